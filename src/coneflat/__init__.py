@@ -1,0 +1,113 @@
+"""Conformal flattening of triangle meshes with automatic cone singularities.
+
+    >>> import coneflat
+    >>> result = coneflat.flatten(vertices, faces)
+    >>> result.uv[result.uv_faces]     # (m, 3, 2), a point of the plane for every triangle corner
+
+Names are imported on first use, so that `import coneflat` takes no time.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "flatten": "pipeline",
+    "Flattening": "result",
+    "PAPER": "options",
+    "read_mesh": "io",
+    "MeshFile": "io",
+    "sample_path": "sample",
+    "TriangleMesh": "mesh",
+    "check_mesh": "validation",
+    "CheckedMesh": "validation",
+    "measure": "distortion",
+    "Distortion": "distortion",
+    "edge_lengths": "geometry",
+    "corner_angles": "geometry",
+    "cotangents": "geometry",
+    "angle_defect": "geometry",
+    "cotangent_laplacian": "geometry",
+    "mollify": "geometry",
+    "greedy_cones": "cones",
+    "cones_at": "cones",
+    "cones_with_curvature": "cones",
+    "ConeSolution": "cones",
+    "scaled_lengths": "conformal.linear",
+    "find_seams": "seams",
+    "cut_open": "seams",
+    "CutMesh": "seams",
+    "least_squares_layout": "layout",
+    "ConeflatError": "errors",
+}
+
+__all__ = [
+    "CheckedMesh",
+    "ConeSolution",
+    "ConeflatError",
+    "CutMesh",
+    "Distortion",
+    "Flattening",
+    "MeshFile",
+    "PAPER",
+    "TriangleMesh",
+    "__version__",
+    "angle_defect",
+    "check_mesh",
+    "cones_at",
+    "cones_with_curvature",
+    "corner_angles",
+    "cotangent_laplacian",
+    "cotangents",
+    "cut_open",
+    "edge_lengths",
+    "errors",
+    "find_seams",
+    "flatten",
+    "greedy_cones",
+    "least_squares_layout",
+    "measure",
+    "mollify",
+    "read_mesh",
+    "sample_path",
+    "scaled_lengths",
+]
+
+if TYPE_CHECKING:
+    from . import errors
+    from .cones import ConeSolution, cones_at, cones_with_curvature, greedy_cones
+    from .conformal.linear import scaled_lengths
+    from .distortion import Distortion, measure
+    from .errors import ConeflatError
+    from .geometry import (
+        angle_defect,
+        corner_angles,
+        cotangent_laplacian,
+        cotangents,
+        edge_lengths,
+        mollify,
+    )
+    from .io import MeshFile, read_mesh
+    from .layout import least_squares_layout
+    from .mesh import TriangleMesh
+    from .options import PAPER
+    from .pipeline import flatten
+    from .result import Flattening
+    from .sample import sample_path
+    from .seams import CutMesh, cut_open, find_seams
+    from .validation import CheckedMesh, check_mesh
+
+
+def __getattr__(name: str) -> Any:
+    if name == "errors":
+        return import_module(".errors", __name__)
+    if name in _HOMES:
+        return getattr(import_module("." + _HOMES[name], __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

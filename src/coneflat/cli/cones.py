@@ -1,0 +1,69 @@
+"""Cones as a user writes them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..errors import MeshFileError, OptionError
+
+_CURVATURE = re.compile(
+    r"(?P<number>[-+]?(?:\d+\.?\d*(?:e[-+]?\d+)?|\.\d+)?)\s*\*?\s*(?P<unit>pi|π|deg|°|rad)?\s*(?:/\s*(?P<by>\d+\.?\d*))?",
+    re.IGNORECASE,
+)
+_UNITS = {"pi": math.pi, "π": math.pi, "deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0, None: 1.0}
+
+
+def parse_cones(words: Sequence[str], path: Path | None) -> dict[int, float | None]:
+    """Return vertex -> curvature (radians, None where it is to be computed) from options and a file.
+
+    Raises:
+        OptionError: what stands there is no cone, or a vertex is named twice.
+        MeshFileError: the file cannot be read.
+    """
+    entries = [(word, word.split(":", 1), "--cone") for word in words]
+    if path is not None:
+        for number, line in enumerate(_lines(path), start=1):
+            text = line.split("#", 1)[0].strip()
+            if text:
+                entries.append((text, re.split(r"[\s,:;]+", text, maxsplit=1), f"{path}, line {number}:"))
+        if not entries:
+            raise OptionError(f"{path} holds no cones")
+    cones: dict[int, float | None] = {}
+    for text, parts, where in entries:
+        try:
+            vertex = int(parts[0])
+        except ValueError as error:
+            raise OptionError(f"{where} {text!r} is not VERTEX or VERTEX:CURVATURE") from error
+        if vertex in cones:
+            raise OptionError(f"{where} vertex {vertex} is given as a cone twice")
+        cones[vertex] = parse_curvature(parts[1], f"{where} {text!r}") if len(parts) > 1 else None
+    return cones
+
+
+def parse_curvature(text: str, where: str) -> float:
+    """Return radians from "1.57", "pi/2", "-0.5pi", "90deg".
+
+    Raises:
+        OptionError: it is none of these.
+    """
+    match = _CURVATURE.fullmatch(text.strip())
+    number = match["number"] if match else ""
+    unit = match["unit"].lower() if match and match["unit"] else None
+    if match is None or (number in ("", "+", "-") and unit not in ("pi", "π")):
+        raise OptionError(f"{where}: {text.strip()!r} is no curvature; write 1.57, pi/2, -0.5pi or 90deg")
+    factor = float(number + "1" if number in ("", "+", "-") else number)
+    divisor = float(match["by"] or 1)
+    if divisor == 0:
+        raise OptionError(f"{where}: division by zero")
+    return factor * _UNITS[unit] / divisor
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise MeshFileError(f"cannot read cones from {path}: {reason}") from error

@@ -1,0 +1,68 @@
+"""The `coneflat` command: its subcommands, and what becomes of errors."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import NoReturn
+
+import click
+
+from .. import __version__
+from ..errors import ConeflatError
+from .demo import demo
+from .flatten import flatten
+
+USER_ERROR = 2
+INTERNAL_ERROR = 1
+INTERRUPTED = 130
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="coneflat")
+def cli() -> None:
+    """Flatten triangle meshes into the plane, conformally and by themselves."""
+
+
+cli.add_command(flatten)
+cli.add_command(demo)
+
+
+def main() -> NoReturn:
+    """Run the command; every failure is one line on stderr and a nonzero exit code."""
+    try:
+        code = cli.main(standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        code = USER_ERROR
+    except click.ClickException as error:
+        code = _fail(f"{error.format_message()}{_hint(error)}", USER_ERROR)
+    except ConeflatError as error:
+        code = _fail(str(error), USER_ERROR)
+    except (KeyboardInterrupt, click.exceptions.Abort):
+        code = _fail("interrupted; nothing was left half-written", INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of our output is gone, as in `coneflat ... | head`; keep the shutdown quiet, too.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = INTERNAL_ERROR
+    except MemoryError:
+        code = _fail("not enough memory for this mesh", INTERNAL_ERROR)
+    except Exception as error:
+        if os.environ.get("CONEFLAT_DEBUG"):
+            raise
+        code = _fail(
+            f"internal error, please report it: {type(error).__name__}: {error} "
+            "(CONEFLAT_DEBUG=1 shows where)",
+            INTERNAL_ERROR,
+        )
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _fail(message: str, code: int) -> int:
+    click.echo(f"coneflat: error: {' '.join(message.split())}", err=True)
+    return code
+
+
+def _hint(error: click.ClickException) -> str:
+    context = getattr(error, "ctx", None)
+    return f" (see `{context.command_path} --help`)" if context is not None else ""

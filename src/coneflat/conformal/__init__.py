@@ -1,0 +1,1 @@
+"""From target curvature to a flat metric: a file per method."""

@@ -1,0 +1,192 @@
+"""Measures of a parameterization, from the mesh and its UVs alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._arrays import BoolArray, FloatArray, IntArray
+from .mesh import NEXT, PREVIOUS, TriangleMesh, label_components
+
+ZERO_AREA = 1e-12  # twice the area over the longest side squared: no digit of the shape is left below
+JOINED = 1e-6  # UV distance over UV edge length at which two sides of an edge count as one
+
+
+@dataclass(frozen=True)
+class Distortion:
+    """Quality of a flattening.
+
+    Quasi-conformal distortion (QC) is the ratio of the singular values of a triangle's map, 1 where it is
+    conformal (Kharevych et al. 2006); means and quantiles are weighted by the area on the model.
+
+    Attributes:
+        qc: (m,) per triangle; NaN where the triangle is degenerate on the model or in the plane.
+        log_area_scale: (m,) log of sqrt(UV area / area on the model); NaN likewise.
+        qc_mean, qc_p95, qc_max: of `qc`.
+        area_std: standard deviation of `log_area_scale`.
+        flipped: triangles that run against the orientation of their chart.
+        degenerate: triangles without area in the plane that have some on the model.
+        degenerate_input: triangles without area on the model.
+        charts: pieces of the layout.
+        mirrored_charts: charts whose orientation is reversed.
+        seam_length: length on the model of all seams, each once, over the square root of the area.
+        seam_mismatch: relative difference of a seam edge's two UV lengths: mean, weighted by length.
+        seam_mismatch_max: the same, the largest.
+        curvature_error: ||target - K||_2 / n of the metric, in units of pi (Table 1 of the paper).
+        curvature_error_max: largest |target - K|, in units of pi.
+    """
+
+    qc: FloatArray
+    log_area_scale: FloatArray
+    qc_mean: float
+    qc_p95: float
+    qc_max: float
+    area_std: float
+    flipped: int
+    degenerate: int
+    degenerate_input: int
+    charts: int
+    mirrored_charts: int
+    seam_length: float
+    seam_mismatch: float
+    seam_mismatch_max: float
+    curvature_error: float = float("nan")
+    curvature_error_max: float = float("nan")
+
+
+def curvature_errors(target: FloatArray, curvature: FloatArray) -> tuple[float, float]:
+    """Return ||target - K||_2 / n as in Table 1 of the paper, and the largest |target - K|, both over pi."""
+    error = (target - curvature) / np.pi
+    return float(np.linalg.norm(error) / len(error)), float(np.abs(error).max())
+
+
+def measure(
+    mesh: TriangleMesh, corner_uv: FloatArray, curvature_error: tuple[float, float] = (np.nan, np.nan)
+) -> Distortion:
+    """Measure a UV map.
+
+    Args:
+        mesh: the mesh.
+        corner_uv: (m, 3, 2) the UV point of every triangle corner.
+        curvature_error: what `curvature_errors` returns for the metric.
+    """
+    area, longest = _model_areas(mesh)
+    one, two = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
+    uv_area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    uv_longest = np.sqrt(np.maximum.reduce([(side**2).sum(axis=1) for side in (one, two, two - one)]))
+    has_area = area > ZERO_AREA * longest**2
+    has_uv_area = np.abs(uv_area) > ZERO_AREA * uv_longest**2
+    valid = has_area & has_uv_area
+    qc = np.full(len(area), np.nan)
+    qc[valid] = _singular_value_ratio(mesh, valid, one[valid], two[valid], area[valid], uv_area[valid])
+    log_scale = np.full(len(area), np.nan)
+    log_scale[valid] = np.log(np.abs(uv_area[valid]) / area[valid]) / 2
+    weights = area[valid]
+    mean_scale = _mean(log_scale[valid], weights)
+
+    seams, charts, chart = _seams_and_charts(mesh, corner_uv)
+    majority = np.sign(np.bincount(chart, weights=np.where(valid, uv_area, 0), minlength=charts))
+    against = np.where(valid, np.sign(uv_area), 0) * majority[chart] < 0
+    seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
+    return Distortion(
+        qc=qc,
+        log_area_scale=log_scale,
+        qc_mean=_mean(qc[valid], weights),
+        qc_p95=_quantile(qc[valid], weights, 0.95),
+        qc_max=float(qc[valid].max()) if len(weights) else float("nan"),
+        area_std=float(np.sqrt(_mean((log_scale[valid] - mean_scale) ** 2, weights))),
+        flipped=int(against.sum()),
+        degenerate=int((has_area & ~has_uv_area).sum()),
+        degenerate_input=int((~has_area).sum()),
+        charts=charts,
+        mirrored_charts=int((majority < 0).sum()),
+        seam_length=float(seam_lengths.sum() / np.sqrt(area.sum() / 2)) if area.sum() > 0 else 0.0,
+        seam_mismatch=_mean(mismatches, seam_lengths) if len(seams) else 0.0,
+        seam_mismatch_max=float(mismatches.max()) if len(seams) else 0.0,
+        curvature_error=curvature_error[0],
+        curvature_error_max=curvature_error[1],
+    )
+
+
+def _model_areas(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
+    """Return twice the area of each triangle in space, and its longest side."""
+    corners = mesh.vertices[mesh.faces]
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    longest = np.sqrt(np.maximum.reduce([(side**2).sum(axis=1) for side in (one, two, two - one)]))
+    return np.linalg.norm(np.cross(one, two), axis=1), longest
+
+
+def _singular_value_ratio(
+    mesh: TriangleMesh,
+    chosen: BoolArray,
+    one: FloatArray,
+    two: FloatArray,
+    area: FloatArray,
+    uv_area: FloatArray,
+) -> FloatArray:
+    """Return the ratio of the singular values of the maps of the chosen triangles.
+
+    Args:
+        one, two: (k, 2) UV sides from corner 0.
+        area, uv_area: (k,) twice the areas.
+    """
+    corners = mesh.vertices[mesh.faces[chosen]]
+    along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    base = np.linalg.norm(along, axis=1)
+    x = (along * across).sum(axis=1) / base
+    height = area / base
+    column_x = one / base[:, None]
+    column_y = (two - column_x * x[:, None]) / height[:, None]
+    similar = np.hypot(column_x[:, 0] + column_y[:, 1], column_x[:, 1] - column_y[:, 0])
+    mirrored = np.hypot(column_x[:, 0] - column_y[:, 1], column_x[:, 1] + column_y[:, 0])
+    # The smaller one from the determinant: their difference would cancel.
+    larger = (similar + mirrored) / 2
+    smaller = np.abs(uv_area) / area / larger
+    ratio: FloatArray = np.maximum(larger / smaller, 1.0)
+    return ratio
+
+
+def _sides(mesh: TriangleMesh, corner_uv: FloatArray, edges: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return the UV ends (k, 2, 2) of interior edges as each of their two faces sees them, in one order."""
+    one, two = mesh.edge_halfedges[edges].T
+    here = np.stack([corner_uv[one // 3, NEXT[one % 3]], corner_uv[one // 3, PREVIOUS[one % 3]]], axis=1)
+    there = np.stack([corner_uv[two // 3, PREVIOUS[two % 3]], corner_uv[two // 3, NEXT[two % 3]]], axis=1)
+    return here, there
+
+
+def _side_lengths(ends: FloatArray) -> FloatArray:
+    lengths: FloatArray = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    return lengths
+
+
+def _seams_and_charts(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[IntArray, int, IntArray]:
+    """Return the interior edges whose UVs differ, the number of charts, and the chart of each face."""
+    inside = np.flatnonzero(~mesh.is_boundary_edge)
+    here, there = _sides(mesh, corner_uv, inside)
+    gap = np.linalg.norm(here - there, axis=2).max(axis=1)
+    joined = gap <= JOINED * np.maximum(_side_lengths(here), _side_lengths(there))
+    faces = mesh.edge_faces[inside[joined]]
+    count, chart = label_components(len(mesh.faces), faces[:, 0], faces[:, 1])
+    return inside[~joined], count, chart
+
+
+def _seam_mismatch(
+    mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the length on the model of each seam edge, and the relative difference of its UV lengths."""
+    here, there = (_side_lengths(ends) for ends in _sides(mesh, corner_uv, seams))
+    ends = mesh.vertices[mesh.edges[seams]]
+    return _side_lengths(ends), np.abs(here - there) / np.maximum((here + there) / 2, np.finfo(float).tiny)
+
+
+def _mean(values: FloatArray, weights: FloatArray) -> float:
+    return float((values * weights).sum() / weights.sum()) if len(values) else float("nan")
+
+
+def _quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
+    if not len(values):
+        return float("nan")
+    order = np.argsort(values, kind="stable")
+    cumulated = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(cumulated, fraction * cumulated[-1])])

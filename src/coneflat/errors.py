@@ -1,0 +1,62 @@
+"""The package's exceptions; every failure a user can cause ends in one of these.
+
+All derive from `ConeflatError`. Messages are one line: what is wrong, where, and what to do about it.
+"""
+
+from __future__ import annotations
+
+
+class ConeflatError(Exception):
+    """Base of every exception that coneflat raises on purpose."""
+
+
+class MeshError(ConeflatError, ValueError):
+    """The mesh is not one that can be flattened."""
+
+
+class EmptyMeshError(MeshError):
+    """There is no vertex or no face."""
+
+
+class ArrayShapeError(MeshError):
+    """An array has the wrong shape or type."""
+
+
+class NonFiniteError(MeshError):
+    """A coordinate is NaN or infinite."""
+
+
+class FaceIndexError(MeshError):
+    """A face names a vertex that does not exist."""
+
+
+class DegenerateFaceError(MeshError):
+    """A face uses a vertex twice, or has no area."""
+
+
+class NonManifoldError(MeshError):
+    """An edge has more than two faces, or a vertex more than one fan of faces."""
+
+
+class NonOrientableError(MeshError):
+    """The faces cannot be oriented consistently (a Moebius strip, a Klein bottle)."""
+
+
+class OptionError(ConeflatError, ValueError):
+    """An option has a value that makes no sense."""
+
+
+class CurvatureError(ConeflatError, ValueError):
+    """The curvatures asked for belong to no metric (Gauss-Bonnet, or a cone of 2 pi and more)."""
+
+
+class MetricError(ConeflatError, ArithmeticError):
+    """No usable flat metric or layout was found."""
+
+
+class MeshFileError(ConeflatError, OSError):
+    """A file cannot be read or written, or is not what its name says."""
+
+
+class UnknownFormatError(MeshFileError):
+    """The file's ending names no format that coneflat knows."""

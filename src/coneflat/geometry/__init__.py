@@ -1,0 +1,17 @@
+"""Pure functions of edge lengths: angles, areas, curvature, Laplacian."""
+
+from .curvature import angle_defect
+from .laplacian import cotangent_laplacian
+from .mollify import mollify
+from .triangles import corner_angles, cotangents, double_areas, edge_lengths, is_broken
+
+__all__ = [
+    "angle_defect",
+    "corner_angles",
+    "cotangent_laplacian",
+    "cotangents",
+    "double_areas",
+    "edge_lengths",
+    "is_broken",
+    "mollify",
+]

@@ -1,0 +1,64 @@
+"""Triangles given by their side lengths: column i is the side opposite corner i.
+
+The formulas go through the slacks b + c - a, evaluated so that needles and caps keep their digits
+(W. Kahan, "Miscalculating area and angles of a needle-like triangle", 2014).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..mesh import NEXT, PREVIOUS
+
+
+def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return (m, 3) side lengths in model units; both sides of an edge get the same bits."""
+    return np.stack(
+        [
+            np.sqrt(((vertices[faces[:, PREVIOUS[i]]] - vertices[faces[:, NEXT[i]]]) ** 2).sum(axis=1))
+            for i in range(3)
+        ],
+        axis=1,
+    )
+
+
+def slacks(lengths: FloatArray) -> FloatArray:
+    """Return (m, 3) b + c - a for every side a; negative where the triangle inequality is broken."""
+    b, c = lengths[:, NEXT], lengths[:, PREVIOUS]
+    return np.minimum(b, c) - (lengths - np.maximum(b, c))
+
+
+def is_broken(lengths: FloatArray) -> BoolArray:
+    """Return (m,) True where the three lengths close to no triangle (Section 2.3 of the paper)."""
+    return np.any(slacks(lengths) < 0, axis=1)
+
+
+def double_areas(lengths: FloatArray) -> FloatArray:
+    """Return (m,) twice the area of each triangle; 0 where the triangle inequality is broken."""
+    slack = np.maximum(slacks(lengths), 0)
+    return np.sqrt(lengths.sum(axis=1) * slack.prod(axis=1)) / 2
+
+
+def corner_angles(lengths: FloatArray) -> FloatArray:
+    """Return (m, 3) corner angles in radians.
+
+    Where the triangle inequality is broken the angles are complex; these are their real parts, pi opposite
+    the side that is too long and 0 at the others (Section 4.3 of the paper).
+    """
+    slack = np.maximum(slacks(lengths), 0)
+    perimeter = lengths.sum(axis=1, keepdims=True)
+    angles: FloatArray = 2 * np.arctan2(
+        np.sqrt(slack[:, NEXT] * slack[:, PREVIOUS]), np.sqrt(perimeter * slack)
+    )
+    return angles
+
+
+def cotangents(lengths: FloatArray) -> FloatArray:
+    """Return (m, 3) cotangents of the corner angles; the triangles must have area."""
+    slack = slacks(lengths)
+    perimeter = lengths.sum(axis=1, keepdims=True)
+    cots: FloatArray = (perimeter * slack - slack[:, NEXT] * slack[:, PREVIOUS]) / (
+        4 * double_areas(lengths)[:, None]
+    )
+    return cots

@@ -1,0 +1,21 @@
+"""Reading meshes from files, and writing flattened meshes to them."""
+
+from __future__ import annotations
+
+from .atomic import atomic_write
+from .model import MeshFile
+from .polygons import is_polygon_side, triangulate
+from .read import INPUT_FORMATS, read_mesh
+from .write import OUTPUT_FORMATS, check_output, write_flattening
+
+__all__ = [
+    "INPUT_FORMATS",
+    "OUTPUT_FORMATS",
+    "MeshFile",
+    "atomic_write",
+    "check_output",
+    "is_polygon_side",
+    "read_mesh",
+    "triangulate",
+    "write_flattening",
+]

@@ -1,0 +1,82 @@
+"""Writing a file so that it is there in full or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import IO, Any
+
+from ..errors import ConeflatError, MeshFileError
+
+
+def check_target(path: str | PathLike[str]) -> Path:
+    """Return the file that a path names, links followed, if it looks as if it could be written.
+
+    Raises:
+        MeshFileError: the folder is missing, or the path is something other than a file, or writing is not
+            permitted.
+    """
+    path = Path(path)
+    try:
+        target = Path(os.path.realpath(path))
+        folder = target.parent
+        if not folder.is_dir():
+            raise MeshFileError(f"{path} cannot be written: there is no folder {folder}; create it first")
+        if target.is_dir():
+            raise MeshFileError(f"{path} cannot be written: it is a folder")
+        if target.exists():
+            if not target.is_file():
+                raise MeshFileError(f"{path} cannot be written: it is not an ordinary file")
+            if not os.access(target, os.W_OK):
+                raise MeshFileError(f"{path} cannot be written: no permission to change it")
+        if not os.access(folder, os.W_OK):
+            raise MeshFileError(f"{path} cannot be written: no permission to write in {folder}")
+    except ConeflatError:
+        raise
+    except (OSError, ValueError) as error:
+        raise _failure(path, error) from error
+    return target
+
+
+@contextmanager
+def atomic_write(path: str | PathLike[str], mode: str = "wb") -> Iterator[IO[Any]]:
+    """Open a file that appears under its name only when it is complete.
+
+    The content goes to a temporary file in the same folder, which takes the name at the end of the block; if
+    the block ends by any exception, it is removed and an older file of that name stays as it was.
+
+    Args:
+        path: the file to write.
+        mode: "wb" for bytes, "w" for text, which is UTF-8 with the line ends as given.
+
+    Raises:
+        MeshFileError: the file cannot be written, or the disk is full.
+    """
+    if mode not in ("w", "wb"):
+        raise ValueError(f"mode must be 'w' or 'wb', not {mode!r}")
+    target = check_target(path)
+    # Created by open(), and not by tempfile, so that it has the permissions of any new file.
+    temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
+    text = {} if mode == "wb" else {"encoding": "utf-8", "newline": ""}
+    try:
+        with open(temporary, mode.replace("w", "x"), **text) as stream:  # type: ignore[call-overload]
+            yield stream
+        if target.exists():
+            shutil.copymode(target, temporary)
+        os.replace(temporary, target)
+    except ConeflatError:
+        raise
+    except OSError as error:
+        raise _failure(Path(path), error) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _failure(path: Path, error: Exception) -> MeshFileError:
+    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return MeshFileError(f"{path} cannot be written: {reason}")

@@ -1,0 +1,252 @@
+"""Reading PLY, text and binary, with its polygons."""
+
+from __future__ import annotations
+
+import re
+import struct
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from .._arrays import FloatArray, IntArray
+from ..errors import EmptyMeshError, MeshFileError
+from .raw import RawMesh
+from .text import first_unreadable, shown
+
+_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+#: One property of an element, all rows of it.
+Column: TypeAlias = "np.ndarray[tuple[int, ...], np.dtype[Any]]"
+
+_STRUCT = {
+    "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
+    "f4": "f", "f8": "d",
+}  # fmt: skip
+_CORNERS = ("vertex_indices", "vertex_index")
+
+
+@dataclass(frozen=True)
+class _Property:
+    name: str
+    kind: str  # numpy code of the value, or of a list's items
+    count: str | None = None  # numpy code of a list's length
+
+
+@dataclass(frozen=True)
+class _Element:
+    name: str
+    length: int
+    properties: tuple[_Property, ...] = ()
+
+
+def parse_ply(path: Path, content: bytes) -> RawMesh:
+    """Return the mesh of a PLY file.
+
+    Raises:
+        MeshFileError: the file is not PLY, is shorter than its header promises, or has text for a number.
+        EmptyMeshError: it has no vertex or no face.
+    """
+    form, elements, start = _header(path, content)
+    if form == "ascii":
+        # As an array of doubles the text is read by the same code as the binary forms; doubles hold every
+        # index a file can have.
+        content, start, order = _text_values(path, content, start).tobytes(), 0, "<"
+        elements = [_as_doubles(element) for element in elements]
+    else:
+        order = "<" if form == "binary_little_endian" else ">"
+
+    vertices: FloatArray | None = None
+    polygons: tuple[IntArray, IntArray] | None = None
+    for element in elements:
+        wanted = _wanted(path, element)
+        try:
+            columns, start = _decode(content, start, element, wanted, order)
+        except (_EndOfFile, struct.error) as error:
+            raise MeshFileError(
+                f"{path} ends before the {element.length} {element.name} elements its header promises"
+            ) from error
+        if element.name == "vertex":
+            vertices = np.stack([np.asarray(c, np.float64) for c in columns], axis=1)
+        elif element.name == "face":
+            sizes, corners = columns
+            polygons = (sizes.astype(np.int64), _whole(path, corners))
+        if vertices is not None and polygons is not None:
+            break
+    if vertices is None or not len(vertices):
+        raise EmptyMeshError(f"{path} has no vertices")
+    if polygons is None or not len(polygons[0]):
+        raise EmptyMeshError(f"{path} has no faces")
+    return RawMesh(vertices, polygons[1], np.concatenate(([0], np.cumsum(polygons[0]))))
+
+
+def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
+    """Return the form, the elements, and where the header ends."""
+    end = content.find(b"end_header")
+    if not content.startswith(b"ply") or end < 0:
+        raise MeshFileError(f"{path} is not a PLY file: it has no PLY header")
+    lines = content[:end].splitlines()
+    start = end + len(b"end_header")
+    while content[start : start + 1] == b" ":
+        start += 1
+    # A lone carriage return ends the lines of some old files; what follows it is data then.
+    start += 2 if content[start : start + 2] == b"\r\n" and b"\n" in content[:end] else 1
+
+    form = ""
+    elements: list[_Element] = []
+    for i, line in enumerate(lines):
+        words = line.decode("latin-1").split()
+        try:
+            if words[:1] == ["format"]:
+                form = words[1]
+            elif words[:1] == ["element"]:
+                elements.append(_Element(words[1], int(words[2])))
+                if elements[-1].length < 0:
+                    raise ValueError("a negative count")
+            elif words[:1] == ["property"]:
+                if words[1] == "list":
+                    new = _Property(words[4], _TYPES[words[3]], _TYPES[words[2]])
+                else:
+                    new = _Property(words[2], _TYPES[words[1]])
+                elements[-1] = replace(elements[-1], properties=(*elements[-1].properties, new))
+        except (IndexError, KeyError, ValueError) as error:
+            raise MeshFileError(f"{path}, line {i + 1}: not a line of a PLY header: {line!r}") from error
+    if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
+        raise MeshFileError(f"{path} is not a PLY file: its header names no known format")
+    return form, elements, start
+
+
+def _wanted(path: Path, element: _Element) -> list[int]:
+    """Return which properties of an element make up the mesh."""
+    if element.name == "vertex":
+        names = [p.name for p in element.properties]
+        missing = [axis for axis in "xyz" if axis not in names]
+        if missing:
+            raise MeshFileError(f"{path}: its vertices have no property {missing[0]!r}")
+        return [names.index(axis) for axis in "xyz"]
+    if element.name == "face":
+        lists = [i for i, p in enumerate(element.properties) if p.count]
+        named = [i for i in lists if element.properties[i].name in _CORNERS]
+        if not named and len(lists) != 1:
+            raise MeshFileError(f"{path}: its faces have no list 'vertex_indices'")
+        return named[:1] or lists
+    return []
+
+
+class _EndOfFile(Exception):
+    """The file is shorter than its header promises."""
+
+
+def _decode(
+    content: bytes, start: int, element: _Element, wanted: list[int], order: str
+) -> tuple[list[Column], int]:
+    """Return the wanted columns of an element, a list as two (lengths, items), and where it ends."""
+    lists = [i for i, p in enumerate(element.properties) if p.count]
+    lengths = dict.fromkeys(lists, 0)
+    if element.length and lists:
+        lengths = _first_lengths(content, start, element, order)
+    fields: list[tuple[str, str] | tuple[str, str, int]] = []
+    for i, p in enumerate(element.properties):
+        if p.count:
+            fields += [(f"n{i}", order + p.count), (f"p{i}", order + p.kind, lengths[i])]
+        else:
+            fields.append((f"p{i}", order + p.kind))
+    row = np.dtype(fields)
+    stop = start + element.length * row.itemsize
+    if stop <= len(content):
+        rows = np.frombuffer(content, row, element.length, start)
+        if all(np.all(rows[f"n{i}"] == lengths[i]) for i in lists):
+            columns: list[Column] = []
+            for i in wanted:
+                if i in lengths:
+                    columns.append(np.full(element.length, lengths[i], dtype=np.int64))
+                columns.append(rows[f"p{i}"].reshape(-1))
+            return columns, stop
+    if not lists:
+        raise _EndOfFile
+    return _decode_ragged(content, start, element, wanted, order)
+
+
+def _first_lengths(content: bytes, start: int, element: _Element, order: str) -> dict[int, int]:
+    """Return the length of every list of an element's first row."""
+    lengths = {}
+    for i, p in enumerate(element.properties):
+        if p.count:
+            counter = struct.Struct(order + _STRUCT[p.count])
+            lengths[i] = _length(counter.unpack_from(content, start)[0])
+            start += counter.size + lengths[i] * np.dtype(p.kind).itemsize
+        else:
+            start += np.dtype(p.kind).itemsize
+        if start > len(content):
+            raise _EndOfFile
+    return lengths
+
+
+def _length(value: float) -> int:
+    if not 0 <= value < 2**31 or value != int(value):
+        raise ValueError(f"a list has the length {value}")
+    return int(value)
+
+
+def _decode_ragged(
+    content: bytes, start: int, element: _Element, wanted: list[int], order: str
+) -> tuple[list[Column], int]:
+    """Return what `_decode` does, of an element whose lists differ in length."""
+    sizes = [np.dtype(p.kind).itemsize for p in element.properties]
+    counters = [struct.Struct(order + _STRUCT[p.count]) if p.count else None for p in element.properties]
+    places: list[list[int]] = [[] for _ in sizes]
+    lengths: list[list[int]] = [[] for _ in sizes]
+    for _ in range(element.length):
+        for i, counter in enumerate(counters):
+            length = 1
+            if counter is not None:
+                length = _length(counter.unpack_from(content, start)[0])
+                start += counter.size
+            places[i].append(start)
+            lengths[i].append(length)
+            start += length * sizes[i]
+        if start > len(content):
+            raise _EndOfFile
+    codes = np.frombuffer(content, np.uint8)
+    columns: list[Column] = []
+    for i in wanted:
+        counts = np.array(lengths[i], dtype=np.int64)
+        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        first = np.repeat(np.array(places[i], dtype=np.int64), counts) + within * sizes[i]
+        kind = np.dtype(order + element.properties[i].kind)
+        items = codes[first[:, None] + np.arange(sizes[i])].reshape(-1).view(kind)
+        columns += [counts, items] if counters[i] else [items]
+    return columns, start
+
+
+def _text_values(path: Path, content: bytes, start: int) -> FloatArray:
+    """Return all numbers of a text body."""
+    words = content[start:].split()
+    try:
+        return np.array(words, dtype="<f8")
+    except ValueError as error:
+        bad = words[first_unreadable(words, float)]
+        before = re.split(rb"(?<!\S)" + re.escape(bad) + rb"(?!\S)", content[start:], maxsplit=1)[0]
+        line = len(content[:start].splitlines()) + before.count(b"\n") + 1
+        raise MeshFileError(f"{path}, line {line}: {shown(bad)} is not a number") from error
+
+
+def _as_doubles(element: _Element) -> _Element:
+    """Return an element with all properties as `_text_values` gives them."""
+    return replace(
+        element,
+        properties=tuple(_Property(p.name, "f8", "f8" if p.count else None) for p in element.properties),
+    )
+
+
+def _whole(path: Path, corners: Column) -> IntArray:
+    """Return corners as integers, which in a text they need not be."""
+    numbers = corners.astype(np.int64)
+    if np.any(numbers != corners):
+        odd = corners[np.argmax(numbers != corners)]
+        raise MeshFileError(f"{path}: a face names vertex {odd}, which is not a whole number")
+    return numbers

@@ -1,0 +1,122 @@
+"""Triangulating polygons."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..errors import DegenerateFaceError, FaceIndexError
+from .ngons import triangulate_ngons
+
+#: Part of a quad's area below which one of its halves counts as empty or turned over: far above the
+#: rounding of a collinear corner (about 1e-16), far below any triangle worth having.
+_EMPTY_HALF = 1e-9
+
+#: Relative difference below which the diagonals of a quad are equally long, as in every square; without it
+#: rounding would choose another one for each cell of a rotated grid.
+_EQUAL_DIAGONALS = 1e-9
+
+
+def triangulate(vertices: FloatArray, corners: IntArray, offsets: IntArray) -> tuple[IntArray, IntArray]:
+    """Return triangles that cover polygons, k - 2 for each polygon of k corners, oriented as it is.
+
+    A quad is split along the diagonal that leaves both halves facing the way the quad does; if both
+    diagonals do, along the shorter. Larger polygons become fans where they are convex and go through ear
+    clipping where they are not. Coordinates may be NaN: the result is valid in its indices then.
+
+    Args:
+        vertices: (n, 3) positions.
+        corners: (c,) vertex of every polygon corner, polygon after polygon.
+        offsets: (p + 1,) polygon i owns corners[offsets[i]:offsets[i + 1]].
+
+    Returns:
+        (m, 3) vertex indices, in the order of the polygons; (m, 3) index into `corners` of the same.
+
+    Raises:
+        DegenerateFaceError: a polygon has fewer than 3 corners.
+        FaceIndexError: a corner names a vertex that does not exist.
+    """
+    corners = np.asarray(corners, dtype=np.int64)
+    offsets = np.asarray(offsets, dtype=np.int64)
+    sizes = np.diff(offsets)
+    _check(len(vertices), corners, offsets, sizes)
+
+    first_triangle = np.cumsum(sizes - 2) - (sizes - 2)
+    face_corners = np.empty((int((sizes - 2).sum()), 3), dtype=np.int64)
+
+    triangles = sizes == 3
+    face_corners[first_triangle[triangles]] = offsets[:-1][triangles, None] + np.arange(3)
+
+    quads = np.flatnonzero(sizes == 4)
+    if len(quads):
+        own = offsets[quads, None] + np.arange(4)
+        use_02 = _splits_at_first_corner(vertices, corners[own])[:, None, None]
+        local = np.where(use_02, [[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]])
+        rows = first_triangle[quads, None] + np.arange(2)
+        face_corners[rows] = offsets[quads, None, None] + local
+
+    for size in np.unique(sizes[sizes > 4]).tolist():
+        polygons = np.flatnonzero(sizes == size)
+        own = offsets[polygons, None] + np.arange(size)
+        local = triangulate_ngons(vertices[corners[own]])
+        rows = first_triangle[polygons, None] + np.arange(size - 2)
+        face_corners[rows] = offsets[polygons, None, None] + local
+    return corners[face_corners], face_corners
+
+
+def is_polygon_side(face_corners: IntArray, offsets: IntArray) -> BoolArray:
+    """Return (m, 3) whether the side from triangle corner k to k + 1 is a side of its polygon.
+
+    False for the diagonals that `triangulate` put in. Triangles may run either way around.
+
+    Args:
+        face_corners: (m, 3) polygon corner at each triangle corner.
+        offsets: (p + 1,) where the corners of each polygon begin.
+    """
+    polygon = np.searchsorted(offsets, face_corners[:, 0], side="right") - 1
+    sizes = np.diff(offsets)[polygon][:, None]
+    steps = np.abs(face_corners - np.roll(face_corners, -1, axis=1))
+    return np.asarray((steps == 1) | (steps == sizes - 1))
+
+
+def _check(vertex_count: int, corners: IntArray, offsets: IntArray, sizes: IntArray) -> None:
+    if np.any(sizes < 3):
+        i = int(np.argmax(sizes < 3))
+        raise DegenerateFaceError(f"face {i} has {sizes[i]} corners, but a face needs at least 3")
+    bad = (corners < 0) | (corners >= vertex_count)
+    if bad.any():
+        c = int(np.argmax(bad))
+        i = int(np.searchsorted(offsets, c, side="right")) - 1
+        raise FaceIndexError(f"face {i} names vertex {corners[c]}, but there are {vertex_count} vertices")
+
+
+def _splits_at_first_corner(vertices: FloatArray, quads: IntArray) -> BoolArray:
+    """Return (q,) whether to split quads from corner 0 to 2 rather than from 1 to 3.
+
+    The choice does not depend on which corner is named first.
+    """
+    p0, p1, p2, p3 = (vertices[quads[:, k]] for k in range(4))
+    with np.errstate(invalid="ignore", over="ignore"):
+        normal = np.cross(p2 - p0, p3 - p1)
+        least = _EMPTY_HALF * _dot(normal, normal)
+        valid_02 = (_dot(np.cross(p1 - p0, p2 - p0), normal) > least) & (
+            _dot(np.cross(p2 - p0, p3 - p0), normal) > least
+        )
+        valid_13 = (_dot(np.cross(p1 - p0, p3 - p0), normal) > least) & (
+            _dot(np.cross(p2 - p1, p3 - p1), normal) > least
+        )
+        length_02 = _dot(p2 - p0, p2 - p0)
+        length_13 = _dot(p3 - p1, p3 - p1)
+        choice = length_02 < length_13
+        tied = np.abs(length_02 - length_13) <= _EQUAL_DIAGONALS * (length_02 + length_13)
+    if tied.any():
+        # The corner that comes first by coordinates decides; on a grid all diagonals run one way then.
+        rank = np.empty(len(vertices), dtype=np.int64)
+        rank[np.lexsort(vertices.T[::-1])] = np.arange(len(vertices))
+        ranks = rank[quads[tied]]
+        choice[tied] = ranks[:, [0, 2]].min(axis=1) < ranks[:, [1, 3]].min(axis=1)
+    return np.where(valid_02 == valid_13, choice, valid_02)
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(np.einsum("ij,ij->i", a, b))

@@ -1,0 +1,77 @@
+"""What every reader returns, and the errors they share."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .._arrays import FloatArray, IntArray
+from ..errors import EmptyMeshError, FaceIndexError, MeshFileError
+
+if TYPE_CHECKING:
+    from .obj import ObjText
+
+
+class RawMesh(NamedTuple):
+    """The content of a mesh file: (n, 3) vertices, (c,) corners, (p + 1,) offsets, and an OBJ file's text."""
+
+    vertices: FloatArray
+    corners: IntArray
+    offsets: IntArray
+    obj: ObjText | None = None
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the content of a file.
+
+    Raises:
+        MeshFileError: there is no such file, it is a directory, or it may not be read.
+        EmptyMeshError: the file is empty.
+    """
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError as error:
+        raise MeshFileError(f"{path}: there is no such file") from error
+    except IsADirectoryError as error:
+        raise MeshFileError(f"{path} is a folder, not a mesh file") from error
+    except PermissionError as error:
+        reason = "is a folder, not a mesh file" if os.path.isdir(path) else "may not be read (no permission)"
+        raise MeshFileError(f"{path} {reason}") from error
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise MeshFileError(f"{path} cannot be read: {reason}") from error
+    if not content.strip():
+        raise EmptyMeshError(f"{path} is empty")
+    return content
+
+
+def check_corners(path: Path, mesh: RawMesh) -> None:
+    """Refuse a mesh without vertices or faces, with a face of fewer than 3 corners, or a bad index.
+
+    Raises:
+        EmptyMeshError, MeshFileError, FaceIndexError: respectively.
+    """
+    count = len(mesh.vertices)
+    if count == 0:
+        raise EmptyMeshError(f"{path} has no vertices")
+    if len(mesh.offsets) < 2:
+        raise EmptyMeshError(f"{path} has no faces")
+    sizes = np.diff(mesh.offsets)
+    if sizes.min() < 3:
+        i = int(np.argmax(sizes < 3))
+        raise MeshFileError(f"{path}: face {i} has {sizes[i]} corners, but a face needs at least 3")
+    bad = (mesh.corners < 0) | (mesh.corners >= count)
+    if bad.any():
+        c = int(np.argmax(bad))
+        i = int(np.searchsorted(mesh.offsets, c, side="right")) - 1
+        raise FaceIndexError(
+            f"{path}: face {i} names vertex {mesh.corners[c]}, but there are {count} vertices, from 0 on"
+        )
+
+
+def triangle_offsets(count: int) -> IntArray:
+    """Return (count + 1,) the offsets of `count` triangles."""
+    return np.arange(0, 3 * count + 1, 3, dtype=np.int64)

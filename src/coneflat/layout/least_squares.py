@@ -1,0 +1,94 @@
+"""Least squares reconstruction from angles (ABF++, Sheffer et al. 2005; Section 4.3 of the paper)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import bmat, csc_matrix, csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from .._arrays import FloatArray, IntArray
+from ..errors import MetricError
+from ..geometry import corner_angles, is_broken
+from ..mesh import NEXT, PREVIOUS, TriangleMesh
+from ..solver import factorize
+
+
+def least_squares_layout(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
+    """Lay out a disk so that its angles fit those of a nearly flat metric in the least squares sense.
+
+    With p1 p2 the longest side of a triangle, p3 - p1 = (l13 / l12) e^(i a1) (p2 - p1) is asked of each.
+    Where the triangle inequality is broken, the angles are the real parts of the complex ones: p3 lies on
+    the side p1 p2 and divides it as l13 : l32.
+
+    Args:
+        disk: a topological disk.
+        lengths: (m, 3) side lengths of the metric.
+
+    Returns:
+        (n, 2) points, up to a similarity.
+
+    Raises:
+        MetricError: the system has no finite solution.
+    """
+    equations = _equations(disk, lengths)
+    pins = _pins(disk, lengths)
+    normal = csr_matrix(equations.conj().T @ equations)
+    free = np.ones(len(disk.vertices), dtype=bool)
+    free[pins] = False
+    inner = normal[free][:, free]
+    system = csc_matrix(bmat([[inner.real, -inner.imag], [inner.imag, inner.real]]))
+    points = np.zeros(len(disk.vertices), dtype=complex)
+    points[pins[1]] = 1.0
+    factor = factorize(system)
+    # The second round removes what the squared condition number of normal equations cost.
+    for _ in range(2):
+        residual = -(equations.conj().T @ (equations @ points))[free]
+        step = factor.solve(np.concatenate([residual.real, residual.imag]))
+        points[free] += step[: len(residual)] + 1j * step[len(residual) :]
+    if not np.isfinite(points).all():
+        raise MetricError(
+            f"the layout of {len(disk.faces)} triangles has no finite solution: "
+            f"{int(is_broken(lengths).sum())} of them break the triangle inequality"
+        )
+    return np.stack([points.real, points.imag], axis=1)
+
+
+def _equations(disk: TriangleMesh, lengths: FloatArray) -> csr_matrix:
+    """Return the complex (m, n) matrix whose rows vanish on triangles of the right shape."""
+    rows = np.arange(len(disk.faces))
+    third = np.argmax(lengths, axis=1)
+    first, second = NEXT[third], PREVIOUS[third]
+    l13, l32 = lengths[rows, second], lengths[rows, first]
+    l12 = np.minimum(lengths[rows, third], l13 + l32)  # a side that is too long is as if just long enough
+    turn = l13 / l12 * np.exp(1j * corner_angles(lengths)[rows, first])
+    columns = disk.faces[rows[:, None], np.stack([first, second, third], axis=1)]
+    values = np.stack([turn - 1, -turn, np.ones(len(rows))], axis=1)
+    return csr_matrix(
+        (values.ravel(), (np.repeat(rows, 3), columns.ravel())), shape=(len(rows), len(disk.vertices))
+    )
+
+
+def _pins(disk: TriangleMesh, lengths: FloatArray) -> IntArray:
+    """Return two vertices far apart, off broken triangles.
+
+    Two pins close together, or held by a triangle that has no shape, leave the system nearly singular.
+    """
+    graph = csr_matrix(
+        (lengths[disk.edge_halfedges[:, 0] // 3, disk.edge_halfedges[:, 0] % 3], tuple(disk.edges.T)),
+        shape=(len(disk.vertices),) * 2,
+    )
+    allowed = np.ones(len(disk.vertices), dtype=bool)
+    allowed[disk.faces[is_broken(lengths)]] = False
+    if allowed.sum() < 2:
+        allowed[:] = True
+    # A start that does not depend on the numbering: the vertex farthest out, inside if possible, since the
+    # two copies of a seam vertex are equally far.
+    offset = ((disk.vertices - disk.vertices.mean(axis=0)) ** 2).sum(axis=1)
+    inside = allowed & ~disk.is_boundary_vertex
+    pins = [int(np.argmax(np.where(inside if inside.any() else allowed, offset, -1)))]
+    for _ in range(2):  # the farthest from there, then the farthest from that
+        distance = dijkstra(graph, directed=False, indices=pins[-1])
+        distance[~allowed] = -1
+        distance[pins[-1]] = -1
+        pins.append(int(np.argmax(distance)))
+    return np.array(pins[1:])

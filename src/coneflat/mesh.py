@@ -1,0 +1,172 @@
+"""Triangle meshes and their connectivity.
+
+Half-edge `h = 3 * f + i` is the side of face `f` opposite its corner `i`: it runs from corner `i + 1` to
+corner `i + 2` (mod 3). So everything that belongs to a side (length, cotangent, twin) has the index of
+the corner it lies opposite to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from ._arrays import BoolArray, FloatArray, IntArray
+
+NEXT = np.array([1, 2, 0])
+PREVIOUS = np.array([2, 0, 1])
+
+
+def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
+    """Return the number of connected components of a graph and the component of each of its nodes."""
+    graph = coo_matrix((np.ones(len(tails), dtype=np.int8), (tails, heads)), shape=(count, count))
+    number, labels = connected_components(graph, directed=False)
+    return int(number), labels.astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """A manifold, consistently oriented triangle mesh without isolated vertices.
+
+    `coneflat.validation.check_mesh` makes one out of arbitrary arrays, or says why it cannot.
+
+    Attributes:
+        vertices: (n, 3) positions.
+        faces: (m, 3) vertex indices.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+
+    @cached_property
+    def _pairing(self) -> tuple[IntArray, IntArray, IntArray]:
+        """Edges as vertex pairs (e, 2), edge of each half-edge (3m,), half-edges of each edge (e, 2)."""
+        tails, heads = self.tails, self.heads
+        keys = np.minimum(tails, heads) * len(self.vertices) + np.maximum(tails, heads)
+        order = np.argsort(keys, kind="stable")
+        first = np.ones(len(keys), dtype=bool)
+        first[1:] = keys[order[1:]] != keys[order[:-1]]
+        edge_of = np.empty(len(keys), dtype=np.int64)
+        edge_of[order] = np.cumsum(first) - 1
+        one = order[first]
+        two = np.full(len(one), -1, dtype=np.int64)
+        two[edge_of[order[~first]]] = order[~first]
+        pairs = np.sort(np.stack([tails[one], heads[one]], axis=1), axis=1)
+        return pairs, edge_of, np.stack([one, two], axis=1)
+
+    @cached_property
+    def tails(self) -> IntArray:
+        """(3m,) vertex that each half-edge starts from."""
+        return self.faces[:, NEXT].ravel()
+
+    @cached_property
+    def heads(self) -> IntArray:
+        """(3m,) vertex that each half-edge ends at."""
+        return self.faces[:, PREVIOUS].ravel()
+
+    @property
+    def edges(self) -> IntArray:
+        """(e, 2) vertex pairs, the smaller index first."""
+        return self._pairing[0]
+
+    @property
+    def halfedge_edges(self) -> IntArray:
+        """(3m,) edge of each half-edge."""
+        return self._pairing[1]
+
+    @property
+    def edge_halfedges(self) -> IntArray:
+        """(e, 2) the half-edges of each edge; the second is -1 on the boundary."""
+        return self._pairing[2]
+
+    @cached_property
+    def edge_faces(self) -> IntArray:
+        """(e, 2) the faces beside each edge; the second is -1 on the boundary."""
+        return np.where(self.edge_halfedges < 0, -1, self.edge_halfedges // 3)
+
+    @cached_property
+    def is_boundary_edge(self) -> BoolArray:
+        """(e,) True for edges with one face."""
+        return self.edge_halfedges[:, 1] < 0
+
+    @cached_property
+    def is_boundary_vertex(self) -> BoolArray:
+        """(n,) True for vertices on a boundary loop."""
+        mask = np.zeros(len(self.vertices), dtype=bool)
+        mask[self.edges[self.is_boundary_edge]] = True
+        return mask
+
+    @cached_property
+    def boundary_loops(self) -> tuple[int, IntArray]:
+        """The number of boundary loops, and the loop of each vertex (n,), -1 inside."""
+        on_boundary = np.flatnonzero(self.is_boundary_vertex)
+        local = np.full(len(self.vertices), -1, dtype=np.int64)
+        local[on_boundary] = np.arange(len(on_boundary))
+        sides = local[self.edges[self.is_boundary_edge]]
+        count, labels = label_components(len(on_boundary), sides[:, 0], sides[:, 1])
+        local[on_boundary] = labels
+        return count, local
+
+    @cached_property
+    def components(self) -> tuple[int, IntArray]:
+        """The number of connected components, and the component of each vertex (n,)."""
+        return label_components(len(self.vertices), self.edges[:, 0], self.edges[:, 1])
+
+    @property
+    def euler_characteristic(self) -> int:
+        """Vertices minus edges plus faces."""
+        return len(self.vertices) - len(self.edges) + len(self.faces)
+
+    def genus(self) -> int:
+        """The number of handles of a connected mesh."""
+        return (2 - self.euler_characteristic - self.boundary_loops[0]) // 2
+
+    def split_components(self) -> list[tuple[TriangleMesh, IntArray, IntArray]]:
+        """Return each component as a mesh of its own, with its vertex and face indices in this mesh."""
+        count, labels = self.components
+        if count == 1:
+            return [(self, np.arange(len(self.vertices)), np.arange(len(self.faces)))]
+        face_order = np.argsort(labels[self.faces[:, 0]], kind="stable")
+        vertex_order = np.argsort(labels, kind="stable")
+        face_cuts = np.cumsum(np.bincount(labels[self.faces[:, 0]], minlength=count))[:-1]
+        vertex_cuts = np.cumsum(np.bincount(labels, minlength=count))[:-1]
+        local = np.empty(len(labels), dtype=np.int64)
+        parts = []
+        for vertices, faces in zip(
+            np.split(vertex_order, vertex_cuts), np.split(face_order, face_cuts), strict=True
+        ):
+            local[vertices] = np.arange(len(vertices))
+            parts.append((TriangleMesh(self.vertices[vertices], local[self.faces[faces]]), vertices, faces))
+        return parts
+
+
+def corner_fans(faces: IntArray, one: IntArray, two: IntArray) -> tuple[int, IntArray]:
+    """Join the corners that meet across pairs of half-edges.
+
+    Args:
+        faces: (m, 3) vertex indices.
+        one, two: (k,) half-edges glued to each other, on the same pair of vertices.
+
+    Returns:
+        The number of fans (classes of joined corners) and the fan of each corner (m, 3). Gluing along all
+        interior edges, a vertex of a manifold has one fan; leaving seams unglued, the fans are the
+        vertices of the cut mesh.
+    """
+    flat = faces.ravel()
+    # A half-edge's end corners, ordered so that both sides name the same vertex first.
+    start_one, end_one = _end_corners(one)
+    start_two, end_two = _end_corners(two)
+    opposed = flat[start_one] == flat[end_two]
+    start_two, end_two = np.where(opposed, end_two, start_two), np.where(opposed, start_two, end_two)
+    count, labels = label_components(
+        faces.size, np.concatenate([start_one, end_one]), np.concatenate([start_two, end_two])
+    )
+    return count, labels.reshape(faces.shape)
+
+
+def _end_corners(halfedges: IntArray) -> tuple[IntArray, IntArray]:
+    base = halfedges - halfedges % 3
+    return base + NEXT[halfedges % 3], base + PREVIOUS[halfedges % 3]

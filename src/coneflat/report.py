@@ -1,0 +1,94 @@
+"""The numbers of a flattening, for people and for programs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .result import Flattening
+
+MEASURES = (
+    "curvature_error",
+    "curvature_error_max",
+    "qc_mean",
+    "qc_p95",
+    "qc_max",
+    "area_std",
+    "flipped",
+    "degenerate",
+    "degenerate_input",
+    "charts",
+    "mirrored_charts",
+    "seam_length",
+    "seam_mismatch",
+    "seam_mismatch_max",
+)
+
+
+def as_dict(result: Flattening) -> dict[str, Any]:
+    """Return every measure as plain values; what is not finite becomes None, so that it is valid JSON."""
+    report: dict[str, Any] = {
+        "input": str(result.source.path) if result.source else None,
+        "vertices": len(result.vertices),
+        "triangles": len(result.faces),
+        "cones": len(result.cones),
+        **{name: getattr(result.distortion, name) for name in MEASURES},
+        "broken": result.broken,
+        "uv_scale": result.uv_scale,
+        "cone_vertices": result.cones.tolist(),
+        "cone_curvatures": result.curvatures.tolist(),
+        "seconds": dict(result.seconds),
+        "notes": list(result.notes),
+        "settings": dict(result.settings),
+    }
+    return {name: _plain(value) for name, value in report.items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
+    """Return (measure, value, meaning) rows of the table that the commands print."""
+    d = result.distortion
+    curvatures = result.curvatures / np.pi
+    cones = f"{len(result.cones)}"
+    if len(result.cones):
+        cones += f"  ({curvatures.min():+.3f} to {curvatures.max():+.3f} pi)"
+    return [
+        ("triangles", f"{len(result.faces):,}", f"{len(result.vertices):,} vertices"),
+        ("cones", cones, "singular vertices, and their curvatures"),
+        (
+            "curvature error",
+            f"{d.curvature_error:.2e} pi",
+            f"||target - K|| / n; worst {d.curvature_error_max:.2e} pi",
+        ),
+        (
+            "QC distortion",
+            f"{d.qc_mean:.4f}",
+            f"1 is conformal; 95% below {d.qc_p95:.4f}, worst {d.qc_max:.4g}",
+        ),
+        ("area distortion", f"{d.area_std:.4f}", "standard deviation of the log of the scale"),
+        ("flipped", f"{d.flipped:,}", "triangles upside down"),
+        (
+            "degenerate",
+            f"{d.degenerate:,}",
+            f"without area in the plane; {d.degenerate_input:,} had none before",
+        ),
+        ("charts", f"{d.charts:,}", "pieces of the layout"),
+        ("seam length", f"{d.seam_length:.3f}", "over the square root of the area"),
+        (
+            "seam mismatch",
+            f"{d.seam_mismatch:.1e}",
+            f"of the two sides' lengths; worst {d.seam_mismatch_max:.1e}",
+        ),
+    ]

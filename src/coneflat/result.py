@@ -1,0 +1,87 @@
+"""What a flattening returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from ._arrays import FloatArray, IntArray
+from .distortion import Distortion
+from .io.model import MeshFile
+
+
+@dataclass(frozen=True)
+class Flattening:
+    """A flattened mesh: n vertices, m triangles, u points in the plane.
+
+    Attributes:
+        vertices: (n, 3) positions in model units; the input's own, or the repaired mesh's.
+        faces: (m, 3) vertex indices, consistently oriented, in the input's order of faces.
+        uv: (u, 2) points of the layout, in [0, 1]^2, all charts at one scale.
+        uv_faces: (m, 3) index into `uv` of every triangle corner.
+        uv_scale: UV units per model unit; `uv / uv_scale` is the layout at the model's own scale.
+        cones: (s,) cone vertices.
+        curvatures: (s,) their target curvatures, radians.
+        log_scale: (n,) log conformal factor phi, so that flat lengths are about l * exp(phi) in model
+            units; NaN at vertices without a face.
+        seams: (k, 2) vertex pairs of the mesh edges that were cut.
+        distortion: the measures of Section 5 of the paper and their like.
+        seconds: wall time of each stage.
+        notes: what was done to the input, one sentence each.
+        settings: the options it was made with.
+        broken: triangles of the metric that break the triangle inequality.
+        vertex_origin: (n,) the input vertex that each vertex came from.
+        face_origin: (m,) the input face that each face came from.
+        face_corners: (m, 3) for a mesh read from a file: the polygon corner of `source` at each
+            triangle corner; else None.
+        source: the file it was read from, if any.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    uv: FloatArray
+    uv_faces: IntArray
+    uv_scale: float
+    cones: IntArray
+    curvatures: FloatArray
+    log_scale: FloatArray
+    seams: IntArray
+    distortion: Distortion
+    seconds: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    broken: int = 0
+    vertex_origin: IntArray | None = None
+    face_origin: IntArray | None = None
+    face_corners: IntArray | None = None
+    source: MeshFile | None = None
+
+    @property
+    def corner_uv(self) -> FloatArray:
+        """(m, 3, 2) the point of every triangle corner."""
+        return self.uv[self.uv_faces]
+
+    def report(self) -> dict[str, Any]:
+        """Return all measures as plain Python values, ready for JSON."""
+        from .report import as_dict
+
+        return as_dict(self)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the textured mesh; the format (.obj, .ply, .glb, .npz) follows the path's ending.
+
+        Raises:
+            UnknownFormatError, MeshFileError: the ending is unknown, or the file cannot be written.
+        """
+        from .io import write_flattening
+
+        return write_flattening(self, path)
+
+    def __repr__(self) -> str:
+        return (
+            f"<Flattening: {len(self.faces)} triangles, {len(self.cones)} cones, "
+            f"{self.distortion.charts} charts, QC {self.distortion.qc_mean:.4f}>"
+        )

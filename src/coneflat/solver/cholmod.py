@@ -1,0 +1,36 @@
+"""CHOLMOD through cholespy."""
+
+from __future__ import annotations
+
+import numpy as np
+from cholespy import CholeskySolverD, MatrixType
+from scipy.sparse import csc_matrix
+
+from .._arrays import FloatArray
+
+
+class NotPositiveDefinite(ArithmeticError):
+    """The matrix has no Cholesky factorization in floating point."""
+
+
+class CholmodFactor:
+    """A sparse Cholesky factorization."""
+
+    def __init__(self, matrix: csc_matrix) -> None:
+        try:
+            self._solver = CholeskySolverD(
+                matrix.shape[0],
+                matrix.indptr.astype(np.int32),
+                matrix.indices.astype(np.int32),
+                matrix.data.astype(np.float64),
+                MatrixType.CSC,
+            )
+        except ValueError as error:
+            raise NotPositiveDefinite(str(error)) from error
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
+        right = np.ascontiguousarray(right, dtype=np.float64)
+        solution = np.zeros_like(right)
+        self._solver.solve(right, solution)
+        return solution

@@ -1,0 +1,18 @@
+"""Small helpers for messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import islice
+
+
+def plural(count: int, noun: str, nouns: str | None = None) -> str:
+    """Return "1 cone", "2 cones"."""
+    return f"{count:,} {noun if count == 1 else nouns or noun + 's'}"
+
+
+def list_some(items: Iterable[object], total: int | None = None, most: int = 5) -> str:
+    """Return the first few items, and dots if there are more."""
+    shown = list(islice(iter(items), most + 1))
+    more = len(shown) > most or (total is not None and total > most)
+    return ", ".join(str(item) for item in shown[:most]) + (", ..." if more else "")

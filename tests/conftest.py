@@ -1,0 +1,17 @@
+from __future__ import annotations
+
+import pytest
+from shapes import SHARED
+
+
+@pytest.fixture
+def shared():
+    """Return the path of a real model; skip where there are none."""
+
+    def find(name: str):
+        path = SHARED / name
+        if not path.exists():
+            pytest.skip(f"the model {name} is not here")
+        return path
+
+    return find

@@ -1,0 +1,165 @@
+"""Meshes with known answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "meshes"
+
+
+def tetrahedron():
+    vertices = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
+    return vertices, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+
+
+def grid(columns: int = 8, rows: int = 6, height: Callable | None = None, wrap=(False, False)):
+    """A grid of 2 * columns * rows triangles; `wrap` glues its left to its right, its bottom to its top."""
+    u, v = np.meshgrid(np.arange(columns + (not wrap[0])), np.arange(rows + (not wrap[1])), indexing="ij")
+    width, depth = u.shape
+    index = np.arange(width * depth).reshape(width, depth)
+
+    def corner(du, dv):
+        i = (np.arange(columns) + du) % width
+        j = (np.arange(rows) + dv) % depth
+        return index[np.ix_(i, j)].ravel()
+
+    a, b, c, d = corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    x, y = u.ravel() / columns, v.ravel() / rows
+    z = np.zeros_like(x) if height is None else height(x, y)
+    return np.stack([x, y, z], axis=1).astype(float), faces
+
+
+def hill(columns: int = 24, rows: int = 20):
+    """A curved disk."""
+    return grid(columns, rows, lambda x, y: 0.6 * np.exp(-12 * ((x - 0.45) ** 2 + (y - 0.55) ** 2)))
+
+
+def torus(around: int = 40, across: int = 20, radius: float = 0.4):
+    """A torus of revolution, outward orientation, with a bulge so that it has no symmetry."""
+    points, faces = grid(around, across, wrap=(True, True))
+    s, t = 2 * np.pi * points[:, 0], 2 * np.pi * points[:, 1]
+    r = radius * (1 + 0.3 * np.cos(s + 0.3) + 0.1 * np.sin(2 * t + s))
+    ring = 1 + r * np.cos(t)
+    return np.stack([ring * np.cos(s), ring * np.sin(s), r * np.sin(t)], axis=1), faces
+
+
+def sphere(rounds: int = 3, bumps: float = 0.3, seed: int = 0):
+    """An icosphere of 20 * 4**rounds triangles with smooth bumps."""
+    g = (1 + 5**0.5) / 2
+    vertices = np.array(
+        [
+            [-1, g, 0], [1, g, 0], [-1, -g, 0], [1, -g, 0], [0, -1, g], [0, 1, g],
+            [0, -1, -g], [0, 1, -g], [g, 0, -1], [g, 0, 1], [-g, 0, -1], [-g, 0, 1],
+        ]
+    )  # fmt: skip
+    faces = np.array(
+        [
+            [0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4],
+            [11, 10, 2], [10, 7, 6], [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8],
+            [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7], [9, 8, 1],
+        ]
+    )  # fmt: skip
+    for _ in range(rounds):
+        vertices, faces = subdivide(vertices, faces)
+    vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
+    directions = np.random.default_rng(seed).normal(size=(5, 3))
+    return vertices * (1 + bumps * np.sin(2 * vertices @ directions.T).mean(axis=1))[:, None], faces
+
+
+def subdivide(vertices, faces):
+    """Split every triangle in four at the midpoints of its sides."""
+    sides = np.sort(np.concatenate([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]]), axis=1)
+    edges, which = np.unique(sides, axis=0, return_inverse=True)
+    a, b, c = (which.ravel() + len(vertices)).reshape(3, -1)
+    i, j, k = faces.T
+    parts = [(i, c, b), (c, j, a), (b, a, k), (a, b, c)]
+    middle = vertices[edges].mean(axis=1)
+    return np.concatenate([vertices, middle]), np.concatenate([np.stack(part, 1) for part in parts])
+
+
+def annulus(around: int = 40, rings: int = 8):
+    """A bent ring: two boundary loops."""
+    points, faces = grid(around, rings, wrap=(True, False))
+    s, r = 2 * np.pi * points[:, 0], 0.4 + points[:, 1]
+    return np.stack([r * np.cos(s), r * np.sin(s), 0.9 * np.sin(2 * s) * r**2], axis=1), faces
+
+
+def blocks(pattern: list[str], size: int = 3):
+    """The surface of unit cubes laid out on a plane as in a drawing, each face split finely.
+
+    Genus is the number of holes in the drawing: blocks(["###", "#.#", "###"]) has genus 1.
+    """
+    solid = np.zeros((len(pattern) * size + 2, max(map(len, pattern)) * size + 2, size + 2), dtype=bool)
+    for i, row in enumerate(pattern):
+        for j, sign in enumerate(row):
+            if sign == "#":
+                solid[1 + i * size : 1 + (i + 1) * size, 1 + j * size : 1 + (j + 1) * size, 1:-1] = True
+    quads = []
+    for axis in range(3):
+        for step in (1, -1):
+            exposed = np.argwhere(solid & ~np.roll(solid, -step, axis=axis))
+            base = exposed.copy()
+            base[:, axis] += step > 0
+            p, q = np.eye(3, dtype=int)[[(axis + 1) % 3, (axis + 2) % 3]]
+            ring = [base, base + p, base + p + q, base + q]
+            quads.append(np.stack(ring if step > 0 else ring[::-1], axis=1))
+    quads = np.concatenate(quads)
+    vertices, index = np.unique(quads.reshape(-1, 3), axis=0, return_inverse=True)
+    a, b, c, d = index.ravel().reshape(-1, 4).T
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    # Rounded a little, so that the curvature is not all in the corners.
+    points = vertices.astype(float) / size
+    return points + 0.05 * np.sin(3 * points[:, [1, 2, 0]]), faces
+
+
+def genus(handles: int):
+    """A closed surface with so many handles."""
+    return blocks(["#" * (2 * handles + 1), "#" + ".#" * handles, "#" * (2 * handles + 1)])
+
+
+def moebius(around: int = 30, across: int = 3):
+    """A strip with one side."""
+    s = 2 * np.pi * np.arange(around) / around
+    t = np.linspace(-0.3, 0.3, across + 1)
+    s, t = (x.ravel() for x in np.meshgrid(s, t, indexing="ij"))
+    r = 1 + t * np.cos(s / 2)
+    vertices = np.stack([r * np.cos(s), r * np.sin(s), t * np.sin(s / 2)], axis=1)
+    faces = []
+    for i in range(around):
+        for j in range(across):
+            a, d = i * (across + 1) + j, i * (across + 1) + j + 1
+            b, c = a + across + 1, d + across + 1
+            if i == around - 1:
+                b, c = across - j, across - j - 1
+            faces += [[a, b, c], [a, c, d]]
+    return vertices, np.array(faces)
+
+
+def join(*parts):
+    """Several meshes as one."""
+    starts = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
+    return (
+        np.concatenate([vertices for vertices, _ in parts]),
+        np.concatenate([faces + start for (_, faces), start in zip(parts, starts[:-1], strict=True)]),
+    )
+
+
+def renumber(vertices, faces, seed: int = 1):
+    """The same mesh with vertices, faces and corners in another order, and the new number of each vertex."""
+    rng = np.random.default_rng(seed)
+    new = rng.permutation(len(vertices))
+    shuffled = np.empty_like(vertices)
+    shuffled[new] = vertices
+    turned = np.stack(
+        [np.roll(face, shift) for face, shift in zip(new[faces], rng.integers(0, 3, len(faces)), strict=True)]
+    )
+    return shuffled, turned[rng.permutation(len(faces))], new
+
+
+def rotation(seed: int = 2):
+    q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    return q * np.sign(np.linalg.det(q))

@@ -1,0 +1,194 @@
+"""The command line, in processes of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import shapes
+
+from coneflat import errors, read_mesh
+from coneflat.cli.cones import parse_cones, parse_curvature
+
+
+def run(*arguments, cwd, **options):
+    command = [sys.executable, "-m", "coneflat", *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, check=False, **options)
+
+
+def write_obj(path, vertices, faces):
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture
+def model(tmp_path):
+    return write_obj(tmp_path / "model.obj", *shapes.sphere(2))
+
+
+def test_flatten_writes_mesh_report_and_table(model, tmp_path):
+    done = run("flatten", model, "-o", "out.obj", "--report", "report.json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    for word in ("cones", "QC distortion", "seam length", "wrote out.obj", "wrote report.json", "layout"):
+        assert word in done.stdout
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert {"read", "write", "layout"} <= set(report["seconds"])
+    assert report["flipped"] == 0
+    lines = (tmp_path / "out.obj").read_text().splitlines()
+    assert sum(line.startswith("vt ") for line in lines) > 162
+    np.testing.assert_array_equal(read_mesh(tmp_path / "out.obj").vertices, read_mesh(model).vertices)
+
+
+def test_quiet_prints_nothing(model, tmp_path):
+    done = run("flatten", model, "-q", cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (tmp_path / "model_uv.obj").exists()
+
+
+@pytest.mark.parametrize("ending", ["ply", "glb", "npz"])
+def test_other_formats(model, tmp_path, ending):
+    assert run("flatten", model, "-q", "-o", f"out.{ending}", cwd=tmp_path).returncode == 0
+    assert (tmp_path / f"out.{ending}").stat().st_size > 1000
+
+
+def test_paper_is_the_published_method(model, tmp_path):
+    done = run("flatten", model, "--paper", "--report", "paper.json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    settings = json.loads((tmp_path / "paper.json").read_text())["settings"]
+    assert settings["cones"] == "greedy"
+    assert settings["metric"] == "linear"
+    assert settings["epsilon"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nothing.obj"], "nothing.obj"),
+        (["model.obj", "-o", "x.fbx"], "'.fbx'"),
+        (["model.obj", "-o", "missing/x.obj"], "missing"),
+        (["model.obj", "--report", "missing/x.json"], "missing"),
+        (["model.obj", "-o", "model.obj"], "input itself"),
+        (["model.obj", "--epsilon", "0"], "epsilon must be a positive number"),
+        (["model.obj", "--epsilon", "few"], "not a valid float"),
+        (["model.obj", "--max-cones", "0"], "at most 0"),
+        (["model.obj", "--cones", "magic"], "magic"),
+        (["model.obj", "--cone", "1:pi", "--cone", "2"], "vertex 2 has none"),
+        (["model.obj", "--cone", "1:pi", "--cone", "2:pi"], "sum to 6.283185 (2 pi)"),
+        (["model.obj", "--cone", "x"], "'x' is not VERTEX"),
+        (["model.obj", "--cone", "1", "--max-cones", "3"], "leave out --max-cones"),
+        (["model.obj", "--paper", "--epsilon", "1"], "leave out --epsilon"),
+        (["model.obj", "--magic"], "--magic"),
+        (["empty.obj"], "empty.obj"),
+        (["text.ply"], "text.ply"),
+        (["model.xyz"], ".xyz"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(model, tmp_path, arguments, message):
+    (tmp_path / "empty.obj").write_text("")
+    (tmp_path / "text.ply").write_text("this is no mesh")
+    (tmp_path / "model.xyz").write_text("0 0 0")
+    before = sorted(tmp_path.iterdir())
+    done = run("flatten", *arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("coneflat: error: ")
+    assert done.stderr.count("\n") == 1
+    assert message in done.stderr
+    assert done.stdout == ""
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_cones_from_a_file(model, tmp_path):
+    def flatten(text):
+        (tmp_path / "cones.txt").write_text(text)
+        return run("flatten", model, "--cones-file", "cones.txt", "--report", "report.json", cwd=tmp_path)
+
+    done = flatten("# vertex curvature\n3 pi/2\n\n50, 270deg\n100 pi # the third\n120  1.0pi\n")
+    assert done.returncode == 0, done.stderr
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["cone_vertices"] == [3, 50, 100, 120]
+    np.testing.assert_allclose(report["cone_curvatures"], np.pi * np.array([0.5, 1.5, 1, 1]))
+    for text, message in [
+        ("3 pi/2\n50 2pi*0.5\n", "cones.txt, line 2: '50 2pi*0.5'"),
+        ("3 pi/2\n50 pi\n", "sum to 4.712389 (1.5 pi)"),
+        ("# nothing\n", "cones.txt holds no cones"),
+    ]:
+        done = flatten(text)
+        assert done.returncode == 2
+        assert message in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("1.5", 1.5), ("pi", np.pi), ("-pi/2", -np.pi / 2), ("0.5pi", np.pi / 2), ("3pi/2", 1.5 * np.pi),
+     ("90deg", np.pi / 2), ("1e-1", 0.1), ("π", np.pi), ("-.25 pi", -np.pi / 4), ("2 * pi", 2 * np.pi)],
+)  # fmt: skip
+def test_curvatures_as_people_write_them(text, value):
+    assert parse_curvature(text, "here") == pytest.approx(value)
+
+
+@pytest.mark.parametrize("text", ["", "x", "pi/0", "1..2", "pipi", "-", "deg", "nan", "1 2"])
+def test_what_is_no_curvature(text):
+    with pytest.raises(errors.OptionError, match="here"):
+        parse_curvature(text, "here")
+
+
+def test_cones_named_twice():
+    with pytest.raises(errors.OptionError, match="vertex 4 is given as a cone twice"):
+        parse_cones(["4", "4:pi"], None)
+
+
+def test_nonmanifold_is_refused_and_repaired(tmp_path):
+    vertices, faces = shapes.sphere(1)
+    write_obj(tmp_path / "fin.obj", np.r_[vertices, [[2, 2, 2]]], np.r_[faces, [[0, 12, len(vertices)]]])
+    done = run("flatten", "fin.obj", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "1 edge with more than two faces (vertex pairs 0-12); run with --repair" in done.stderr
+    done = run("flatten", "fin.obj", "--repair", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "Separated the faces at 1 edge" in done.stdout
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has other signals")
+def test_interrupt_leaves_nothing_half_written(tmp_path):
+    write_obj(tmp_path / "big.obj", *shapes.sphere(6))
+    command = [sys.executable, "-m", "coneflat", "flatten", "big.obj", "-o", "out.obj"]
+    for delay in (0.4, 0.9, 1.5):
+        process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        time.sleep(delay)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+        if process.returncode == 0:
+            continue
+        assert process.returncode in (130, -signal.SIGINT)
+        if process.returncode == 130:
+            assert said.splitlines()[-1] == "coneflat: error: interrupted; nothing was left half-written"
+        assert [path.name for path in tmp_path.iterdir()] == ["big.obj"]
+
+
+def test_demo(tmp_path):
+    pytest.importorskip("matplotlib")
+    done = run("demo", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "coneflat-demo"
+    assert (folder / "sample.png").read_bytes()[:4] == b"\x89PNG"
+    assert json.loads((folder / "sample.json").read_text())["flipped"] == 0
+    assert "vt " in (folder / "sample.obj").read_text()
+    assert str(folder.relative_to(tmp_path) / "sample.png") in done.stdout
+
+
+def test_help_lists_the_commands(tmp_path):
+    done = run("--help", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "flatten" in done.stdout
+    assert "demo" in done.stdout
+    assert "coneflat, version" in run("--version", cwd=tmp_path).stdout
+    assert run(cwd=tmp_path).returncode == 2

@@ -1,0 +1,128 @@
+"""The cone search, against the paper's literal equations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+from coneflat import (
+    TriangleMesh,
+    angle_defect,
+    cones_at,
+    cones_with_curvature,
+    corner_angles,
+    cotangent_laplacian,
+    cotangents,
+    edge_lengths,
+    errors,
+    greedy_cones,
+)
+
+
+def surface(shape):
+    """Return (laplacian, curvature, is_boundary, euler_characteristic)."""
+    mesh = TriangleMesh(*shape)
+    lengths = edge_lengths(*shape)
+    curvature = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
+    laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths), len(mesh.vertices))
+    return laplacian, curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
+
+
+def absorbing_walk_targets(laplacian, curvature, is_singular):
+    """Eq. 2-5 of the paper: curvature walks from vertex to vertex until a singular one absorbs it."""
+    dense = laplacian.toarray()
+    walk = -dense / np.diag(dense)[:, None]
+    np.fill_diagonal(walk, 0)
+    rest = ~is_singular
+    absorbed = np.linalg.solve(np.eye(rest.sum()) - walk[np.ix_(rest, rest)], walk[np.ix_(rest, is_singular)])
+    target = np.zeros(len(curvature))
+    target[is_singular] = curvature[is_singular] + absorbed.T @ curvature[rest]
+    return target
+
+
+@pytest.mark.parametrize(
+    "shape", [shapes.sphere(2), shapes.hill(12, 10), shapes.genus(2), shapes.torus(20, 10)]
+)
+def test_one_dirichlet_problem_gives_the_papers_targets_and_scale(shape):
+    laplacian, curvature, is_boundary, chi = surface(shape)
+    cones = np.random.default_rng(3).choice(np.flatnonzero(~is_boundary), 6, replace=False)
+    solution = cones_at(laplacian, curvature, is_boundary, chi, cones)
+    is_singular = is_boundary.copy()
+    is_singular[cones] = True
+    literal = absorbing_walk_targets(laplacian, curvature, is_singular)
+    np.testing.assert_allclose(solution.target, literal, atol=1e-10)
+    # Eq. 1 with these targets: the same phi up to a constant.
+    phi = np.linalg.lstsq(laplacian.toarray(), literal - curvature, rcond=None)[0]
+    difference = solution.log_scale - phi
+    np.testing.assert_allclose(difference, difference[0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "shape", [shapes.sphere(3), shapes.torus(), shapes.hill(), shapes.annulus(), shapes.genus(1), shapes.genus(3)]
+)  # fmt: skip
+def test_greedy_search_is_one_dirichlet_problem_in_the_end(shape):
+    laplacian, curvature, is_boundary, chi = surface(shape)
+    found = greedy_cones(laplacian, curvature, is_boundary, chi, epsilon=0.05)
+    assert np.ptp(found.log_scale) <= 0.05
+    assert len(np.unique(found.cones)) == len(found.cones) > 0
+    direct = cones_at(laplacian, curvature, is_boundary, chi, found.cones)
+    np.testing.assert_allclose(found.target, direct.target, atol=1e-10)
+    np.testing.assert_allclose(found.log_scale, direct.log_scale, atol=1e-10)
+    np.testing.assert_allclose(found.target.sum(), 2 * np.pi * chi, atol=1e-9)
+
+
+def test_greedy_search_takes_the_extrema_of_phi():
+    laplacian, curvature, is_boundary, chi = surface(shapes.sphere(2))
+    one = greedy_cones(laplacian, curvature, is_boundary, chi, epsilon=0.3, max_cones=5)
+    two = greedy_cones(laplacian, curvature, is_boundary, chi, epsilon=0.3, max_cones=3)
+    assert one.cones[0] == np.argmax(curvature)
+    np.testing.assert_array_equal(one.cones[:3], two.cones)
+    phi = cones_at(laplacian, curvature, is_boundary, chi, two.cones).log_scale
+    extrema = {int(np.argmax(phi)), int(np.argmin(phi))} - set(two.cones.tolist())
+    assert extrema
+    assert set(one.cones[3 : 3 + len(extrema)].tolist()) == extrema
+
+
+def test_negative_surfaces_start_from_the_most_negative_vertex():
+    laplacian, curvature, is_boundary, chi = surface(shapes.genus(2))
+    assert greedy_cones(laplacian, curvature, is_boundary, chi).cones[0] == np.argmin(curvature)
+
+
+def test_flat_surfaces_need_no_cones():
+    laplacian, curvature, is_boundary, chi = surface(shapes.grid())
+    solution = greedy_cones(laplacian, curvature, is_boundary, chi)
+    assert len(solution.cones) == 0
+    np.testing.assert_allclose(solution.log_scale, 0, atol=1e-12)
+    torus = greedy_cones(*surface(shapes.torus()), epsilon=50)
+    assert len(torus.cones) == 0
+    assert not torus.target.any()
+
+
+def test_given_curvatures_are_met():
+    laplacian, curvature, is_boundary, chi = surface(shapes.sphere(2))
+    cones, wanted = np.array([5, 40, 99]), np.array([1.5, 1.5, 1.0]) * np.pi
+    solution = cones_with_curvature(laplacian, curvature, is_boundary, chi, cones, wanted)
+    np.testing.assert_allclose(solution.curvatures, wanted)
+    np.testing.assert_allclose(laplacian @ solution.log_scale, solution.target - curvature, atol=1e-9)
+
+
+def test_the_boundary_takes_what_cones_leave():
+    laplacian, curvature, is_boundary, chi = surface(shapes.hill(10, 10))
+    solution = cones_with_curvature(laplacian, curvature, is_boundary, chi, np.array([60]), np.array([0.7]))
+    assert solution.target[60] == pytest.approx(0.7)
+    np.testing.assert_allclose(solution.target.sum(), 2 * np.pi * chi)
+    assert not solution.log_scale[is_boundary].any()
+
+
+def test_curvatures_must_sum_to_what_the_surface_has():
+    where = surface(shapes.sphere(1))
+    with pytest.raises(errors.CurvatureError, match=r"must sum to .* \(4 pi\).*sum to 3\.1\d+ \(1 pi\)"):
+        cones_with_curvature(*where, np.array([1, 2]), np.array([0.5, 0.5]) * np.pi)
+    with pytest.raises(errors.CurvatureError, match="none is given"):
+        cones_at(*where, np.array([], dtype=int))
+    with pytest.raises(errors.CurvatureError, match="at most 0 are allowed"):
+        greedy_cones(*where, max_cones=0)
+    for epsilon in (0, -1, float("nan")):
+        with pytest.raises(errors.OptionError, match="epsilon"):
+            greedy_cones(*where, epsilon=epsilon)

@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+import importlib.util
+
+import numpy as np
+import pytest
+import shapes
+
+from coneflat import TriangleMesh, flatten, measure
+
+VERTICES, FACES = shapes.grid(6, 4)
+MESH = TriangleMesh(VERTICES, FACES)
+FLAT = VERTICES[FACES][..., :2]
+
+
+def test_identity():
+    d = measure(MESH, FLAT)
+    assert d.qc_mean == pytest.approx(1)
+    assert d.qc_max == pytest.approx(1)
+    assert (d.flipped, d.degenerate, d.charts, d.mirrored_charts, d.seam_length) == (0, 0, 1, 0, 0)
+    assert d.area_std == pytest.approx(0, abs=1e-12)
+
+
+def test_stretch_and_shear():
+    assert measure(MESH, FLAT * [2, 1]).qc_mean == pytest.approx(2)
+    golden = (1 + 5**0.5) / 2
+    assert measure(MESH, FLAT @ [[1, 0], [1, 1]]).qc_mean == pytest.approx(golden**2)
+
+
+def test_area_distortion_of_two_scales():
+    left = FACES.size // 3 // 2
+    uv = FLAT.copy()
+    areas = np.full(len(FACES), 1.0)
+    uv[:left] *= np.e
+    d = measure(MESH, uv)
+    spread = np.where(np.arange(len(FACES)) < left, 1.0, 0.0)
+    assert d.area_std == pytest.approx(np.sqrt(np.average((spread - spread.mean()) ** 2, weights=areas)))
+
+
+def test_flipped_degenerate_and_mirrored():
+    uv = FLAT.copy()
+    uv[3] = uv[3][[0, 2, 1]]
+    uv[5] = uv[5, :1]
+    d = measure(MESH, uv)
+    assert d.degenerate == 1
+    assert d.charts == 4  # the turned triangle and the collapsed one, and what the latter cut off
+    assert d.mirrored_charts == 1
+    uv = FLAT.copy()
+    uv[FACES == FACES[10, 0]] += [0.4, 0.0]  # a vertex pulled over its neighbours
+    assert measure(MESH, uv).flipped > 0
+
+
+def test_seams_are_where_uvs_differ():
+    uv = FLAT.copy()
+    right = VERTICES[FACES].mean(axis=1)[:, 0] > 0.5
+    uv[right] = uv[right] * 0.5 + [3, 0]
+    d = measure(MESH, uv)
+    assert d.charts == 2
+    assert d.seam_length == pytest.approx(1)
+    assert d.seam_mismatch == d.seam_mismatch_max == pytest.approx(0.5 / 0.75)
+
+
+def test_agrees_with_an_independent_implementation(shared):
+    path = shared("rocker-arm.obj").parents[1] / "tools" / "measure.py"
+    spec = importlib.util.spec_from_file_location("independent", path)
+    independent = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(independent)
+    for name in ("camelhead.off", "rocker-arm.obj", "human.obj"):
+        result = flatten(shared(name), max_cones=40)
+        theirs = independent.measure(result.vertices, result.faces, result.corner_uv, res=64)
+        ours = result.report()
+        for key, name_there in {
+            "qc_mean": "qc_mean", "qc_p95": "qc_p95", "qc_max": "qc_max", "area_std": "area_std",
+            "flipped": "flipped", "degenerate": "n_zero_uv", "charts": "charts", "mirrored_charts": "mirrored",
+            "seam_length": "seam_len", "seam_mismatch": "seam_mismatch", "degenerate_input": "n_zero_3d",
+        }.items():  # fmt: skip
+            assert ours[key] == pytest.approx(theirs[name_there], rel=1e-9), (name, key)

@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+from coneflat import (
+    TriangleMesh,
+    angle_defect,
+    corner_angles,
+    cotangent_laplacian,
+    cotangents,
+    edge_lengths,
+    errors,
+    mollify,
+)
+from coneflat.geometry import double_areas, is_broken
+
+
+def test_right_triangle():
+    lengths = np.array([[5.0, 4.0, 3.0]])
+    np.testing.assert_allclose(corner_angles(lengths), [[np.pi / 2, np.arctan2(4, 3), np.arctan2(3, 4)]])
+    np.testing.assert_allclose(cotangents(lengths), [[0, 3 / 4, 4 / 3]], atol=1e-15)
+    np.testing.assert_allclose(double_areas(lengths), [12.0])
+
+
+def test_broken_triangle_has_the_real_part_of_its_angles():
+    lengths = np.array([[1.0, 3.0, 1.0]])
+    assert is_broken(lengths).tolist() == [True]
+    np.testing.assert_allclose(corner_angles(lengths), np.arccos(np.clip([[1.5, -3.5, 1.5]], -1, 1)))
+    assert double_areas(lengths).tolist() == [0.0]
+
+
+def test_needles_keep_their_digits():
+    # A side of 1e-9 between two of 1: the small angle is 1e-9 to all digits.
+    angles = corner_angles(np.array([[1e-9, 1.0, 1.0]]))
+    np.testing.assert_allclose(angles[0, 0], 1e-9, rtol=1e-12)
+
+
+def test_gauss_bonnet():
+    for shape in (shapes.sphere(2), shapes.torus(), shapes.genus(2), shapes.hill(), shapes.annulus()):
+        mesh = TriangleMesh(*shape)
+        angles = corner_angles(edge_lengths(*shape))
+        np.testing.assert_allclose(angles.sum(axis=1), np.pi)
+        defect = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+        np.testing.assert_allclose(defect.sum(), 2 * np.pi * mesh.euler_characteristic, atol=1e-9)
+
+
+def test_laplacian_of_a_grid_is_the_five_point_stencil():
+    vertices, faces = shapes.grid(4, 4)
+    laplacian = cotangent_laplacian(faces, cotangents(edge_lengths(vertices, faces)), len(vertices))
+    row = laplacian[12].toarray().ravel()  # the middle of 5 x 5
+    expected = np.zeros(25)
+    expected[[7, 11, 13, 17]] = -1
+    expected[12] = 4
+    np.testing.assert_allclose(row, expected, atol=1e-12)
+
+
+def test_laplacian_energy_is_the_dirichlet_energy():
+    vertices, faces = shapes.sphere(2)
+    laplacian = cotangent_laplacian(faces, cotangents(edge_lengths(vertices, faces)), len(vertices))
+    f = vertices @ [0.3, -1.0, 2.0]
+    # The gradient of a linear function on a triangle is its gradient in space, projected.
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1) / 2
+    normals /= 2 * areas[:, None]
+    gradient = np.array([0.3, -1.0, 2.0]) - (normals @ [0.3, -1.0, 2.0])[:, None] * normals
+    np.testing.assert_allclose(f @ (laplacian @ f), (areas * (gradient**2).sum(axis=1)).sum())
+
+
+def test_mollify_opens_collapsed_triangles_only_when_there_are_any():
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0, 0], [0.5, 1, 0.0]])
+    faces = np.array([[0, 1, 2], [0, 1, 3]])
+    lengths = edge_lengths(vertices, faces)
+    opened, note = mollify(lengths)
+    assert (double_areas(opened) > 0).all()
+    assert abs(opened - lengths).max() < 1e-7
+    assert "1 triangle" in note
+    with pytest.raises(errors.DegenerateFaceError, match="1 triangle without area: 0"):
+        mollify(lengths, strict=True)
+    healthy = lengths[1:]
+    assert mollify(healthy) == (pytest.approx(healthy, abs=0), None)
+    with pytest.raises(errors.DegenerateFaceError, match="none of the 1"):
+        mollify(lengths[:1])

@@ -1,0 +1,466 @@
+"""Reading meshes, and triangulating their polygons."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coneflat.errors import (
+    ConeflatError,
+    DegenerateFaceError,
+    EmptyMeshError,
+    FaceIndexError,
+    MeshFileError,
+    UnknownFormatError,
+)
+from coneflat.io import INPUT_FORMATS, is_polygon_side, read_mesh, triangulate
+
+MESHES = Path(__file__).parents[2] / "shared" / "meshes"
+
+SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+TETRA_POINTS = [[0.1, 0, 0], [1, 0, 1 / 3], [0, 1, 0], [0, 0, 1e-7]]
+TETRA_FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+
+
+def polygons(mesh):
+    return [mesh.corners[a:b].tolist() for a, b in zip(mesh.offsets[:-1], mesh.offsets[1:], strict=True)]
+
+
+def written(folder, name, text):
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def tetra_text(ending):
+    points, faces = TETRA_POINTS, TETRA_FACES
+    rows = [" ".join(map(repr, p)) for p in points]
+    if ending == ".obj":
+        body = [f"v {r}" for r in rows] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+    elif ending == ".off":
+        body = ["OFF", "4 4 6", *rows] + [f"3 {a} {b} {c}" for a, b, c in faces]
+    elif ending == ".ply":
+        body = ["ply", "format ascii 1.0", "element vertex 4", *(f"property double {c}" for c in "xyz")]
+        body += ["element face 4", "property list uchar int vertex_indices", "end_header", *rows]
+        body += [f"3 {a} {b} {c}" for a, b, c in faces]
+    else:
+        body = ["solid tetra vertex"]
+        for face in faces:
+            body += ["facet normal 0 0 0", "outer loop", *(f"vertex {rows[v]}" for v in face)]
+            body += ["endloop", "endfacet"]
+        body += ["endsolid tetra"]
+    return "\n".join(body) + "\n"
+
+
+def stl_bytes(corners, promised=None):
+    head = b"solid but binary".ljust(80) + struct.pack("<I", len(corners) if promised is None else promised)
+    return head + b"".join(struct.pack("<12fH", 0, 0, 0, *np.ravel(c), 0) for c in corners)
+
+
+def ply_bytes(order, points, faces):
+    name = {"<": "little", ">": "big"}[order]
+    head = [
+        "ply", f"format binary_{name}_endian 1.0", "comment end of line", f"element vertex {len(points)}",
+        "property uchar red", *(f"property double {c}" for c in "xyz"), "element edge 1",
+        "property int vertex1", f"element face {len(faces)}", "property list uchar int vertex_indices",
+        "property float quality", "end_header",
+    ]  # fmt: skip
+    body = b"".join(struct.pack(order + "B3d", 7, *p) for p in points) + struct.pack(order + "i", 3)
+    for face in faces:
+        body += struct.pack(f"{order}B{len(face)}if", len(face), *face, 0.5)
+    return "\n".join(head).encode() + b"\n" + body
+
+
+class TestFormats:
+    @pytest.mark.parametrize("ending", [".obj", ".off", ".ply"])
+    def test_text_formats_keep_every_bit(self, tmp_path, ending):
+        mesh = read_mesh(written(tmp_path, "tetra" + ending.upper(), tetra_text(ending)))
+        assert mesh.vertices.tobytes() == np.array(TETRA_POINTS, dtype=float).tobytes()
+        assert polygons(mesh) == TETRA_FACES
+        assert mesh.welded == 0
+
+    def test_stl_text_is_welded(self, tmp_path):
+        mesh = read_mesh(written(tmp_path, "tetra.stl", tetra_text(".stl")))
+        assert mesh.welded == 8
+        # Numbered by first occurrence, which is 0, 2, 1, 3 here.
+        assert mesh.vertices.tolist() == [TETRA_POINTS[i] for i in (0, 2, 1, 3)]
+        assert polygons(mesh) == [[0, 1, 2], [0, 2, 3], [2, 1, 3], [1, 0, 3]]
+
+    @pytest.mark.parametrize("extra", [b"", b"trailing"])
+    def test_stl_binary(self, tmp_path, extra):
+        corners = np.array(TETRA_POINTS, dtype=np.float32)[TETRA_FACES]
+        content = stl_bytes(corners) + extra
+        path = written(tmp_path, "t.stl", content if not extra else b"header" + content[6:])
+        mesh = read_mesh(path)
+        assert (len(mesh.vertices), mesh.welded) == (4, 8)
+        np.testing.assert_array_equal(mesh.vertices[mesh.corners].reshape(-1, 3, 3), corners)
+        loose = read_mesh(path, weld=False)
+        assert (len(loose.vertices), loose.welded) == (12, 0)
+
+    def test_weld_takes_minus_zero_as_zero_and_nothing_else(self, tmp_path):
+        nearly = float(np.nextafter(1.0, 2))
+        text = f"v 0 0 -0.0\nv 1 0 0\nv 0 1 0\nv -0 0 0.0\nv {nearly!r} 0 0\nv 5 5 5\nf 1 2 3\nf 4 3 5\n"
+        path = written(tmp_path, "slit.obj", text)
+        mesh = read_mesh(path, weld=True)
+        assert mesh.welded == 1
+        assert polygons(mesh) == [[0, 1, 2], [0, 2, 3]]
+        assert len(mesh.vertices) == 5
+        slit = read_mesh(path)
+        assert len(slit.vertices) == 6
+        assert polygons(slit) == [[0, 1, 2], [3, 2, 4]]
+
+    @pytest.mark.parametrize("order", "<>")
+    @pytest.mark.parametrize(
+        "faces", [TETRA_FACES, [[0, 1, 2, 3]], [[0, 1, 2], [3, 2, 1, 0], [0, 1, 3], [4, 3, 2, 1, 0]]]
+    )
+    def test_ply_binary_keeps_polygons(self, tmp_path, order, faces):
+        points = [*TETRA_POINTS, [9, 9, 9], [8, 8, 8]]
+        mesh = read_mesh(written(tmp_path, "t.ply", ply_bytes(order, points, faces)))
+        assert mesh.vertices.tolist() == points
+        assert polygons(mesh) == faces
+
+    def test_ply_text_mixed_and_crlf(self, tmp_path):
+        text = tetra_text(".ply").replace("3 2 0 3", "4 3 2 1 0").replace("\n", "\r\n")
+        assert polygons(read_mesh(written(tmp_path, "t.ply", text))) == [*TETRA_FACES[:3], [3, 2, 1, 0]]
+
+    def test_off_with_colours_comments_and_counts_on_the_header_line(self, tmp_path):
+        text = (
+            "COFF 4 2 0 # counts\n\n# points\n0 0 0 255 0 0\n1 0 0 255 0 0\n1 1 0 0 0 0 # here\n0 1 0 1 1 1\n"
+            "4 0 1 2 3 0.5 0.5 0.5\n3 0 2 3\n"
+        )
+        mesh = read_mesh(written(tmp_path, "t.off", text))
+        np.testing.assert_array_equal(mesh.vertices, SQUARE)
+        assert polygons(mesh) == [[0, 1, 2, 3], [0, 2, 3]]
+
+    def test_off_without_keyword(self, tmp_path):
+        text = tetra_text(".off").replace("OFF\n", "")
+        assert polygons(read_mesh(written(tmp_path, "t.off", text))) == TETRA_FACES
+
+    @pytest.mark.parametrize("ending", [".glb", ".gltf"])
+    def test_gltf_joins_and_transforms(self, tmp_path, ending):
+        trimesh = pytest.importorskip("trimesh")
+        # Two unit boxes; a rotation and a shift put the second's face on the first's.
+        scene = trimesh.Scene()
+        box = trimesh.creation.box()
+        scene.add_geometry(box)
+        turn = trimesh.transformations.rotation_matrix(np.pi / 2, [0, 0, 1])
+        turn[:3, 3] = (2, 0, 0)
+        scene.add_geometry(trimesh.creation.box((1, 2, 1)), transform=turn)
+        path = tmp_path / f"boxes{ending}"
+        if ending == ".glb":
+            path.write_bytes(scene.export(file_type="glb"))
+        else:
+            for name, content in scene.export(file_type="gltf").items():
+                (tmp_path / name).write_bytes(content)
+            (tmp_path / "model.gltf").rename(path)
+        mesh = read_mesh(path, weld=False)
+        assert len(mesh.vertices) == 16
+        assert len(mesh.offsets) == 25
+        np.testing.assert_allclose(mesh.vertices.min(0), [-0.5, -0.5, -0.5], atol=1e-6)
+        np.testing.assert_allclose(mesh.vertices.max(0), [3, 0.5, 0.5], atol=1e-6)
+
+    def test_gltf_repeats_and_mirrors(self, tmp_path):
+        points = np.array([[1, 0, 0], [2, 0, 0], [1, 1, 0]], dtype="<f4").tobytes()
+        (tmp_path / "points.bin").write_bytes(points)
+        tree = {
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": [0, 1]}],
+            "nodes": [{"mesh": 0}, {"children": [2], "scale": [-1, 1, 1]}, {"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}],
+            "buffers": [{"byteLength": 36, "uri": "points.bin"}],
+        }
+        mesh = read_mesh(written(tmp_path, "t.gltf", json.dumps(tree)))
+        triangles = mesh.vertices[mesh.corners].reshape(-1, 3, 3)
+        assert sorted(triangles[:, :, 0].sum(axis=1)) == [-4, 4]
+        up = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        # A mirroring node turns the winding over, so both still face +z.
+        np.testing.assert_array_equal(up, [[0, 0, 1], [0, 0, 1]])
+        (tmp_path / "points.bin").unlink()
+        with pytest.raises(MeshFileError, match=r"t\.gltf"):
+            read_mesh(tmp_path / "t.gltf")
+
+    def test_unknown_ending_names_the_known(self, tmp_path):
+        for name in ("mesh.xyz", "mesh"):
+            with pytest.raises(UnknownFormatError, match=r"\.obj.*\.glb"):
+                read_mesh(tmp_path / name)
+
+
+class TestObj:
+    def test_forms_of_numbers(self, tmp_path):
+        text = (
+            "# header\r\n  v 0 0 0 1 0 0\r\nv\t1 0 0\r\nv 1 1 0 1.0 # colour\r\nvt 0 0\r\nvn 0 0 1\r\n"
+            "g left\xe9\r\nf 1 2 3\r\nf -3//-1 -2//-1 -1//-1 # relative\r\nv 0 1 0\r\n"
+            "f 1/1/1 3/1 \\\r\n 4\r\n"
+            "f -1 1/ 2// 3/1/\r\nl 1/1 2/1\r\n"
+        ).encode("latin-1")
+        mesh = read_mesh(written(tmp_path, "m.obj", text))
+        np.testing.assert_array_equal(mesh.vertices, SQUARE)
+        # The second face counts back from the three vertices above it.
+        assert polygons(mesh) == [[0, 1, 2], [0, 1, 2], [0, 2, 3], [3, 0, 1, 2]]
+
+    @pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+    @pytest.mark.parametrize("end", ["", "\n"])
+    def test_newlines(self, tmp_path, newline, end):
+        text = ("v 0 0 0\nv 1 0 0\nv 0 1 nan\nf 1/1 2/2 3/3" + end).replace("\n", newline)
+        mesh = read_mesh(written(tmp_path, "m.obj", text))
+        assert mesh.corners.tolist() == [0, 1, 2]
+        assert np.isnan(mesh.vertices[2, 2])
+
+    def test_byte_order_mark_and_unused_vertex(self, tmp_path):
+        mesh = read_mesh(
+            written(tmp_path, "m.obj", b"\xef\xbb\xbfv 3 0 0\nv 1 0 0\nv 9 9 9\nv 0 1 0\nf 1 2 4\n ")
+        )
+        assert mesh.vertices[:, 0].tolist() == [3, 1, 9, 0]
+        assert mesh.corners.tolist() == [0, 1, 3]
+
+    @pytest.mark.parametrize(
+        ("text", "line", "reason"),
+        [
+            ("v 0 0 0\nv 1 0 x1\nv 0 1 0\nf 1 2 3\n", 2, "'x1' is not a number"),
+            ("v 0 0 0\nv 1 0 \nv 0 1 0\nf 1 2 3\n", 2, "needs 3 coordinates, but has 2"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 two 3\n", 5, "'two' is not a number"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1 2/1 3/1\nf 1/1 2/q 3/1\n", 5, "'2/q'"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf /1 /2 /3\n", 4, "'/1'"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1/1/1 2 3\n", 4, "'1/1/1/1'"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2\n", 5, "at least 3 corners, but has 2"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf", 5, "at least 3 corners, but has 0"),
+            ("v 0 0 0\nv 1 0 \\\n 0\nv 0 1 zero\nf 1 2 3\n", 4, "'zero'"),
+            ("v 0 0 0\nv 1 0-1\nv 0 1 0\nf 1 2 3\n", 2, "has 2"),
+            ("v 0 0 0\nv 1 0-1 0\nv 0 1 0\nf 1 2 3\n", 2, "'0-1'"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf #1 2 3\n", 4, "at least 3 corners, but has 0"),
+        ],
+    )
+    def test_bad_lines_are_named(self, tmp_path, text, line, reason):
+        with pytest.raises(MeshFileError, match=rf"bad\.obj, line {line}: .*{re.escape(reason)}"):
+            read_mesh(written(tmp_path, "bad.obj", text))
+
+    @pytest.mark.parametrize("number", ["0", "4", "-4", "9" * 18])
+    @pytest.mark.parametrize("form", ["f 1 2 {}", "f 1/7/7 2/7 {}//7"])
+    def test_bad_index(self, tmp_path, number, form):
+        text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n" + form.format(number)
+        with pytest.raises(FaceIndexError, match=rf"bad\.obj, line 5: .*vertex {number}"):
+            read_mesh(written(tmp_path, "bad.obj", text))
+
+
+class TestBadFiles:
+    @pytest.mark.parametrize("ending", INPUT_FORMATS)
+    @pytest.mark.parametrize(
+        "content", [b"", b" \n", b"\x00\xff\x13garbage" * 40, b"ply\nglTF\x02\x00\x00\x00{"]
+    )
+    def test_garbage(self, tmp_path, ending, content):
+        path = written(tmp_path, "bad" + ending, content)
+        with pytest.raises((MeshFileError, EmptyMeshError)) as caught:
+            read_mesh(path)
+        assert str(path) in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+    @pytest.mark.parametrize("ending", INPUT_FORMATS)
+    def test_missing_folder_and_directory(self, tmp_path, ending):
+        with pytest.raises(MeshFileError, match="no such file"):
+            read_mesh(tmp_path / "none" / ("x" + ending))
+        (tmp_path / ("dir" + ending)).mkdir()
+        with pytest.raises(MeshFileError, match="folder"):
+            read_mesh(tmp_path / ("dir" + ending))
+
+    @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may read everything")
+    def test_no_permission(self, tmp_path):
+        path = written(tmp_path, "x.obj", tetra_text(".obj"))
+        path.chmod(0)
+        with pytest.raises(MeshFileError, match="permission"):
+            read_mesh(path)
+        (tmp_path / "closed").mkdir(mode=0)
+        with pytest.raises(MeshFileError, match="permission"):
+            read_mesh(tmp_path / "closed" / "x.obj")
+
+    @pytest.mark.parametrize("ending", [".off", ".ply", ".stl"])
+    def test_text_cut_anywhere(self, tmp_path, ending):
+        whole = tetra_text(ending).rstrip()
+        # A cut inside the last number, or name of the solid, leaves a file nobody can tell from a whole one.
+        stop = len(whole) if ending != ".stl" else whole.index("endsolid")
+        for cut in range(1, stop - 1):
+            with pytest.raises(ConeflatError):
+                read_mesh(written(tmp_path, "cut" + ending, whole[:cut]))
+
+    @pytest.mark.parametrize("order", "<>")
+    @pytest.mark.parametrize("faces", [TETRA_FACES, [[0, 1, 2], [3, 2, 1, 0], [0, 1, 3]]])
+    def test_binary_ply_cut_anywhere(self, tmp_path, order, faces):
+        whole = ply_bytes(order, TETRA_POINTS, faces)
+        for cut in range(1, len(whole)):
+            with pytest.raises((MeshFileError, EmptyMeshError)):
+                read_mesh(written(tmp_path, "cut.ply", whole[:cut]))
+
+    def test_glb_cut_anywhere(self, tmp_path):
+        trimesh = pytest.importorskip("trimesh")
+        whole = trimesh.Scene(trimesh.creation.box()).export(file_type="glb")
+        for cut in range(1, len(whole), 7):
+            with pytest.raises((MeshFileError, EmptyMeshError)):
+                read_mesh(written(tmp_path, "cut.glb", whole[:cut]))
+
+    def test_stl_counts(self, tmp_path):
+        corners = np.array(TETRA_POINTS)[TETRA_FACES]
+        with pytest.raises(MeshFileError, match="4 of the 5 triangles"):
+            read_mesh(written(tmp_path, "x.stl", b"binary" + stl_bytes(corners, promised=5)[6:]))
+        with pytest.raises(EmptyMeshError):
+            read_mesh(written(tmp_path, "x.stl", stl_bytes([])))
+
+    @pytest.mark.parametrize(
+        ("name", "old", "new", "reason"),
+        [
+            ("x.off", "4 4 6", "4 5 6", "4 of the 5 faces"),
+            ("x.off", "4 4 6", "9 4 6", "8 of the 9 vertices"),
+            ("x.off", "1e-07", "abc", "line 6: 'abc'"),
+            ("x.off", "3 0 2 1", "2 0 2", "line 7: .*at least 3 corners"),
+            ("x.off", "3 0 2 1", "4 0 2 1", "line 7: .*4 corners names 3"),
+            ("x.off", "OFF", "OFF BINARY", "binary"),
+            ("x.ply", "1e-07", "abc", "line 13: 'abc'"),
+            ("x.ply", "element face 4", "element face 5", "5 face elements"),
+            ("x.ply", "property double z", "property double w", "'z'"),
+            ("x.ply", "3 0 2 1", "3 0 2.5 1", "2.5"),
+            ("x.ply", "format ascii", "format utf8", "format"),
+            ("x.stl", "1e-07", "abc", "'abc'"),
+        ],
+    )
+    def test_reasons(self, tmp_path, name, old, new, reason):
+        text = tetra_text(name[1:])
+        assert old in text
+        with pytest.raises(MeshFileError, match=reason):
+            read_mesh(written(tmp_path, name, text.replace(old, new, 1)))
+
+    @pytest.mark.parametrize("ending", [".off", ".ply"])
+    def test_index_out_of_range(self, tmp_path, ending):
+        text = tetra_text(ending).replace("3 0 2 1", "3 0 2 4")
+        with pytest.raises(FaceIndexError, match="face 0 names vertex 4"):
+            read_mesh(written(tmp_path, "x" + ending, text))
+
+    @pytest.mark.parametrize("text", ["v 0 0 0\n", "f 1 2 3\n", "# nothing\n"])
+    def test_empty_obj(self, tmp_path, text):
+        with pytest.raises(EmptyMeshError, match=r"x\.obj has no"):
+            read_mesh(written(tmp_path, "x.obj", text))
+
+
+@pytest.mark.skipif(not MESHES.is_dir(), reason="the development meshes are not here")
+def test_development_meshes():
+    table = re.findall(r"^\| (\S+) \| ([\d,]+) \|", (MESHES / "SOURCES.md").read_text(), re.MULTILINE)
+    assert table
+    for name, count in table:
+        mesh = read_mesh(MESHES / name)
+        faces, face_corners = triangulate(mesh.vertices, mesh.corners, mesh.offsets)
+        assert len(faces) == int(count.replace(",", "")), name
+        assert is_polygon_side(face_corners, mesh.offsets).all(), name
+
+
+def triangulated(points, *rings):
+    corners = np.concatenate(rings)
+    offsets = np.cumsum([0, *map(len, rings)])
+    faces, face_corners = triangulate(np.asarray(points, float), corners, offsets)
+    np.testing.assert_array_equal(corners[face_corners], faces)
+    return faces, face_corners, offsets
+
+
+def area_vectors(points, faces):
+    a, b, c = np.asarray(points, float)[faces].transpose(1, 0, 2)
+    return np.cross(b - a, c - a) / 2
+
+
+def triangle_set(faces):
+    return {tuple(np.roll(f, -int(np.argmin(f)))) for f in faces}
+
+
+def lifted(plane):
+    """Turn points of the plane into a plane of space that is along no axis."""
+    plane = np.asarray(plane, dtype=float)
+    u, v = np.array([2, 1, 0]) / 5**0.5, np.array([-1, 2, 5]) / 30**0.5
+    return plane[:, :1] * u + plane[:, 1:] * v + [3, -4, 5]
+
+
+DENT = [(0, 0), (4, 0), (1, 1), (0, 4)]  # concave at corner 2
+ARROW = [(0, 0), (4, 0), (4, 4), (2, 1), (0, 4)]  # concave at corner 3
+COMB = [(0, 0), (7, 0), (7, 3), (6, 1), (5, 3), (4, 1), (3, 3), (2, 1), (1, 3)]
+SIDE_POINTS = [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
+REGULAR = [(np.cos(t), np.sin(t)) for t in np.arange(7) * 2 * np.pi / 7]
+
+
+class TestTriangulate:
+    def test_order_and_sides_of_mixed_polygons(self):
+        points = [*lifted(REGULAR), [9, 9, 9]]
+        _, face_corners, offsets = triangulated(points, [0, 1, 2], [0, 2, 3, 4], [5, 4, 3, 2, 0], [6, 5, 0])
+        polygon = np.searchsorted(offsets, face_corners, side="right") - 1
+        assert polygon.tolist() == [[0] * 3, [1] * 3, [1] * 3, [2] * 3, [2] * 3, [2] * 3, [3] * 3]
+        sides = is_polygon_side(face_corners, offsets)
+        # A polygon of k corners has k sides, and k - 3 diagonals seen from both ends.
+        assert [int(sides[polygon[:, 0] == i].sum()) for i in range(4)] == [3, 4, 5, 3]
+        np.testing.assert_array_equal(is_polygon_side(face_corners[:, ::-1], offsets).sum(1), sides.sum(1))
+
+    @pytest.mark.parametrize("shape", [SQUARE[:, :2], DENT, ARROW, COMB, SIDE_POINTS, REGULAR])
+    def test_triangles_tile_the_polygon(self, shape):
+        points = lifted(shape)
+        count = len(points)
+        whole = area_vectors(points, [[0, i, i + 1] for i in range(1, count - 1)]).sum(0)
+        for start in range(count):
+            for ring in (np.roll(np.arange(count), start), np.roll(np.arange(count)[::-1], start)):
+                faces, _, _ = triangulated(points, ring)
+                assert faces.shape == (count - 2, 3)
+                assert set(faces.ravel()) == set(range(count))
+                up = whole if ring[1] == (ring[0] + 1) % count else -whole
+                parts = area_vectors(points, faces) @ up / (up @ up)
+                # All turned the polygon's way, none empty, and together as large as it.
+                assert parts.min() > 1e-3
+                assert parts.sum() == pytest.approx(1, abs=1e-12)
+
+    def test_quads_take_the_shorter_diagonal(self):
+        kite = [(0, 0), (3, -1), (4, 0), (3, 1)]
+        faces, _, _ = triangulated(lifted(kite), [0, 1, 2, 3])
+        assert triangle_set(faces) == {(0, 1, 3), (1, 2, 3)}
+
+    def test_concave_quad_is_split_at_its_dent(self):
+        faces, _, _ = triangulated(lifted(DENT), [0, 1, 2, 3])
+        # The other diagonal, 1-3, is longer here; with the dent moved out it is the shorter and yet wrong.
+        assert triangle_set(faces) == {(0, 1, 2), (0, 2, 3)}
+        thin = [(-9, 0), (1, 0.5), (0, 0), (1, -0.5)]
+        faces, _, _ = triangulated(lifted(thin), [0, 3, 2, 1])
+        assert triangle_set(faces) == {(0, 3, 2), (0, 2, 1)}
+
+    @pytest.mark.parametrize("turn", [0, 0.3, 1.1])
+    def test_squares_do_not_depend_on_the_first_corner(self, turn):
+        rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        points = lifted(SQUARE[:, :2] @ rotation.T)
+        splits = [triangle_set(triangulated(points, np.roll(np.arange(4), k))[0]) for k in range(4)]
+        assert all(split == splits[0] for split in splits)
+
+    def test_grid_of_squares_has_parallel_diagonals(self):
+        x, y = np.meshgrid(np.arange(5.0), np.arange(4.0))
+        turn = np.array([[0.8, -0.6], [0.6, 0.8]])
+        points = lifted(np.stack([x.ravel(), y.ravel()], 1) / 10 @ turn.T)
+        rings = [[5 * j + i, 5 * j + i + 1, 5 * j + i + 6, 5 * j + i + 5] for j in range(3) for i in range(4)]
+        faces, face_corners, offsets = triangulated(points, *rings)
+        diagonal = ~is_polygon_side(face_corners, offsets)
+        ends = np.stack([faces[diagonal], np.roll(faces, -1, axis=1)[diagonal]], 1)
+        assert len(set(np.abs(ends[:, 0] - ends[:, 1]))) == 1
+
+    @pytest.mark.parametrize("shape", [SQUARE[:, :2], ARROW, COMB])
+    def test_bad_coordinates_give_valid_indices(self, shape):
+        for value in (np.nan, np.inf, 1e200):
+            points = lifted(shape)
+            points[1] = value
+            faces, _, _ = triangulated(points, np.arange(len(points)))
+            assert faces.shape == (len(points) - 2, 3)
+            assert set(faces.ravel()) == set(range(len(points)))
+        faces, _, _ = triangulated(np.zeros((len(shape), 3)), np.arange(len(shape)))
+        assert faces.shape == (len(shape) - 2, 3)
+
+    def test_bad_input(self):
+        with pytest.raises(FaceIndexError, match="face 1 names vertex 4, but there are 4"):
+            triangulated(SQUARE, [0, 1, 2], [0, 1, 4])
+        with pytest.raises(FaceIndexError, match="vertex -1"):
+            triangulated(SQUARE, [0, 1, -1])
+        with pytest.raises(DegenerateFaceError, match="face 1 has 2 corners"):
+            triangulated(SQUARE, [0, 1, 2], [0, 1])

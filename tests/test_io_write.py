@@ -1,0 +1,362 @@
+"""Writing flattened meshes, and that a file is written in full or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from coneflat.errors import MeshFileError, UnknownFormatError
+from coneflat.io import OUTPUT_FORMATS, atomic_write, check_output, read_mesh, triangulate, write_flattening
+
+OBJ = b"""\
+# a bar of two cells \xe9
+mtllib bar.mtl more/paint.mtl
+o bar
+v 0 0 0 1 0 0
+v 1 0 0 1 0 0
+v 2 0 0.30000000000000004 1 0 0
+v 0 1 0 0 1 0
+v 1 1 0 0 1 0
+v 2 1 1e-17 0 1 0
+v 7 7 7
+vt 0.5 0.5
+vn 0 0 1
+g left
+usemtl red
+f 1/1/1 2/1/1 5/1/1 4/1/1
+s off
+l 1/1 2/1
+g right
+f -6//-1 -5//-1 -2//-1 # the triangle
+# between
+f 2/1 6 5
+# the end"""
+
+POINTS = np.array(
+    [[0, 0, 0], [1, 0, 0], [2, 0, 0.1 + 0.2], [0, 1, 0], [1, 1, 0], [2, 1, 1e-17], [7, 7, 7]], dtype=float
+)
+
+
+def flattening(vertices, faces, uv, uv_faces, source=None, face_corners=None, origin=None):
+    return SimpleNamespace(
+        vertices=np.asarray(vertices, dtype=float),
+        faces=np.asarray(faces),
+        uv=np.asarray(uv, dtype=float),
+        uv_faces=np.asarray(uv_faces),
+        uv_scale=0.25,
+        cones=np.array([1]),
+        curvatures=np.array([np.pi / 2]),
+        log_scale=np.linspace(0, 1, len(vertices)),
+        seams=np.array([[1, 4]]),
+        vertex_origin=np.arange(len(vertices)) if origin is None else np.asarray(origin),
+        face_corners=face_corners,
+        source=source,
+        report=lambda: {"faces": len(faces), "note": "größer"},
+    )
+
+
+def cut_bar(source, keep=slice(None), flip=()):
+    """Return a result whose layout is x and y, with a seam along the edge 1-4 between the cells."""
+    faces, face_corners = triangulate(source.vertices, source.corners, source.offsets)
+    right = np.array([False, False, *[True] * (len(faces) - 2)])[:, None]
+    uv = np.concatenate((source.vertices[:, :2] / 3, source.vertices[[1, 4], :2] / 3 + [0.3, 0]))
+    shifted = {1: 7, 4: 8}
+    uv_faces = np.where(right, np.vectorize(lambda v: shifted.get(v, v))(faces), faces)
+    for t in flip:
+        for rows in (faces, uv_faces, face_corners):
+            rows[t] = rows[t, ::-1]
+    return flattening(source.vertices, faces[keep], uv, uv_faces[keep], source, face_corners[keep])
+
+
+@pytest.fixture
+def bar(tmp_path):
+    (tmp_path / "in").mkdir()
+    path = tmp_path / "in" / "bar.obj"
+    path.write_bytes(OBJ)
+    return read_mesh(path)
+
+
+def lines_of(path):
+    return path.read_bytes().splitlines()
+
+
+def corner_uv(path):
+    """Return the UV at every polygon corner of an OBJ file, by an independent reading of its text."""
+    uv = [tuple(map(float, line.split()[1:])) for line in lines_of(path) if line.startswith(b"vt ")]
+    words = [line.split()[1:] for line in lines_of(path) if line.startswith(b"f ")]
+    return [[uv[int(word.split(b"/")[1]) - 1] for word in face] for face in words]
+
+
+class TestObj:
+    def test_everything_else_stays_in_place(self, bar, tmp_path):
+        out = write_flattening(cut_bar(bar), tmp_path / "in" / "out.obj")
+        old = [line for line in OBJ.splitlines() if not line.startswith((b"vt", b"f", b"l"))]
+        new = [line for line in lines_of(out) if not line.startswith((b"vt", b"f", b"l", b"# the triangle"))]
+        assert new == old
+        lines = lines_of(out)
+        assert [line for line in lines if line.startswith(b"f")] == [
+            b"f 1/1/1 2/2/1 5/5/1 4/4/1",
+            b"f 2/8/-1 3/3/-1 6/6/-1",
+            b"f 2/8 6/6 5/9",
+        ]
+        assert b"l 1 2" in lines
+        assert lines.index(b"# the triangle") == lines.index(b"f 2/8/-1 3/3/-1 6/6/-1") + 1
+        texture = [i for i, line in enumerate(lines) if line.startswith(b"vt ")]
+        assert len(texture) == 9
+        assert texture[-1] < lines.index(b"f 1/1/1 2/2/1 5/5/1 4/4/1")
+
+    def test_round_trip_is_exact(self, bar, tmp_path):
+        result = cut_bar(bar)
+        result.uv = np.random.default_rng(1).random((9, 2)) ** 20
+        out = write_flattening(result, tmp_path / "out.obj")
+        again = read_mesh(out)
+        assert again.vertices.tobytes() == POINTS.tobytes() == bar.vertices.tobytes()
+        np.testing.assert_array_equal(again.corners, bar.corners)
+        np.testing.assert_array_equal(again.offsets, bar.offsets)
+        quad, *triangles = corner_uv(out)
+        # The layout's points 0, 1, 4, 3 are those of the vertices, in the left cell.
+        assert quad == [tuple(p) for p in result.uv[[0, 1, 4, 3]]]
+        assert triangles == [[tuple(p) for p in face] for face in result.uv[result.uv_faces[2:]]]
+
+    def test_newlines_are_kept(self, tmp_path):
+        path = tmp_path / "bar.obj"
+        path.write_bytes(OBJ.replace(b"\n", b"\r\n"))
+        out = write_flattening(cut_bar(read_mesh(path)), tmp_path / "out.obj")
+        assert out.read_bytes().count(b"\n") == out.read_bytes().count(b"\r\n") > 20
+
+    def test_written_over_itself_twice_is_the_same(self, bar):
+        write_flattening(cut_bar(bar), bar.path)
+        first = bar.path.read_bytes()
+        write_flattening(cut_bar(read_mesh(bar.path)), bar.path)
+        assert bar.path.read_bytes() == first
+
+    def test_material_paths_follow_the_output(self, bar, tmp_path):
+        (tmp_path / "elsewhere").mkdir()
+        out = write_flattening(cut_bar(bar), tmp_path / "elsewhere" / "out.obj")
+        assert b"mtllib ../in/bar.mtl ../in/more/paint.mtl" in lines_of(out)
+        (bar.path.parent / "bar.mtl more").mkdir()
+        (bar.path.parent / "bar.mtl more" / "paint.mtl").write_text("newmtl red\n")
+        out = write_flattening(cut_bar(bar), tmp_path / "out.obj")
+        assert b"mtllib in/bar.mtl more/paint.mtl" in lines_of(out)
+
+    def test_reversed_polygons_run_backwards(self, bar, tmp_path):
+        out = write_flattening(cut_bar(bar, flip=(0, 1, 3)), tmp_path / "out.obj")
+        assert [line for line in lines_of(out) if line.startswith(b"f")] == [
+            b"f 1/1/1 4/4/1 5/5/1 2/2/1",
+            b"f 2/8/-1 3/3/-1 6/6/-1",
+            b"f 2/8 5/9 6/6",
+        ]
+
+    def test_dropped_faces_are_left_out(self, bar, tmp_path):
+        result = cut_bar(bar, keep=[0, 3])
+        out = write_flattening(result, tmp_path / "out.obj")
+        faces = [line.split()[1:] for line in lines_of(out) if line.startswith(b"f")]
+        # Of the quad one triangle is left, of the first triangle nothing.
+        assert [len(face) for face in faces] == [3, 3]
+        assert {int(w.split(b"/")[0]) - 1 for w in faces[0]} == set(result.faces[0].tolist())
+        assert faces[1] == [b"2/8", b"6/6", b"5/9"]
+        order = [line.split()[0] for line in lines_of(out)]
+        assert order.index(b"s") > order.index(b"f")
+        assert lines_of(out)[-1] == b"# the end"
+
+    def test_welded_input_keeps_the_numbers_of_the_file(self, tmp_path):
+        path = tmp_path / "slit.obj"
+        path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv -1 0 0\nf 1 2 3\nf 4 3 5\n")
+        source = read_mesh(path, weld=True)
+        faces, face_corners = triangulate(source.vertices, source.corners, source.offsets)
+        result = flattening(source.vertices, faces, source.vertices[:, :2], faces, source, face_corners)
+        out = write_flattening(result, tmp_path / "out.obj")
+        assert lines_of(out)[-2:] == [b"f 1/1 2/2 3/3", b"f 4/1 3/3 5/4"]
+
+    def test_slit_stays_a_slit(self, tmp_path):
+        path = tmp_path / "slit.obj"
+        path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv -1 0 0\nv 0 1 0\nf 1 2 3\nf 4 6 5\n")
+        source = read_mesh(path)
+        faces, face_corners = triangulate(source.vertices, source.corners, source.offsets)
+        result = flattening(source.vertices, faces, source.vertices[:, :2], faces, source, face_corners)
+        again = read_mesh(write_flattening(result, tmp_path / "out.obj"))
+        assert len(again.vertices) == 6
+        assert again.corners.tolist() == [0, 1, 2, 3, 5, 4]
+
+    def test_source_of_another_format_keeps_polygons(self, tmp_path):
+        path = tmp_path / "q.off"
+        path.write_text("OFF\n5 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0.1 5 0.2\n4 0 1 2 3\n3 3 2 4\n")
+        source = read_mesh(path)
+        faces, face_corners = triangulate(source.vertices, source.corners, source.offsets)
+        result = flattening(source.vertices, faces, source.vertices[:, :2], faces, source, face_corners)
+        out = write_flattening(result, tmp_path / "out.obj")
+        assert lines_of(out)[-2:] == [b"f 1/1 2/2 3/3 4/4", b"f 4/4 3/3 5/5"]
+        assert read_mesh(out).vertices.tobytes() == source.vertices.tobytes()
+
+    def test_plain_arrays(self, tmp_path):
+        vertices = np.random.default_rng(0).normal(size=(4, 3)) * 1e-5
+        faces = np.array([[0, 1, 2], [1, 3, 2]])
+        uv = np.random.default_rng(1).random((6, 2))
+        out = write_flattening(
+            flattening(vertices, faces, uv, np.arange(6).reshape(2, 3)), tmp_path / "o.OBJ"
+        )
+        again = read_mesh(out)
+        assert again.vertices.tobytes() == vertices.tobytes()
+        np.testing.assert_array_equal(again.corners.reshape(-1, 3), faces)
+        assert corner_uv(out) == [[tuple(p) for p in uv[:3]], [tuple(p) for p in uv[3:]]]
+
+
+def glb_parts(path):
+    """Return the JSON of a GLB file and a reader of its accessors, read by the specification."""
+    content = path.read_bytes()
+    magic, version, total, length, kind = struct.unpack_from("<4sII I4s", content)
+    assert (magic, version, total, kind) == (b"glTF", 2, len(content), b"JSON")
+    tree = json.loads(content[20 : 20 + length])
+    binary = content[28 + length :]
+    columns = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
+
+    def accessor(i):
+        item = tree["accessors"][i]
+        view = tree["bufferViews"][item["bufferView"]]
+        kind = {5126: "<f4", 5125: "<u4", 5123: "<u2"}[item["componentType"]]
+        start = view.get("byteOffset", 0) + item.get("byteOffset", 0)
+        values = np.frombuffer(binary, kind, item["count"] * columns[item["type"]], start)
+        return values.reshape(item["count"], -1)
+
+    return tree, accessor
+
+
+class TestSplitFormats:
+    def test_ply_round_trip(self, bar, tmp_path):
+        result = cut_bar(bar)
+        result.uv = np.random.default_rng(1).random((9, 2))
+        result.vertex_origin = np.arange(7) + 10
+        out = write_flattening(result, tmp_path / "out.ply")
+        mesh = read_mesh(out)
+        # Vertex 6 has no face, vertices 1 and 4 lie on the seam.
+        assert len(mesh.vertices) == 8
+        triangles = mesh.corners.reshape(-1, 3)
+        assert mesh.vertices[triangles].tobytes() == result.vertices[result.faces].tobytes()
+        header, _, body = out.read_bytes().partition(b"end_header\n")
+        properties = [line.split()[-1] for line in header.splitlines() if line.startswith(b"property")]
+        assert properties == [b"x", b"y", b"z", b"s", b"t", b"source_vertex", b"vertex_indices"]
+        rows = np.frombuffer(body, [("xyz", "<f8", 3), ("uv", "<f8", 2), ("source", "<i4")], 8)
+        assert rows["uv"][triangles].tobytes() == result.uv[result.uv_faces].tobytes()
+        np.testing.assert_array_equal(rows["source"][triangles], result.faces + 10)
+
+    def test_glb_by_the_specification(self, bar, tmp_path):
+        result = cut_bar(bar)
+        result.uv = np.random.default_rng(1).random((9, 2))
+        result.vertex_origin = np.arange(7) + 10
+        out = write_flattening(result, tmp_path / "out.glb")
+        tree, accessor = glb_parts(out)
+        (primitive,) = tree["meshes"][0]["primitives"]
+        triangles = accessor(primitive["indices"]).reshape(-1, 3)
+        attributes = {name: accessor(i)[triangles] for name, i in primitive["attributes"].items()}
+        np.testing.assert_array_equal(attributes["POSITION"], result.vertices[result.faces].astype("f4"))
+        # glTF counts v from the top of the image.
+        expected = result.uv[result.uv_faces] * [1, -1] + [0, 1]
+        np.testing.assert_array_equal(attributes["TEXCOORD_0"], expected.astype("f4"))
+        np.testing.assert_array_equal(attributes["_SOURCE_VERTEX"][..., 0], result.faces + 10)
+        np.testing.assert_allclose(np.linalg.norm(attributes["NORMAL"], axis=-1), 1, rtol=1e-6)
+        assert (attributes["NORMAL"][..., 2] > 0).all()
+        assert tree["materials"][primitive["material"]]["doubleSided"]
+        assert tree["accessors"][primitive["attributes"]["_SOURCE_VERTEX"]]["type"] == "SCALAR"
+        # The seam closes again when the file is read, since the positions agree.
+        assert len(read_mesh(out).vertices) == 6
+
+    def test_npz_holds_every_array(self, bar, tmp_path):
+        result = cut_bar(bar)
+        out = write_flattening(result, tmp_path / "out.npz")
+        names = ["vertices", "faces", "uv", "uv_faces", "cones", "curvatures", "log_scale", "seams"]
+        names += ["vertex_origin", "uv_scale"]
+        with np.load(out, allow_pickle=False) as arrays:
+            assert set(arrays.files) == {*names, "report"}
+            for name in names:
+                np.testing.assert_array_equal(arrays[name], getattr(result, name))
+            assert json.loads(str(arrays["report"])) == result.report()
+
+
+class TestTargets:
+    @pytest.mark.parametrize("ending", OUTPUT_FORMATS)
+    def test_missing_folder(self, bar, tmp_path, ending):
+        with pytest.raises(MeshFileError, match=r"there is no folder .*create it first"):
+            write_flattening(cut_bar(bar), tmp_path / "none" / ("x" + ending))
+        assert not (tmp_path / "none").exists()
+
+    @pytest.mark.parametrize("name", ["x.stl", "x", "x.png"])
+    def test_unknown_ending(self, bar, tmp_path, name):
+        with pytest.raises(UnknownFormatError, match=r"\.obj, \.ply, \.glb, \.npz"):
+            write_flattening(cut_bar(bar), tmp_path / name)
+        assert not (tmp_path / name).exists()
+
+    def test_folder_in_the_way(self, bar, tmp_path):
+        (tmp_path / "x.obj").mkdir()
+        with pytest.raises(MeshFileError, match="it is a folder"):
+            write_flattening(cut_bar(bar), tmp_path / "x.obj")
+        (tmp_path / "file").write_text("")
+        with pytest.raises(MeshFileError, match="no folder"):
+            check_output(tmp_path / "file" / "x.obj")
+
+    @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
+    def test_no_permission(self, bar, tmp_path):
+        (tmp_path / "x.obj").write_text("old")
+        (tmp_path / "x.obj").chmod(0o444)
+        with pytest.raises(MeshFileError, match="permission"):
+            write_flattening(cut_bar(bar), tmp_path / "x.obj")
+        (tmp_path / "in").chmod(0o555)
+        with pytest.raises(MeshFileError, match="permission"):
+            write_flattening(cut_bar(bar), tmp_path / "in" / "x.obj")
+
+    @pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError, OSError, MeshFileError])
+    def test_interruption_leaves_the_old_file(self, tmp_path, error):
+        path = tmp_path / "report.json"
+        path.write_text("old")
+        expected = MeshFileError if error is OSError else error
+
+        def interrupted():
+            with atomic_write(path, "w") as stream:
+                stream.write("new")
+                stream.flush()
+                assert len(list(tmp_path.iterdir())) == 2
+                raise error("stop")
+
+        with pytest.raises(expected, match="stop"):
+            interrupted()
+        assert [p.name for p in tmp_path.iterdir()] == ["report.json"]
+        assert path.read_text() == "old"
+
+    @pytest.mark.parametrize("ending", OUTPUT_FORMATS)
+    def test_interrupted_writer_leaves_nothing(self, bar, tmp_path, ending):
+        result = cut_bar(bar)
+        (tmp_path / "out").mkdir()
+
+        class Interrupting:
+            def __getattr__(self, name):
+                if name in ("uv", "uv_faces"):
+                    raise KeyboardInterrupt
+                return getattr(result, name)
+
+        with pytest.raises(KeyboardInterrupt):
+            write_flattening(Interrupting(), tmp_path / "out" / ("x" + ending))
+        assert list((tmp_path / "out").iterdir()) == []
+
+    def test_text_is_utf8_with_its_own_newlines(self, tmp_path):
+        with atomic_write(tmp_path / "t.txt", "w") as stream:
+            stream.write("größer\n")
+        assert (tmp_path / "t.txt").read_bytes() == "größer\n".encode()
+
+    @pytest.mark.skipif(os.name != "posix", reason="links and modes of POSIX")
+    def test_links_and_modes_are_respected(self, tmp_path):
+        (tmp_path / "real").mkdir()
+        target = tmp_path / "real" / "t.bin"
+        target.write_bytes(b"old")
+        target.chmod(0o640)
+        (tmp_path / "link.bin").symlink_to(target)
+        with atomic_write(tmp_path / "link.bin") as stream:
+            stream.write(b"new")
+        assert (tmp_path / "link.bin").is_symlink()
+        assert target.read_bytes() == b"new"
+        assert target.stat().st_mode & 0o777 == 0o640
+        with pytest.raises(MeshFileError, match="not an ordinary file"), atomic_write("/dev/null"):
+            pass

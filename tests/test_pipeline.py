@@ -1,0 +1,225 @@
+"""The whole way, on meshes of every topology."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+import shapes
+
+import coneflat
+from coneflat import errors, flatten, read_mesh, sample_path
+
+SHAPES = {
+    "tetrahedron": shapes.tetrahedron(),
+    "sphere": shapes.sphere(3),
+    "torus": shapes.torus(),
+    "disk": shapes.hill(),
+    "annulus": shapes.annulus(),
+    "genus 3": shapes.genus(3),
+    "triangle": (np.eye(3), np.array([[0, 1, 2]])),
+    "two components": shapes.join(shapes.sphere(2), shapes.hill()),
+    "many components": shapes.join(*[shapes.tetrahedron()] * 30, shapes.torus(12, 8)),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_every_topology_comes_through(name):
+    vertices, faces = SHAPES[name]
+    result = flatten(vertices, faces)
+    components = coneflat.TriangleMesh(vertices, faces).components[0]
+    assert result.uv.min() >= 0
+    assert result.uv.max() <= 1
+    assert result.distortion.charts == components
+    assert result.distortion.mirrored_charts == 0
+    np.testing.assert_array_equal(result.faces, faces)
+    np.testing.assert_array_equal(result.vertices, vertices)
+    assert result.uv_faces.min() == 0
+    assert len(np.unique(result.uv_faces)) == len(result.uv)
+    # Corners that share a UV point share a vertex.
+    pairs = np.unique(np.stack([result.uv_faces.ravel(), faces.ravel()]), axis=1)
+    assert pairs.shape[1] == len(result.uv)
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus", "disk", "annulus", "genus 3"])
+def test_smooth_shapes_have_little_distortion(name):
+    d = flatten(*SHAPES[name], epsilon=0.5).distortion
+    assert d.flipped == d.degenerate == 0
+    assert d.qc_mean < 1.1
+    assert d.area_std < 0.25
+    assert d.curvature_error_max < 0.2
+
+
+def test_scale_is_the_models_own():
+    vertices, faces = shapes.grid(5, 5)
+    result = flatten(vertices * 7, faces)
+    lengths = np.linalg.norm(result.corner_uv[:, 1] - result.corner_uv[:, 0], axis=1) / result.uv_scale
+    expected = np.linalg.norm(vertices[faces[:, 1]] - vertices[faces[:, 0]], axis=1) * 7
+    np.testing.assert_allclose(lengths, expected, rtol=1e-9)
+    np.testing.assert_allclose(result.log_scale, 0, atol=1e-9)
+
+
+def same(one, two, rtol=1e-6):
+    for field in dataclasses.fields(one.distortion):
+        if field.name not in ("qc", "log_area_scale"):
+            value = getattr(one.distortion, field.name), getattr(two.distortion, field.name)
+            np.testing.assert_allclose(*value, rtol=rtol, atol=1e-8, err_msg=field.name)
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus", "disk", "annulus", "genus 3"])
+def test_numbering_motion_and_scale_change_nothing(name):
+    vertices, faces = SHAPES[name]
+    base = flatten(vertices, faces, epsilon=0.5)
+    for scale in (1e-6, 1e6):
+        scaled = flatten(vertices * scale, faces, epsilon=0.5)
+        np.testing.assert_array_equal(scaled.cones, base.cones)
+        same(scaled, base)
+    moved = flatten(vertices @ shapes.rotation().T + [5, -3, 2], faces, epsilon=0.5)
+    np.testing.assert_array_equal(moved.cones, base.cones)
+    same(moved, base)
+    new_vertices, new_faces, new = shapes.renumber(vertices, faces)
+    renumbered = flatten(new_vertices, new_faces, epsilon=0.5)
+    np.testing.assert_array_equal(renumbered.cones, new[base.cones])
+    same(renumbered, base)
+
+
+def test_same_input_same_bits():
+    one, two = flatten(*SHAPES["genus 3"]), flatten(*SHAPES["genus 3"])
+    np.testing.assert_array_equal(one.uv, two.uv)
+    np.testing.assert_array_equal(one.seams, two.seams)
+
+
+def test_cones_of_the_users_own():
+    vertices, faces = SHAPES["sphere"]
+    computed = flatten(vertices, faces, cones=[1, 2, 3, 4, 100])
+    assert computed.cones.tolist() == [1, 2, 3, 4, 100]
+    np.testing.assert_allclose(computed.curvatures.sum(), 4 * np.pi)
+    given = dict(zip(computed.cones.tolist(), computed.curvatures.tolist(), strict=True))
+    again = flatten(vertices, faces, cones=given)
+    np.testing.assert_allclose(again.log_scale, computed.log_scale, atol=1e-9)
+    np.testing.assert_allclose(again.uv, computed.uv, atol=1e-7)
+    # Isolated vertices before them shift nothing.
+    shifted = flatten(np.r_[vertices[:2], vertices], faces + 2, cones=[3, 4, 5, 6, 102])
+    np.testing.assert_allclose(shifted.uv, computed.uv, atol=1e-12)
+    assert np.isnan(shifted.log_scale[:2]).all()
+    # A component each.
+    two = flatten(*SHAPES["two components"], cones=[5, 50, 100, 162 + 250])
+    assert two.distortion.charts == 2
+    none = flatten(*SHAPES["disk"], cones="none")
+    assert len(none.cones) == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "message"),
+    [
+        ({"cones": "magic"}, errors.OptionError, "unknown cones 'magic': choose from greedy, none"),
+        ({"metric": "magic"}, errors.OptionError, "unknown metric"),
+        ({"length_rule": 3}, errors.OptionError, "unknown length_rule 3"),
+        ({"layout": None}, errors.OptionError, "unknown layout"),
+        ({"epsilon": 0}, errors.OptionError, "epsilon must be a positive number, not 0"),
+        ({"epsilon": "x"}, errors.OptionError, "epsilon must be a number"),
+        ({"epsilon": float("inf")}, errors.OptionError, "epsilon"),
+        ({"max_cones": -1}, errors.OptionError, "max_cones"),
+        ({"max_cones": 2.5}, errors.OptionError, "max_cones must be a whole number"),
+        ({"max_cones": 0}, errors.CurvatureError, "at most 0"),
+        ({"max_cones": 2}, errors.CurvatureError, "2 pi or more"),
+        ({"cones": "none"}, errors.CurvatureError, "none is given"),
+        ({"cones": [1, 2, 3, 3]}, errors.OptionError, "vertex 3 is given as a cone twice"),
+        ({"cones": [1, 2, 642]}, errors.OptionError, "cone 642 is no vertex .* 0 to 641"),
+        ({"cones": [1, 2, -1]}, errors.OptionError, "cone -1"),
+        ({"cones": [1.5]}, errors.OptionError, "whole number"),
+        ({"cones": 3.5}, errors.OptionError, "cones must be|whole number"),
+        ({"cones": {1: 2.0, 2: None}}, errors.OptionError, "vertex 2 has none"),
+        ({"cones": {1: float("nan")}}, errors.OptionError, "curvature of cone 1 is nan"),
+        ({"cones": {1: 2.0, 2: 3.0}}, errors.CurvatureError, r"must sum to 2 pi chi = 12\.56637"),
+        (
+            {"cones": {1: 2.5 * np.pi, 2: np.pi, 3: np.pi / 2}},
+            errors.CurvatureError,
+            "vertex 1 has 2.5000 pi",
+        ),
+    ],
+)
+def test_bad_options_are_named(options, kind, message):
+    with pytest.raises(kind, match=message):
+        flatten(*SHAPES["sphere"], **options)
+
+
+def test_cones_on_boundaries_and_loose_vertices_are_refused():
+    vertices, faces = SHAPES["disk"]
+    with pytest.raises(errors.OptionError, match="cone 0 lies on the boundary"):
+        flatten(vertices, faces, cones=[0])
+    with pytest.raises(errors.OptionError, match="cone 0 cannot be used: no face"):
+        flatten(np.r_[vertices[:1], vertices], faces + 1, cones=[0])
+
+
+def test_triangles_without_area_are_opened_and_reported():
+    vertices, faces = shapes.grid(6, 6, lambda x, y: 0.2 * x * y)
+    vertices[24] = vertices[25]
+    result = flatten(vertices, faces)
+    assert np.isfinite(result.uv).all()
+    assert result.distortion.degenerate_input == 2
+    assert "Opened 2 triangles without area" in result.notes[0]
+    with pytest.raises(errors.DegenerateFaceError, match="2 triangles without area"):
+        flatten(vertices, faces, strict=True)
+
+
+def test_meshes_of_other_packages():
+    import meshio
+    import trimesh
+
+    vertices, faces = SHAPES["disk"]
+    expected = flatten(vertices, faces).uv
+    meshes = [
+        (vertices, faces),
+        (vertices.tolist(), faces.tolist()),
+        trimesh.Trimesh(vertices, faces, process=False),
+        meshio.Mesh(vertices, [("line", [[0, 1]]), ("triangle", faces)]),
+        type("PolyData", (), {"points": vertices, "faces": np.c_[np.full(len(faces), 3), faces].ravel()})(),
+        type("PolyData", (), {"points": vertices, "faces": faces})(),
+    ]
+    for mesh in meshes:
+        np.testing.assert_array_equal(flatten(mesh).uv, expected)
+    quads = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+    flat = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0.0]])
+    for mesh in (
+        meshio.Mesh(flat, [("quad", quads)]),
+        type("PolyData", (), {"points": flat, "faces": np.c_[[4, 4], quads].ravel()})(),
+    ):
+        assert len(flatten(mesh).faces) == 4
+    with pytest.raises(errors.ArrayShapeError, match="its cells are: tetra"):
+        flatten(meshio.Mesh(vertices, [("tetra", [[0, 1, 2, 3]])]))
+    with pytest.raises(errors.ArrayShapeError, match="cannot read a mesh from int"):
+        flatten(3)
+
+
+def test_report_is_json_with_the_promised_keys():
+    result = flatten(*SHAPES["two components"])
+    report = json.loads(json.dumps(result.report(), allow_nan=False))
+    promised = (
+        "cones curvature_error curvature_error_max qc_mean qc_p95 qc_max area_std flipped degenerate charts "
+        "seam_length seam_mismatch seconds"
+    )
+    assert set(promised.split()) <= set(report)
+    assert report["cones"] == len(result.cones)
+    assert {"check", "cones", "metric", "cut", "layout", "measure"} <= set(report["seconds"])
+
+
+def test_progress_names_the_stages():
+    seen = []
+    flatten(*SHAPES["two components"], progress=lambda stage, fraction: seen.append((stage, fraction)))
+    stages, fractions = zip(*seen, strict=True)
+    assert stages[0] == "check"
+    assert stages[-1] == "measure"
+    assert list(fractions) == sorted(fractions)
+
+
+def test_sample_has_limbs_and_a_handle():
+    model = read_mesh(sample_path())
+    result = flatten(model)
+    mesh = coneflat.TriangleMesh(result.vertices, result.faces)
+    assert mesh.genus() == 1
+    assert 5_000 <= len(result.faces) <= 20_000
+    assert sample_path().stat().st_size < 1_000_000
+    assert result.distortion.flipped == result.distortion.degenerate == 0
