@@ -19,7 +19,9 @@ from coneflat.cli.cones import parse_cones, parse_curvature
 
 def run(*arguments, cwd, **options):
     command = [sys.executable, "-m", "coneflat", *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, check=False, **options)
+    return subprocess.run(
+        command, cwd=cwd, capture_output=True, text=True, timeout=120, check=False, **options
+    )
 
 
 def write_obj(path, vertices, faces):
@@ -162,7 +164,9 @@ def test_interrupt_leaves_nothing_half_written(tmp_path):
     write_obj(tmp_path / "big.obj", *shapes.sphere(6))
     command = [sys.executable, "-m", "coneflat", "flatten", "big.obj", "-o", "out.obj"]
     for delay in (0.4, 0.9, 1.5):
-        process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
         time.sleep(delay)
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=60)
