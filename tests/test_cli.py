@@ -14,7 +14,7 @@ import pytest
 import shapes
 
 from coneflat import errors, read_mesh
-from coneflat.cli.cones import parse_cones, parse_curvature
+from coneflat.cli.given import parse_curvature, parse_vertices
 
 
 def run(*arguments, cwd, **options):
@@ -145,7 +145,7 @@ def test_what_is_no_curvature(text):
 
 def test_cones_named_twice():
     with pytest.raises(errors.OptionError, match="vertex 4 is given as a cone twice"):
-        parse_cones(["4", "4:pi"], None)
+        parse_vertices("cone", ["4", "4:pi"])
 
 
 def test_nonmanifold_is_refused_and_repaired(tmp_path):

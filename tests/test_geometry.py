@@ -75,7 +75,7 @@ def test_mollify_opens_collapsed_triangles_only_when_there_are_any():
     lengths = edge_lengths(vertices, faces)
     opened, note = mollify(lengths)
     assert (double_areas(opened) > 0).all()
-    assert abs(opened - lengths).max() < 1e-7
+    assert 0 < abs(opened - lengths).max() < 2e-5
     assert "1 triangle" in note
     with pytest.raises(errors.DegenerateFaceError, match="1 triangle without area: 0"):
         mollify(lengths, strict=True)

@@ -52,6 +52,7 @@ def flattening(vertices, faces, uv, uv_faces, source=None, face_corners=None, or
         cones=np.array([1]),
         curvatures=np.array([np.pi / 2]),
         log_scale=np.linspace(0, 1, len(vertices)),
+        curvature_residual=np.zeros(len(vertices)),
         seams=np.array([[1, 4]]),
         vertex_origin=np.arange(len(vertices)) if origin is None else np.asarray(origin),
         face_corners=face_corners,
@@ -268,7 +269,17 @@ class TestSplitFormats:
     def test_npz_holds_every_array(self, bar, tmp_path):
         result = cut_bar(bar)
         out = write_flattening(result, tmp_path / "out.npz")
-        names = ["vertices", "faces", "uv", "uv_faces", "cones", "curvatures", "log_scale", "seams"]
+        names = [
+            "vertices",
+            "faces",
+            "uv",
+            "uv_faces",
+            "cones",
+            "curvatures",
+            "log_scale",
+            "curvature_residual",
+            "seams",
+        ]
         names += ["vertex_origin", "uv_scale"]
         with np.load(out, allow_pickle=False) as arrays:
             assert set(arrays.files) == {*names, "report"}

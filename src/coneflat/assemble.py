@@ -9,6 +9,7 @@ import numpy as np
 
 from ._arrays import IntArray
 from .distortion import curvature_errors, measure
+from .figures import SolveFigures
 from .inputs import InputMesh
 from .layout import arrange
 from .mesh import TriangleMesh
@@ -49,17 +50,17 @@ def assemble(
 
     log_scale, target, curvature = (np.empty(len(mesh.vertices)) for _ in range(3))
     for (_, vertices, _), piece in zip(parts, pieces, strict=True):
-        log_scale[vertices] = piece.solution.log_scale
-        target[vertices] = piece.solution.target
+        log_scale[vertices] = piece.log_scale
+        target[vertices] = piece.target
         curvature[vertices] = piece.curvature
-    cones = np.concatenate([v[p.solution.cones] for (_, v, _), p in zip(parts, pieces, strict=True)])
+    cones = np.concatenate([v[p.cones] for (_, v, _), p in zip(parts, pieces, strict=True)])
     with stages("measure"):
-        distortion = measure(mesh, uv[uv_faces], curvature_errors(target, curvature))
+        distortion = measure(mesh, uv[uv_faces], curvature_errors(target, curvature), cones)
 
     points = np.asarray(given.vertices, dtype=np.float64)
     number, vertex_origin = result_numbering(checked, len(points))
-    every_log_scale = np.full(len(vertex_origin), np.nan)
-    every_log_scale[number] = log_scale
+    every_log_scale, every_residual = np.full((2, len(vertex_origin)), np.nan)
+    every_log_scale[number], every_residual[number] = log_scale, target - curvature
     seams = [vertices[piece.seams] for (_, vertices, _), piece in zip(parts, pieces, strict=True)]
     return Flattening(
         vertices=points[vertex_origin],
@@ -70,12 +71,13 @@ def assemble(
         cones=number[cones],
         curvatures=target[cones],
         log_scale=every_log_scale,
+        curvature_residual=every_residual,
         seams=number[np.concatenate(seams)],
         distortion=distortion,
         seconds=dict(stages.seconds),
         notes=checked.notes + tuple(piece.note for piece in pieces if piece.note),
         settings=options.as_dict(),
-        broken=sum(piece.broken for piece in pieces),
+        solve=SolveFigures.of_all(piece.figures for piece in pieces),
         vertex_origin=vertex_origin,
         face_origin=checked.face_origin,
         face_corners=None if given.face_corners is None else turn_corners(checked, given.face_corners),

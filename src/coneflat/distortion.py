@@ -33,6 +33,9 @@ class Distortion:
         seam_length: length on the model of all seams, each once, over the square root of the area.
         seam_mismatch: relative difference of a seam edge's two UV lengths: mean, weighted by length.
         seam_mismatch_max: the same, the largest.
+        seam_motion_mismatch: how far the two sides of a seam are from one rigid motion of each other: the largest
+            change of the rotation between them from one seam edge to the next, radians; where seams branch
+            or end, and at cones, there is none to compare.
         curvature_error: ||target - K||_2 / n of the metric, in units of pi (Table 1 of the paper).
         curvature_error_max: largest |target - K|, in units of pi.
     """
@@ -51,6 +54,7 @@ class Distortion:
     seam_length: float
     seam_mismatch: float
     seam_mismatch_max: float
+    seam_motion_mismatch: float
     curvature_error: float = float("nan")
     curvature_error_max: float = float("nan")
 
@@ -62,13 +66,17 @@ def curvature_errors(target: FloatArray, curvature: FloatArray) -> tuple[float, 
 
 
 def measure(
-    mesh: TriangleMesh, corner_uv: FloatArray, curvature_error: tuple[float, float] = (np.nan, np.nan)
+    mesh: TriangleMesh,
+    corner_uv: FloatArray,
+    curvature_error: tuple[float, float] = (np.nan, np.nan),
+    cones: IntArray | None = None,
 ) -> Distortion:
     """Measure a UV map.
 
     Args:
         mesh: the mesh.
         corner_uv: (m, 3, 2) the UV point of every triangle corner.
+        cones: (s,) vertices at which the rotation between the sides of a seam changes.
         curvature_error: what `curvature_errors` returns for the metric.
     """
     area, longest = _model_areas(mesh)
@@ -104,6 +112,7 @@ def measure(
         seam_length=float(seam_lengths.sum() / np.sqrt(area.sum() / 2)) if area.sum() > 0 else 0.0,
         seam_mismatch=_mean(mismatches, seam_lengths) if len(seams) else 0.0,
         seam_mismatch_max=float(mismatches.max()) if len(seams) else 0.0,
+        seam_motion_mismatch=_seam_motion_mismatch(mesh, corner_uv, seams, cones),
         curvature_error=curvature_error[0],
         curvature_error_max=curvature_error[1],
     )
@@ -178,6 +187,38 @@ def _seam_mismatch(
     here, there = (_side_lengths(ends) for ends in _sides(mesh, corner_uv, seams))
     ends = mesh.vertices[mesh.edges[seams]]
     return _side_lengths(ends), np.abs(here - there) / np.maximum((here + there) / 2, np.finfo(float).tiny)
+
+
+def _seam_motion_mismatch(
+    mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray, cones: IntArray | None
+) -> float:
+    """Return the largest change, radians, of the rotation between a seam's sides along it."""
+    here, there = _sides(mesh, corner_uv, seams)
+    one = (here[:, 1] - here[:, 0]) @ np.array([1, 1j])
+    two = (there[:, 1] - there[:, 0]) @ np.array([1, 1j])
+    # `here` is the side of the first half-edge, which may be either side of the seam: each edge tells the
+    # rotation as seen by a walker along it, from the left side to the right.
+    rotation = one * np.conj(two)
+    rotation = rotation / np.maximum(np.abs(rotation), np.finfo(float).tiny)
+    starts = mesh.tails[mesh.edge_halfedges[seams, 0]]
+    ends = mesh.heads[mesh.edge_halfedges[seams, 0]]
+    degree = np.bincount(np.concatenate([starts, ends]), minlength=len(mesh.vertices))
+    passed = (degree == 2) & ~mesh.is_boundary_vertex
+    if cones is not None:
+        passed[cones] = False
+    # The two seam edges at each vertex that a seam passes, and whether each of them leaves it.
+    at = np.concatenate([starts, ends])
+    leaves = np.repeat([True, False], len(seams))
+    edge = np.tile(np.arange(len(seams)), 2)
+    order = np.argsort(at, kind="stable")
+    order = order[passed[at[order]]].reshape(-1, 2)
+    if not len(order):
+        return 0.0
+    first, second = rotation[edge[order[:, 0]]], rotation[edge[order[:, 1]]]
+    # Edges that both leave, or both arrive, are walked in opposite directions, with left and right exchanged.
+    opposed = leaves[order[:, 0]] == leaves[order[:, 1]]
+    change = np.where(opposed, first * second, first * np.conj(second))
+    return float(np.abs(np.angle(change)).max())
 
 
 def _mean(values: FloatArray, weights: FloatArray) -> float:

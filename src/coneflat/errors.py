@@ -54,6 +54,10 @@ class MetricError(ConeflatError, ArithmeticError):
     """No usable flat metric or layout was found."""
 
 
+class ConvergenceError(MetricError):
+    """The solve ended short of its tolerance."""
+
+
 class MeshFileError(ConeflatError, OSError):
     """A file cannot be read or written, or is not what its name says."""
 

@@ -12,11 +12,13 @@ import numpy as np
 from .errors import OptionError
 
 CONES = ("greedy", "none")
-METRICS = ("linear",)
+METRICS = ("exact", "linear")
 LENGTH_RULES = ("integral", "mean")
-LAYOUTS = ("least-squares",)
+AT_CONES = ("auto", "scale", "curvature")
+BOUNDARIES = ("free", "lengths", "disk")
 
 Cones = str | Mapping[int, float] | Iterable[int]
+Boundary = str | Mapping[int, float] | Iterable[int]
 
 #: The published method: `flatten(mesh, **PAPER)`.
 PAPER: Mapping[str, Any] = {
@@ -25,7 +27,6 @@ PAPER: Mapping[str, Any] = {
     "max_cones": None,
     "metric": "linear",
     "length_rule": "integral",
-    "layout": "least-squares",
 }
 
 
@@ -40,21 +41,40 @@ class Options:
     cones: Cones = "greedy"
     epsilon: float = 1.0
     max_cones: int | None = None
-    metric: str = "linear"
+    metric: str = "exact"
     length_rule: str = "integral"
-    layout: str = "least-squares"
+    at_cones: str = "auto"
+    boundary: Boundary = "free"
+    best_effort: bool = False
     repair: bool = False
     strict: bool = False
-    given: Mapping[int, float | None] = field(init=False, default_factory=dict)
+    given_cones: Mapping[int, float | None] = field(init=False, default_factory=dict)
+    corners: Mapping[int, float | None] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         if isinstance(self.cones, str):
             _choice("cones", self.cones, CONES)
         else:
-            object.__setattr__(self, "given", _given_cones(self.cones))
+            object.__setattr__(self, "given_cones", _given_vertices("cone", self.cones))
+        if isinstance(self.boundary, str):
+            _choice("boundary", self.boundary, BOUNDARIES)
+        else:
+            object.__setattr__(self, "corners", _given_vertices("corner", self.boundary))
+            if not self.corners:
+                raise OptionError("boundary names no corners; for a round boundary, say 'disk'")
+        _choice("at_cones", self.at_cones, AT_CONES)
+        if self.metric == "linear" and (self.boundary_kind != "free" or self.at_cones != "auto"):
+            raise OptionError(
+                "the linear metric has a free boundary and no choice at cones: use metric 'exact'"
+            )
+        if self.at_cones == "scale" and any(k is not None for k in self.given_cones.values()):
+            raise OptionError("with the scale fixed at cones their curvatures come out: give positions only")
+        if self.at_cones == "scale" and self.boundary_kind not in ("free", "lengths"):
+            raise OptionError(
+                "a prescribed boundary needs prescribed curvatures at cones: at_cones 'curvature'"
+            )
         _choice("metric", self.metric, METRICS)
         _choice("length_rule", self.length_rule, LENGTH_RULES)
-        _choice("layout", self.layout, LAYOUTS)
         epsilon = _number("epsilon", self.epsilon)
         if not 0 < epsilon < math.inf:
             raise OptionError(f"epsilon must be a positive number, not {epsilon:g}")
@@ -70,11 +90,26 @@ class Options:
         """The way cones are found: "greedy", "none" or "given"."""
         return self.cones if isinstance(self.cones, str) else "given"
 
+    @property
+    def boundary_kind(self) -> str:
+        """What the boundary becomes: "free", "lengths", "disk" or "polygon"."""
+        return self.boundary if isinstance(self.boundary, str) else "polygon"
+
+    @property
+    def scale_at_cones(self) -> bool:
+        """Whether phi = 0 is prescribed at cones, not curvature."""
+        if self.at_cones == "auto":
+            has_curvatures = any(k is not None for k in self.given_cones.values())
+            return not has_curvatures and self.boundary_kind in ("free", "lengths")
+        return self.at_cones == "scale"
+
     def as_dict(self) -> dict[str, Any]:
-        """Return the options as plain values, given cones as a map from vertex to curvature or None."""
+        """Return the options as plain values, given cones and corners as a map to curvature or None."""
         values = asdict(self)
-        given = values.pop("given")
-        return {**values, "cones": self.cones if isinstance(self.cones, str) else given}
+        for name, given in (("cones", values.pop("given_cones")), ("boundary", values.pop("corners"))):
+            if not isinstance(values[name], str):
+                values[name] = given
+        return values
 
 
 def _choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
@@ -96,32 +131,26 @@ def _whole(name: str, value: object) -> int:
     return int(number)
 
 
-def _given_cones(cones: Mapping[int, float] | Iterable[int]) -> dict[int, float | None]:
-    """Return vertex -> curvature, None where it is to be computed: for all cones or for none."""
-    if isinstance(cones, Mapping):
+def _given_vertices(noun: str, vertices: Mapping[int, float] | Iterable[int]) -> dict[int, float | None]:
+    """Return vertex -> curvature, None where it is to be computed: for all or for none."""
+    if isinstance(vertices, Mapping):
         given: dict[int, float | None] = {
-            _whole("a cone's vertex", v): None if k is None else _number("a cone's curvature", k)
-            for v, k in cones.items()
+            _whole(f"a {noun}'s vertex", v): None if k is None else _number(f"a {noun}'s curvature", k)
+            for v, k in vertices.items()
         }
     else:
-        try:
-            listed = [_whole("a cone's vertex", v) for v in np.asarray(cones).ravel().tolist()]
-        except TypeError as error:
-            raise OptionError(
-                f"cones must be a method's name, a list of vertices or a map from vertex to curvature, "
-                f"not {type(cones).__name__}"
-            ) from error
+        listed = [_whole(f"a {noun}'s vertex", v) for v in np.asarray(vertices).ravel().tolist()]
         given = dict.fromkeys(listed)
         if len(given) < len(listed):
             twice = next(v for v in listed if listed.count(v) > 1)
-            raise OptionError(f"vertex {twice} is given as a cone twice")
+            raise OptionError(f"vertex {twice} is given as a {noun} twice")
     unknown = [v for v, k in given.items() if k is None]
     if unknown and len(unknown) < len(given):
         raise OptionError(
-            f"{len(given) - len(unknown)} of {len(given)} cones have a curvature and vertex {unknown[0]} has "
-            "none: give curvatures to all cones, or to none"
+            f"{len(given) - len(unknown)} of {len(given)} {noun}s have a curvature and vertex {unknown[0]} has "
+            "none: give curvatures to all, or to none"
         )
     for v, k in given.items():
         if k is not None and not math.isfinite(k):
-            raise OptionError(f"the curvature of cone {v} is {k}")
+            raise OptionError(f"the curvature of {noun} {v} is {k}")
     return given

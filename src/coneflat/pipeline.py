@@ -11,23 +11,22 @@ from scipy.sparse import csc_matrix
 
 from ._arrays import BoolArray, FloatArray, IntArray
 from .assemble import assemble
-from .cones import ConeSolution, check_feasible, cones_at, cones_with_curvature, greedy_cones
-from .conformal.linear import scaled_lengths
+from .cones import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
+from .conformal.boundary import prescribed_boundary
+from .figures import SolveFigures
 from .geometry import (
     angle_defect,
     corner_angles,
     cotangent_laplacian,
     cotangents,
-    double_areas,
     edge_lengths,
-    is_broken,
     mollify,
 )
 from .inputs import as_input
-from .layout import least_squares_layout
 from .mesh import TriangleMesh
-from .numbering import locate_cones, turn_corners
-from .options import Cones, Options
+from .metrics import ExactChoices, FlatMetric, linear_metric, solve_exact
+from .numbering import locate, select, turn_corners
+from .options import Boundary, Cones, Options
 from .result import Flattening
 from .seams import cut_open, find_seams
 from .stages import Progress, Stages
@@ -41,9 +40,11 @@ def flatten(
     cones: Cones = "greedy",
     epsilon: float = 1.0,
     max_cones: int | None = None,
-    metric: str = "linear",
+    metric: str = "exact",
     length_rule: str = "integral",
-    layout: str = "least-squares",
+    at_cones: str = "auto",
+    boundary: Boundary = "free",
+    best_effort: bool = False,
     repair: bool = False,
     strict: bool = False,
     progress: Progress | None = None,
@@ -59,9 +60,17 @@ def flatten(
             taken as it is. Vertices are those of the input.
         epsilon: the greedy search stops when log scale factors differ by at most this.
         max_cones: the greedy search stops at this many cones per component; None for no limit.
-        metric: "linear", the paper's.
-        length_rule: "integral" scales an edge by the mean of exp(phi) along it, "mean" by exp of the mean.
-        layout: "least-squares", the reconstruction of ABF++.
+        metric: "exact" has no curvature error and no flipped triangle, "linear" is the paper's.
+        length_rule: of the linear metric: "integral" scales an edge by the mean of exp(phi) along it, "mean"
+            by exp of the mean.
+        at_cones: of the exact metric: "scale" prescribes phi = 0 at the cones and their curvatures come out,
+            "curvature" prescribes those of the search; "auto" is "curvature" where curvatures are given or
+            the boundary is prescribed, else "scale".
+        boundary: of the exact metric: "free" has the least area distortion (phi = 0 there), "lengths" is the
+            same at the model's own scale, so that boundary lengths are kept, "disk" makes it round; vertices
+            make it a polygon with these corners and straight sides between, all of one angle, and a map
+            from vertex to curvature in radians one with these.
+        best_effort: return a metric that did not converge to its tolerance, instead of refusing it.
         repair: drop, split and cut what makes the input no manifold, instead of refusing it.
         strict: refuse triangles without area, instead of opening them by a tiny perturbation.
         progress: called with the name of each stage and the fraction of triangles done.
@@ -72,25 +81,50 @@ def flatten(
         OptionError: an option makes no sense.
         MetricError: the computation found no finite result.
     """
-    options = Options(cones, epsilon, max_cones, metric, length_rule, layout, repair, strict)
+    options = Options(
+        cones, epsilon, max_cones, metric, length_rule, at_cones, boundary, best_effort, repair, strict
+    )
     stages = Stages(progress)
     with stages("check"):
         given = as_input(mesh, faces)
         checked = check_mesh(given.vertices, given.faces, repair=repair)
         is_diagonal = turn_corners(checked, ~given.is_side())
-        given_cones = locate_cones(checked, options.given)
+        given_cones = locate(checked, "cone", options.given_cones)
+        corners = locate(checked, "corner", options.corners)
         parts = checked.mesh.split_components()
     pieces = []
     done = 0
     for part, vertices, part_faces in parts:
         stages.fraction = done / len(checked.mesh.faces)
-        own = np.isin(given_cones[0], vertices)
-        own_cones = np.searchsorted(vertices, given_cones[0][own]), given_cones[1][own]
-        names = checked.vertex_origin[vertices]
-        pieces.append(flatten_component(part, options, stages, own_cones, is_diagonal[part_faces], names))
+        given_here = Given(
+            *select(given_cones, vertices),
+            *select(corners, vertices),
+            is_diagonal[part_faces],
+            checked.vertex_origin[vertices],
+        )
+        pieces.append(flatten_component(part, given_here, options, stages))
         done += len(part_faces)
     stages.fraction = 1.0
     return assemble(given, checked, parts, pieces, options, stages)
+
+
+@dataclass(frozen=True)
+class Given:
+    """What the input says about a component.
+
+    Attributes:
+        cones, cone_curvatures: (s,) vertices and radians; NaN where the curvature is to be computed.
+        corners, corner_curvatures: (c,) the same of corners of the boundary.
+        is_diagonal: (m, 3) sides inside a polygon of the input, which should not be cut.
+        names: (n,) what the user calls each vertex.
+    """
+
+    cones: IntArray
+    cone_curvatures: FloatArray
+    corners: IntArray
+    corner_curvatures: FloatArray
+    is_diagonal: BoolArray
+    names: IntArray
 
 
 @dataclass(frozen=True)
@@ -100,96 +134,94 @@ class Piece:
     Attributes:
         points: (c, 2) layout at the model's own scale.
         corners: (m, 3) index into `points` of every triangle corner.
-        solution: cones, target curvatures and log scale.
-        curvature: (n,) curvature of the metric that was laid out, radians.
+        cones: (s,) vertices.
+        log_scale, target, curvature: (n,) of the metric that was laid out.
         seams: (k, 2) vertex pairs.
-        broken: triangles of the metric that break the triangle inequality.
+        figures: how the metric and the layout were found.
         note: what was done to triangles without area, if anything.
     """
 
     points: FloatArray
     corners: IntArray
-    solution: ConeSolution
+    cones: IntArray
+    log_scale: FloatArray
+    target: FloatArray
     curvature: FloatArray
     seams: IntArray
-    broken: int
+    figures: SolveFigures
     note: str | None
 
 
-def flatten_component(
-    mesh: TriangleMesh,
-    options: Options,
-    stages: Stages,
-    given_cones: tuple[IntArray, FloatArray],
-    is_diagonal: BoolArray,
-    names: IntArray,
-) -> Piece:
-    """Flatten a connected mesh to one disk.
-
-    Args:
-        mesh: connected and checked.
-        options, stages: as in `flatten`.
-        given_cones: vertices and their curvatures, NaN where these are to be computed.
-        is_diagonal: (m, 3) sides inside a polygon of the input, which should not be cut.
-        names: (n,) what the user calls each vertex.
-    """
+def flatten_component(mesh: TriangleMesh, given: Given, options: Options, stages: Stages) -> Piece:
+    """Flatten a connected mesh to one disk."""
     with stages("cones"):
         lengths, note = mollify(edge_lengths(mesh.vertices, mesh.faces), strict=options.strict)
-        curvature = _curvature(mesh, lengths)
+        curvature = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
         laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths), len(mesh.vertices))
-        solution = find_cones(mesh, laplacian, curvature, options, given_cones)
-        check_feasible(solution.cones, solution.curvatures, names, "add cones or move them")
+        solution = find_cones(mesh, laplacian, curvature, given, options)
 
     with stages("metric"):
-        scaled = scaled_lengths(lengths, mesh.faces, solution.log_scale, options.length_rule)
-        shrink = np.sqrt(double_areas(lengths).sum() / double_areas(scaled).sum())
-        scaled *= shrink
-        solution = solution.shifted(float(np.log(shrink)))
+        metric = find_metric(mesh, lengths, solution, given, options)
 
     with stages("cut"):
         edge_costs = lengths.ravel()[mesh.edge_halfedges[:, 0]]
         avoided = np.zeros(len(mesh.edges), dtype=bool)
-        avoided[mesh.halfedge_edges[is_diagonal.ravel()]] = True
+        avoided[mesh.halfedge_edges[given.is_diagonal.ravel()]] = True
         seams = find_seams(mesh, solution.cones, edge_costs, avoided)
         disk = cut_open(mesh, seams).mesh
 
     with stages("layout"):
-        points = least_squares_layout(disk, scaled)
-        points *= np.sqrt(double_areas(lengths).sum() / np.abs(_signed_areas(points, disk.faces)).sum())
+        points, figures = metric.lay_out(disk, seams)
 
     return Piece(
         points,
         disk.faces,
-        solution,
-        _curvature(mesh, scaled),
+        solution.cones,
+        metric.log_scale,
+        metric.target,
+        metric.curvature,
         mesh.edges[seams],
-        int(is_broken(scaled).sum()),
+        figures,
         note,
     )
 
 
 def find_cones(
-    mesh: TriangleMesh,
-    laplacian: csc_matrix,
-    curvature: FloatArray,
-    options: Options,
-    given: tuple[IntArray, FloatArray],
+    mesh: TriangleMesh, laplacian: csc_matrix, curvature: FloatArray, given: Given, options: Options
 ) -> ConeSolution:
-    """Return cones with their curvatures and log scale by the method that the options name."""
+    """Return cones with their curvatures and linear log scale by the method that the options name."""
     surface = laplacian, curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     if options.method == "greedy":
-        return greedy_cones(*surface, epsilon=options.epsilon, max_cones=options.max_cones)
-    cones, curvatures = given
-    if len(cones) and np.isfinite(curvatures).all():
-        return cones_with_curvature(*surface, cones, curvatures)
-    return cones_at(*surface, cones)
+        solution = greedy_cones(*surface, epsilon=options.epsilon, max_cones=options.max_cones)
+    elif len(given.cones) and np.isfinite(given.cone_curvatures).all():
+        solution = cones_with_curvature(*surface, given.cones, given.cone_curvatures)
+    else:
+        solution = cones_at(*surface, given.cones)
+    if options.scale_at_cones and options.metric == "exact":
+        check_enough(len(solution.cones), mesh)
+    else:
+        check_feasible(solution.cones, solution.curvatures, given.names, "add cones or move them")
+    return solution
 
 
-def _curvature(mesh: TriangleMesh, lengths: FloatArray) -> FloatArray:
-    return angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
-
-
-def _signed_areas(points: FloatArray, faces: IntArray) -> FloatArray:
-    one, two = points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]]
-    areas: FloatArray = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-    return areas
+def find_metric(
+    mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, given: Given, options: Options
+) -> FlatMetric:
+    """Return the flat metric that the options name."""
+    if options.metric == "linear":
+        return linear_metric(mesh, lengths, solution, options.length_rule)
+    is_prescribed = options.boundary_kind == "disk" or len(given.corners) > 0
+    boundary = None
+    if is_prescribed and mesh.is_boundary_vertex.any():
+        total = float(solution.curvatures.sum())
+        boundary = prescribed_boundary(
+            mesh, lengths, total, given.corners, given.corner_curvatures, given.names
+        )
+    choices = ExactChoices(
+        scale_at_cones=options.scale_at_cones,
+        boundary=boundary,
+        keep_area=options.boundary_kind != "lengths",
+        best_effort=options.best_effort,
+        names=given.names,
+    )
+    return solve_exact(mesh, lengths, solution, choices)

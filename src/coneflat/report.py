@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,7 @@ MEASURES = (
     "seam_length",
     "seam_mismatch",
     "seam_mismatch_max",
+    "seam_motion_mismatch",
 )
 
 
@@ -36,7 +38,7 @@ def as_dict(result: Flattening) -> dict[str, Any]:
         "triangles": len(result.faces),
         "cones": len(result.cones),
         **{name: getattr(result.distortion, name) for name in MEASURES},
-        "broken": result.broken,
+        **asdict(result.solve),
         "uv_scale": result.uv_scale,
         "cone_vertices": result.cones.tolist(),
         "cone_curvatures": result.curvatures.tolist(),
@@ -61,9 +63,16 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
     """Return (measure, value, meaning) rows of the table that the commands print."""
     d = result.distortion
     curvatures = result.curvatures / np.pi
+    solve = result.solve
     cones = f"{len(result.cones)}"
     if len(result.cones):
         cones += f"  ({curvatures.min():+.3f} to {curvatures.max():+.3f} pi)"
+    untangled = ""
+    if solve.untangled_triangles:
+        untangled = (
+            f"triangles upside down; {solve.untangled_triangles:,} were, until {solve.untangled_vertices:,} vertices "
+            f"moved by at most {solve.untangled_move:.2g} edges"
+        )
     return [
         ("triangles", f"{len(result.faces):,}", f"{len(result.vertices):,} vertices"),
         ("cones", cones, "singular vertices, and their curvatures"),
@@ -78,7 +87,7 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
             f"1 is conformal; 95% below {d.qc_p95:.4f}, worst {d.qc_max:.4g}",
         ),
         ("area distortion", f"{d.area_std:.4f}", "standard deviation of the log of the scale"),
-        ("flipped", f"{d.flipped:,}", "triangles upside down"),
+        ("flipped", f"{d.flipped:,}", untangled or "triangles upside down"),
         (
             "degenerate",
             f"{d.degenerate:,}",

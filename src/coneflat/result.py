@@ -10,6 +10,7 @@ from typing import Any
 
 from ._arrays import FloatArray, IntArray
 from .distortion import Distortion
+from .figures import SolveFigures
 from .io.model import MeshFile
 
 
@@ -27,12 +28,13 @@ class Flattening:
         curvatures: (s,) their target curvatures, radians.
         log_scale: (n,) log conformal factor phi, so that flat lengths are about l * exp(phi) in model
             units; NaN at vertices without a face.
+        curvature_residual: (n,) target minus curvature of the flat metric, radians; NaN likewise.
         seams: (k, 2) vertex pairs of the mesh edges that were cut.
         distortion: the measures of Section 5 of the paper and their like.
         seconds: wall time of each stage.
         notes: what was done to the input, one sentence each.
         settings: the options it was made with.
-        broken: triangles of the metric that break the triangle inequality.
+        solve: how the metric and the layout were found: Newton steps, flips, untangled triangles.
         vertex_origin: (n,) the input vertex that each vertex came from.
         face_origin: (m,) the input face that each face came from.
         face_corners: (m, 3) for a mesh read from a file: the polygon corner of `source` at each
@@ -48,12 +50,13 @@ class Flattening:
     cones: IntArray
     curvatures: FloatArray
     log_scale: FloatArray
+    curvature_residual: FloatArray
     seams: IntArray
     distortion: Distortion
     seconds: Mapping[str, float]
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
-    broken: int = 0
+    solve: SolveFigures = field(default_factory=SolveFigures)
     vertex_origin: IntArray | None = None
     face_origin: IntArray | None = None
     face_corners: IntArray | None = None

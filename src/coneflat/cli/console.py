@@ -55,7 +55,8 @@ class Console:
         if self._bar:
             self._bar.update(self._task, description=stage, completed=fraction)
         elif not self.quiet and elapsed > PATIENCE:
-            click.echo(f"{elapsed:6.1f} s  {stage}  ({fraction:.0%} of triangles done)", err=True)
+            done = f"  ({fraction:.0%} of triangles done)" if 0 < fraction < 1 else ""
+            click.echo(f"{elapsed:6.1f} s  {stage}{done}", err=True)
 
     def finish(self, result: Flattening, written: Sequence[Path]) -> None:
         """Print notes, measures, where the time went, and what was written."""
@@ -85,6 +86,6 @@ class Console:
         if bad:
             out.print(
                 f"warning: {bad} of {len(result.faces):,} triangles are flipped or collapsed in the plane; "
-                f"{result.broken} break the triangle inequality in this metric",
+                f"{result.solve.broken} break the triangle inequality in this metric",
                 style="yellow",
             )

@@ -8,7 +8,9 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-METHOD_OPTIONS = ("cones", "cone", "cones_file", "epsilon", "max_cones", "metric", "lengths")
+SEARCH_OPTIONS = ("cones", "epsilon", "max_cones")
+EXACT_OPTIONS = ("at_cones", "boundary", "corner", "best_effort")
+METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "metric", "lengths", *EXACT_OPTIONS)
 
 
 @click.command(short_help="Flatten a mesh and write it with UV coordinates.")
@@ -47,13 +49,40 @@ METHOD_OPTIONS = ("cones", "cone", "cones_file", "epsilon", "max_cones", "metric
     help="The greedy search stops when the log scale varies by at most this.",
 )
 @click.option("--max-cones", type=int, help="The greedy search stops at this many cones.")
-@click.option("--metric", type=click.Choice(["linear"]), default="linear", show_default=True)
+@click.option(
+    "--metric",
+    type=click.Choice(["exact", "linear"]),
+    default="exact",
+    show_default=True,
+    help="exact: no curvature error, no flipped triangle.  linear: the paper's.",
+)
+@click.option(
+    "--at-cones",
+    type=click.Choice(["auto", "scale", "curvature"]),
+    default="auto",
+    show_default=True,
+    help="Exact metric: prescribe scale 1 at cones, or the curvatures that the search found.",
+)
+@click.option(
+    "--boundary",
+    type=click.Choice(["free", "lengths", "disk"]),
+    default="free",
+    show_default=True,
+    help="Exact metric: free (least area distortion), lengths (kept at the model's scale), or a round disk.",
+)
+@click.option(
+    "--corner",
+    metavar="VERTEX[:CURVATURE]",
+    multiple=True,
+    help="Exact metric: a polygon with this boundary vertex as a corner; repeat: four make a rectangle.",
+)
+@click.option("--best-effort", is_flag=True, help="Write a result even if the metric did not converge.")
 @click.option(
     "--lengths",
     type=click.Choice(["integral", "mean"]),
     default="integral",
     show_default=True,
-    help="Scale an edge by the mean of the scale along it, or by the scale at the mean.",
+    help="Linear metric: scale an edge by the mean of the scale along it, or by the scale at the mean.",
 )
 @click.option("--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces.")
 @click.option("--strict", is_flag=True, help="Refuse triangles without area instead of opening them.")
@@ -76,6 +105,10 @@ def flatten(
     epsilon: float,
     max_cones: int | None,
     metric: str,
+    at_cones: str,
+    boundary: str,
+    corner: tuple[str, ...],
+    best_effort: bool,
     lengths: str,
     repair: bool,
     strict: bool,
@@ -90,12 +123,14 @@ def flatten(
       coneflat flatten horse.ply -o horse.obj
       coneflat flatten hand.obj -o hand.glb --max-cones 20 --report hand.json
       coneflat flatten part.stl --cone 12 --cone 507 --cone 1044
+      coneflat flatten face.obj -o face.obj --corner 10 --corner 95 --corner 230 --corner 310
     """
-    from .cones import parse_cones
+    from .given import parse_vertices
     from .run import run
 
-    _check_combinations(context, paper, bool(cone or cones_file))
-    given = parse_cones(cone, cones_file)
+    _check_combinations(context, paper, metric, bool(cone or cones_file))
+    given = parse_vertices("cone", cone, cones_file)
+    corners = parse_vertices("corner", corner)
     options: dict[str, Any]
     if paper:
         from ..options import PAPER
@@ -108,19 +143,23 @@ def flatten(
             "max_cones": max_cones,
             "metric": metric,
             "length_rule": lengths,
+            "at_cones": at_cones,
+            "boundary": corners or boundary,
+            "best_effort": best_effort,
         }
     run(mesh, output, {**options, "repair": repair, "strict": strict}, weld=weld, report=report, quiet=quiet)
 
 
-def _check_combinations(context: click.Context, paper: bool, has_given: bool) -> None:
-    def was_given(name: str) -> bool:
-        return context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-
-    if paper:
-        for name in filter(was_given, METHOD_OPTIONS):
-            raise click.UsageError(f"--paper fixes the method: leave out --{name.replace('_', '-')}", context)
-    if has_given:
-        for name in filter(was_given, ("cones", "epsilon", "max_cones")):
-            raise click.UsageError(
-                f"with cones given there is nothing to search: leave out --{name.replace('_', '-')}", context
-            )
+def _check_combinations(context: click.Context, paper: bool, metric: str, has_given: bool) -> None:
+    rules = [
+        (paper, METHOD_OPTIONS, "--paper fixes the method"),
+        (has_given, SEARCH_OPTIONS, "with cones given there is nothing to search"),
+        (metric == "linear", EXACT_OPTIONS, "--metric linear has no such choice"),
+        (metric == "exact", ("lengths",), "only --metric linear has this choice"),
+    ]
+    for applies, names, reason in rules:
+        for name in names if applies else ():
+            if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+                raise click.UsageError(f"{reason}: leave out --{name.replace('_', '-')}", context)
+    if context.params["corner"] and context.params["boundary"] != "free":
+        raise click.UsageError("--corner makes a polygon: leave out --boundary", context)

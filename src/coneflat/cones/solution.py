@@ -9,6 +9,7 @@ from scipy.sparse import csc_matrix
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import CurvatureError
+from ..mesh import TriangleMesh
 from ..solver import Factor, factorize
 from ..text import plural
 
@@ -87,4 +88,14 @@ def check_feasible(cones: IntArray, curvatures: FloatArray, names: IntArray | No
         raise CurvatureError(
             f"{plural(len(bad), 'cone')} with a curvature of 2 pi or more, which no metric has: "
             f"vertex {name} has {curvatures[worst] / np.pi:.4f} pi; {advice}"
+        )
+
+
+def check_enough(count: int, mesh: TriangleMesh) -> None:
+    """Raise CurvatureError if so many cones, of less than 2 pi each, cannot carry the curvature of a closed mesh."""
+    total = 2 * mesh.euler_characteristic
+    if not mesh.is_boundary_vertex.any() and total >= 2 * max(count, 1):
+        raise CurvatureError(
+            f"{plural(count, 'cone')} cannot carry this closed surface's total curvature of {total} pi, as each has "
+            f"less than 2 pi: {total // 2 + 1} or more are needed"
         )

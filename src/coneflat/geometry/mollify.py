@@ -9,8 +9,11 @@ from ..errors import DegenerateFaceError
 from ..text import list_some, plural
 from .triangles import double_areas, slacks
 
-ZERO_AREA = 1e-12  # twice the area over the longest side squared: rounding alone makes as much
-SLACK = 1e-8  # what the triangle inequality is given to spare, in mean side lengths: angles of about 1e-4
+# Twice the area over the longest side squared. Lengths, rounded, know no smaller areas; the flattest triangles of
+# real scans have 1e-3.
+ZERO_AREA = 1e-7
+# What the triangle inequality is given to spare, in mean side lengths: enough for angles good to 1e-11.
+SLACK = 1e-5
 
 
 def mollify(lengths: FloatArray, *, strict: bool = False) -> tuple[FloatArray, str | None]:

@@ -42,6 +42,7 @@ def _write_npz(result: Flattening, stream: IO[bytes], path: Path) -> None:
         "cones": result.cones,
         "curvatures": result.curvatures,
         "log_scale": result.log_scale,
+        "curvature_residual": result.curvature_residual,
         "seams": result.seams,
         "vertex_origin": np.arange(len(result.vertices)) if origin is None else origin,
         "uv_scale": np.float64(result.uv_scale),

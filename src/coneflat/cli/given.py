@@ -1,4 +1,4 @@
-"""Cones as a user writes them."""
+"""Cones and corners as a user writes them."""
 
 from __future__ import annotations
 
@@ -16,31 +16,36 @@ _CURVATURE = re.compile(
 _UNITS = {"pi": math.pi, "π": math.pi, "deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0, None: 1.0}
 
 
-def parse_cones(words: Sequence[str], path: Path | None) -> dict[int, float | None]:
+def parse_vertices(noun: str, words: Sequence[str], path: Path | None = None) -> dict[int, float | None]:
     """Return vertex -> curvature (radians, None where it is to be computed) from options and a file.
 
+    Args:
+        noun: "cone" or "corner", which is the option's name, too.
+        words: values of the option, VERTEX or VERTEX:CURVATURE.
+        path: a file with VERTEX [CURVATURE] on each line.
+
     Raises:
-        OptionError: what stands there is no cone, or a vertex is named twice.
+        OptionError: what stands there is neither, or a vertex is named twice.
         MeshFileError: the file cannot be read.
     """
-    entries = [(word, word.split(":", 1), "--cone") for word in words]
+    entries = [(word, word.split(":", 1), f"--{noun}") for word in words]
     if path is not None:
         for number, line in enumerate(_lines(path), start=1):
             text = line.split("#", 1)[0].strip()
             if text:
                 entries.append((text, re.split(r"[\s,:;]+", text, maxsplit=1), f"{path}, line {number}:"))
         if not entries:
-            raise OptionError(f"{path} holds no cones")
-    cones: dict[int, float | None] = {}
+            raise OptionError(f"{path} holds no {noun}s")
+    given: dict[int, float | None] = {}
     for text, parts, where in entries:
         try:
             vertex = int(parts[0])
         except ValueError as error:
             raise OptionError(f"{where} {text!r} is not VERTEX or VERTEX:CURVATURE") from error
-        if vertex in cones:
-            raise OptionError(f"{where} vertex {vertex} is given as a cone twice")
-        cones[vertex] = parse_curvature(parts[1], f"{where} {text!r}") if len(parts) > 1 else None
-    return cones
+        if vertex in given:
+            raise OptionError(f"{where} vertex {vertex} is given as a {noun} twice")
+        given[vertex] = parse_curvature(parts[1], f"{where} {text!r}") if len(parts) > 1 else None
+    return given
 
 
 def parse_curvature(text: str, where: str) -> float:
@@ -66,4 +71,4 @@ def _lines(path: Path) -> list[str]:
         return path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise MeshFileError(f"cannot read cones from {path}: {reason}") from error
+        raise MeshFileError(f"cannot read {path}: {reason}") from error

@@ -1,0 +1,95 @@
+"""What exactness costs: `python benchmarks/metric_and_layout.py` prints a Markdown table.
+
+Metric and layout, given cones, by the exact metric and its unfolding against the paper's linear metric and its
+least squares layout, in the same process. Models of `../shared/meshes` where they are, split in four over and over
+up to --largest triangles, and a bumpy sphere in any case. Wall time, the best of --runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+MODELS = ROOT.parent / "shared" / "meshes"
+sys.path.insert(0, str(ROOT / "tests"))
+
+import shapes  # noqa: E402
+
+from coneflat import check_mesh, cut_open, edge_lengths, find_seams, read_mesh  # noqa: E402
+from coneflat.cones import greedy_cones  # noqa: E402
+from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents  # noqa: E402
+from coneflat.mesh import TriangleMesh  # noqa: E402
+from coneflat.metrics import ExactChoices, FlatMetric, linear_metric, solve_exact  # noqa: E402
+
+CONES = 20
+
+
+def meshes(names: list[str], largest: int) -> Iterator[tuple[str, TriangleMesh]]:
+    sources = [("sphere", shapes.sphere(5))]
+    for name in names:
+        for path in sorted(MODELS.glob(f"{name}.*")):
+            model = read_mesh(path)
+            sources.append((name, (model.vertices, model.corners.reshape(-1, 3))))
+    for name, (vertices, faces) in sources:
+        while len(faces) <= largest:
+            yield name, check_mesh(vertices, faces).mesh
+            vertices, faces = shapes.subdivide(vertices, faces)
+
+
+def best_time(run: Callable[[], object], runs: int) -> float:
+    times = []
+    for _ in range(runs):
+        start = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--models", default="bunny,hand,kitten")
+    parser.add_argument("--largest", type=int, default=500_000, help="triangles")
+    parser.add_argument("--runs", type=int, default=2)
+    arguments = parser.parse_args()
+    print(
+        "| model | triangles | Newton steps | flips | exact + unfolding, s | linear + least squares, s | ratio |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- |")
+    for name, mesh in meshes(arguments.models.split(","), arguments.largest):
+        lengths = edge_lengths(mesh.vertices, mesh.faces)
+        curvature = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
+        laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths), len(mesh.vertices))
+        surface = laplacian, curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
+        solution = greedy_cones(*surface, max_cones=CONES)
+        seams = find_seams(mesh, solution.cones, lengths.ravel()[mesh.edge_halfedges[:, 0]])
+        disk = cut_open(mesh, seams).mesh
+        choices = ExactChoices(True, None, True, False, np.arange(len(mesh.vertices)))
+        found: list[FlatMetric] = []
+
+        def exact() -> None:
+            found.append(solve_exact(mesh, lengths, solution, choices))  # noqa: B023
+            found[-1].lay_out(disk, seams)  # noqa: B023
+
+        def linear() -> None:
+            linear_metric(mesh, lengths, solution, "integral").lay_out(disk, seams)  # noqa: B023
+
+        if name == "sphere":
+            exact()  # compiles, or loads what was compiled
+        one, two = best_time(exact, arguments.runs), best_time(linear, arguments.runs)
+        figures = found[-1].figures
+        flips = figures.euclidean_flips + figures.ptolemy_flips
+        print(
+            f"| {name} | {len(mesh.faces):,} | {figures.newton_steps} | {flips:,} | {one:.2f} | {two:.2f} "
+            f"| {one / two:.2f} |",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,61 @@
+"""Angle sums and cotangents of a scaled metric, compiled."""
+
+from __future__ import annotations
+
+import math
+
+from .._arrays import FloatArray, IntArray
+from ..geometry.compiled import compiled
+
+
+@compiled
+def sum_angles(
+    tail: IntArray, length: FloatArray, scale: FloatArray, angle_sum: FloatArray, cots: FloatArray
+) -> int:
+    """Fill the angle sum at each vertex and the cotangent opposite each half-edge.
+
+    A side from i to j has the length length * scale_i * scale_j. Where the triangle inequality is broken the
+    angles are those of the convex extension (Springborn, Schroeder, Pinkall 2008, Section 5.1): pi opposite
+    the side that is too long, 0 at the others, and no cotangents. Returns the number of broken triangles.
+    """
+    broken = 0
+    angle_sum[:] = 0.0
+    for h in range(0, len(tail), 3):
+        # The corner opposite side i is at the tail of side i + 2.
+        j, k, i = tail[h], tail[h + 1], tail[h + 2]
+        a = length[h] * scale[j] * scale[k]
+        b = length[h + 1] * scale[k] * scale[i]
+        c = length[h + 2] * scale[i] * scale[j]
+        largest = max(a, b, c)
+        a /= largest
+        b /= largest
+        c /= largest
+        slack_a = min(b, c) - (a - max(b, c))
+        slack_b = min(c, a) - (b - max(c, a))
+        slack_c = min(a, b) - (c - max(a, b))
+        if min(slack_a, slack_b, slack_c) <= 0.0:
+            broken += 1
+            cots[h] = cots[h + 1] = cots[h + 2] = 0.0
+            wide = i if slack_a <= 0.0 else (j if slack_b <= 0.0 else k)
+            angle_sum[wide] += math.pi
+            continue
+        perimeter = a + b + c
+        root = math.sqrt(perimeter * slack_a * slack_b * slack_c)  # four times the area
+        angle_sum[i] += 2 * math.atan2(root, perimeter * slack_a)
+        angle_sum[j] += 2 * math.atan2(root, perimeter * slack_b)
+        angle_sum[k] += 2 * math.atan2(root, perimeter * slack_c)
+        cots[h] = (perimeter * slack_a - slack_b * slack_c) / (2 * root)
+        cots[h + 1] = (perimeter * slack_b - slack_c * slack_a) / (2 * root)
+        cots[h + 2] = (perimeter * slack_c - slack_a * slack_b) / (2 * root)
+    return broken
+
+
+@compiled
+def has_negative_weight(twin: IntArray, cots: FloatArray) -> bool:
+    """Return whether the cotangents opposite some edge sum to less than 0: it is not Delaunay."""
+    for h in range(len(twin)):
+        t = twin[h]
+        # The margin is the rounding of the cotangents; the test that decides on a flip has its own.
+        if t > h and cots[h] + cots[t] < -1e-13 * (abs(cots[h]) + abs(cots[t])):
+            return True
+    return False

@@ -1,0 +1,236 @@
+"""The exact discrete conformal metric of given curvatures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..errors import CurvatureError
+from ..geometry.delaunay import make_delaunay
+from ..geometry.intrinsic import IntrinsicTriangulation, intrinsic_triangulation
+from ..geometry.triangles import double_areas
+from ..mesh import NEXT, PREVIOUS, TriangleMesh
+from .doubling import double
+from .newton import ConformalProblem, State, minimize
+
+# How far, in radians, prescribed curvatures may miss Gauss-Bonnet; decimals typed by hand are good to more.
+SUM_TOLERANCE = 1e-8
+
+
+@dataclass(frozen=True)
+class ExactMetric:
+    """A metric of prescribed curvature, discretely conformal to the input.
+
+    Attributes:
+        log_scale: (n,) phi.
+        curvature: (n,) curvature reached, radians; at fixed vertices the one that came out.
+        triangulation: the triangulation on which the metric lives, Delaunay in it, with its flat lengths in
+            model units times exp(phi).
+        flips: half-edges flipped on the way there from the input's triangles, in order.
+        euclidean_flips: how many of them made the input Delaunay; the others happened during the solve.
+        steps: Newton steps (factorizations).
+        residual: largest curvature error, radians, over the vertices with a target.
+        worst_vertex: where it is.
+        converged: whether the residual is within the tolerance and every triangle has area.
+        doubled: whether the triangulation is that of the surface glued to its mirror image; the first m
+            triangles are the input's.
+    """
+
+    log_scale: FloatArray
+    curvature: FloatArray
+    triangulation: IntrinsicTriangulation
+    flips: IntArray
+    euclidean_flips: int
+    steps: int
+    residual: float
+    worst_vertex: int
+    converged: bool
+    doubled: bool
+
+    @property
+    def ptolemy_flips(self) -> int:
+        """The number of flips during the solve."""
+        return len(self.flips) - self.euclidean_flips
+
+
+def exact_metric(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    target: FloatArray,
+    *,
+    fixed: BoolArray | None = None,
+    fixed_log_scale: FloatArray | float = 0.0,
+    start: FloatArray | None = None,
+    tolerance: float = 1e-10,
+    delaunay: bool = True,
+    max_steps: int = 200,
+) -> ExactMetric:
+    """Return the metric l_ij exp((phi_i + phi_j) / 2) whose curvature is the target.
+
+    Args:
+        mesh: the mesh.
+        lengths: (m, 3) side lengths, model units; the triangles must have area.
+        target: (n,) curvature in radians; not used at fixed vertices.
+        fixed: (n,) True for vertices whose log scale is given and whose curvature comes out: cones with
+            phi = 0, a free boundary. None: all curvatures are prescribed, and phi, then known up to a
+            constant, is chosen to keep the total area.
+        fixed_log_scale: (n,) or one number, phi at the fixed vertices.
+        start: (n,) first guess of phi; the linear solution is a good one.
+        tolerance: curvature error, radians, that counts as converged. Rounding permitting the solve goes on
+            for two more digits where this is cheap.
+        delaunay: flip the input to its intrinsic Delaunay triangulation first. Without it, the conformal
+            class is that of the input's own triangles; the same on Delaunay meshes.
+        max_steps: Newton steps after which the best metric so far is returned; counted anew if the surface
+            has to be doubled.
+
+    Raises:
+        CurvatureError: a target is 2 pi or more inside, pi or more on the boundary, or the targets of a
+            component without fixed vertices miss Gauss-Bonnet.
+
+    Notes:
+        Springborn, Schroeder, Pinkall, "Conformal equivalence of triangle meshes", 2008, with the flips of
+        Springborn, "Ideal hyperbolic polyhedra and discrete uniformization", 2019, and of Gillespie,
+        Springborn, Crane, "Discrete conformal equivalence of polyhedral surfaces", 2021. With flips a metric
+        exists for every target that passes the checks. At a boundary the theorem needs the edges of the
+        boundary to flip, too: where the solution has broken triangles there, the surface is glued to its
+        mirror image and solved again.
+    """
+    n = len(mesh.vertices)
+    fixed = np.zeros(n, dtype=bool) if fixed is None else np.asarray(fixed, dtype=bool)
+    target, pinned = _checked_target(mesh, np.asarray(target, dtype=np.float64), fixed)
+    log_scale = np.zeros(n) if start is None else np.array(start, dtype=np.float64)
+    log_scale[fixed] = np.broadcast_to(np.asarray(fixed_log_scale, dtype=np.float64), (n,))[fixed]
+
+    triangulation = intrinsic_triangulation(mesh, lengths)
+    flat_turn = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
+    problem = ConformalProblem(triangulation, flat_turn, target, fixed, pinned)
+    euclidean = _prepare(problem, delaunay)
+    state = minimize(problem, log_scale, tolerance, max_steps)
+    original = np.arange(n)
+    doubled = not _is_solved(state, tolerance) and bool(mesh.is_boundary_vertex.any())
+    steps = problem.steps
+    if doubled:
+        triangulation, original = double(intrinsic_triangulation(mesh, lengths))
+        copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
+        problem = ConformalProblem(
+            triangulation,
+            np.full(len(original), 2 * np.pi),
+            (copies * target)[original],
+            fixed[original],
+            np.concatenate([pinned, np.zeros(len(original) - n, dtype=bool)]),
+        )
+        euclidean = _prepare(problem, delaunay)
+        state = minimize(problem, log_scale[original], tolerance, max_steps)
+        state.curvature[:n] /= copies
+        steps += problem.steps
+    if pinned.any():
+        state.log_scale = _keep_area(mesh, lengths, problem, state.log_scale, original)
+    return _finish(problem, state, n, euclidean, steps, tolerance, doubled)
+
+
+def _prepare(problem: ConformalProblem, delaunay: bool) -> int:
+    """Flip the input to Delaunay in its own metric; return the number of flips."""
+    if not delaunay:
+        return 0
+    problem.records.append(make_delaunay(problem.triangulation))
+    return len(problem.records[0])
+
+
+def _is_solved(state: State, tolerance: float) -> bool:
+    return state.largest <= tolerance and state.broken == 0
+
+
+def _keep_area(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    problem: ConformalProblem,
+    log_scale: FloatArray,
+    original: IntArray,
+) -> FloatArray:
+    """Return phi, shifted on each component without fixed vertices so that its total area stays the same.
+
+    original: (n,) for each vertex of the problem the vertex of the mesh that it is, or is a copy of.
+    """
+    count, labels = mesh.components
+    component = labels[original]
+    free = np.ones(count, dtype=bool)
+    free[component[problem.fixed]] = False
+    centre = np.full(count, -np.inf)
+    np.maximum.at(centre, component, log_scale)
+    log_scale = log_scale - np.where(free, centre, 0.0)[component]
+    faces = problem.triangulation.faces
+    scale = np.exp(log_scale / 2)[faces]
+    metric = problem.triangulation.length.reshape(-1, 3) * scale[:, NEXT] * scale[:, PREVIOUS]
+    before = np.bincount(labels[mesh.faces[:, 0]], weights=double_areas(lengths), minlength=count)
+    after = np.bincount(component[faces[:, 0]], weights=double_areas(metric), minlength=count)
+    copies = len(metric) / len(lengths)  # 2 if the surface was doubled
+    shift = np.log(copies * before / after) / 2
+    shifted: FloatArray = log_scale + np.where(free, shift, 0.0)[component]
+    return shifted
+
+
+def _finish(
+    problem: ConformalProblem,
+    state: State,
+    n: int,
+    euclidean: int,
+    steps: int,
+    tolerance: float,
+    doubled: bool,
+) -> ExactMetric:
+    """Put the metric on the triangulation and collect the report."""
+    triangulation = problem.triangulation
+    tail = triangulation.tail
+    head = tail.reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    # The same bits on both sides: multiplication commutes, and the background lengths agree.
+    triangulation.length *= np.exp((state.log_scale[tail] + state.log_scale[head]) / 2)
+    residual = np.abs(state.residual[:n])
+    records = problem.records
+    return ExactMetric(
+        log_scale=state.log_scale[:n],
+        curvature=state.curvature[:n],
+        triangulation=triangulation,
+        flips=np.concatenate(records) if records else np.empty(0, dtype=np.int64),
+        euclidean_flips=euclidean,
+        steps=steps,
+        residual=state.largest,
+        worst_vertex=int(residual.argmax()),
+        converged=_is_solved(state, tolerance),
+        doubled=doubled,
+    )
+
+
+def _checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> tuple[FloatArray, BoolArray]:
+    """Return a target that satisfies Gauss-Bonnet to rounding, and a pinned vertex a component, if needed."""
+    on_boundary = mesh.is_boundary_vertex
+    for where, limit, name, place in (
+        (~on_boundary, 2 * np.pi, "2 pi", "inside"),
+        (on_boundary, np.pi, "pi", "on the boundary"),
+    ):
+        bad = np.flatnonzero(where & ~fixed & ~(target < limit * (1 - 1e-12)))
+        if len(bad):
+            worst = bad[np.argmax(target[bad])]
+            raise CurvatureError(
+                f"no metric has a curvature of {name} or more {place}: vertex {worst} is to have "
+                f"{target[worst] / np.pi:.6g} pi ({len(bad)} such); ask for less"
+            )
+    pinned = np.zeros(len(target), dtype=bool)
+    count, component = mesh.components
+    target = target.copy()
+    for label in np.setdiff1d(np.arange(count), component[fixed]):
+        inside = component == label
+        faces = int(inside[mesh.faces[:, 0]].sum())
+        edges = int(inside[mesh.edges[:, 0]].sum())
+        vertices = int(inside.sum())
+        euler = vertices - edges + faces
+        excess = float(target[inside].sum()) - 2 * np.pi * euler
+        if not abs(excess) <= SUM_TOLERANCE:
+            raise CurvatureError(
+                f"curvatures must sum to 2 pi times the Euler characteristic, {2 * euler} pi, but the input "
+                f"sums to {target[inside].sum() / np.pi:.9g} pi; change one cone by {-excess / np.pi:.6g} pi"
+            )
+        target[inside] -= excess / vertices
+        pinned[np.flatnonzero(inside)[0]] = True
+    return target, pinned

@@ -1,0 +1,181 @@
+"""Newton's method on the convex energy of discrete conformal maps, with edge flips."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..errors import MetricError
+from ..geometry.delaunay import make_delaunay
+from ..geometry.intrinsic import IntrinsicTriangulation
+from ..solver import Factor, factorize
+from .hessian import HessianPattern
+
+# Residual, radians, below which nothing is left to gain: the rounding of a sum of a few angles.
+GOAL = 1e-14
+# Largest change of phi in one step. Beyond e^5 in length the quadratic model says nothing any more.
+LARGEST_STEP = 5.0
+# A factorization serves on as long as each step with it divides the residual by this much at least; it costs
+# as much as five to twenty back-substitutions with the flips and angles that go with them.
+CONTRACTION = 0.2
+# Halvings of a step after which it is taken for rounding: the change is then below 1e-9 of the first trial.
+HALVINGS = 30
+# The same where the surface can be doubled instead of creeping along triangles that are about to break.
+HALVINGS_BOUNDED = 6
+
+
+@dataclass(eq=False)
+class State:
+    """Curvature at a log scale, on the triangulation that is Delaunay for it."""
+
+    log_scale: FloatArray
+    curvature: FloatArray
+    cots: FloatArray
+    broken: int
+    residual: FloatArray
+
+    @property
+    def largest(self) -> float:
+        """The largest residual, radians."""
+        return float(np.abs(self.residual).max(initial=0.0))
+
+
+@dataclass(eq=False)
+class ConformalProblem:
+    """Find phi, so that the curvature of l_ij exp((phi_i + phi_j) / 2) is the target.
+
+    K(phi) - target is the gradient of a convex energy (Springborn, Schroeder, Pinkall 2008, Eq. 7), whose
+    Hessian is the cotangent Laplacian of the scaled metric; flipped to Delaunay, the energy is defined
+    for every phi and twice continuously differentiable (Springborn 2019; Gu, Luo, Sun, Wu 2018).
+
+    Attributes:
+        triangulation: lengths l; flipped in place.
+        flat_turn: (n,) 2 pi inside, pi on the boundary.
+        target: (n,) curvature, radians; not used at fixed vertices.
+        fixed: (n,) True where phi is given.
+        pinned: (n,) True for one vertex of each component without fixed ones.
+        records: half-edges flipped so far.
+        steps: factorizations so far.
+        last: the state evaluated last, the one the triangulation belongs to.
+    """
+
+    triangulation: IntrinsicTriangulation
+    flat_turn: FloatArray
+    target: FloatArray
+    fixed: BoolArray
+    pinned: BoolArray
+    records: list[IntArray] = field(default_factory=list)
+    steps: int = 0
+    last: State | None = None
+    _pattern: HessianPattern | None = None
+
+    @cached_property
+    def is_bounded(self) -> bool:
+        """Whether there is a boundary, where edges cannot be flipped and triangles may stay broken."""
+        return bool((self.triangulation.twin < 0).any())
+
+    def evaluate(self, log_scale: FloatArray) -> State:
+        """Flip to Delaunay in the scaled metric and return the curvature there."""
+        from .angle_kernel import has_negative_weight, sum_angles
+
+        # Centred, so that neither huge nor tiny factors overflow: angles see ratios only.
+        scale = np.exp((log_scale - (log_scale.max() + log_scale.min()) / 2) / 2)
+        sums = np.empty(len(log_scale))
+        cots = np.empty(len(self.triangulation.tail))
+        arrays = self.triangulation.tail, self.triangulation.length, scale, sums, cots
+        broken = sum_angles(*arrays)
+        # The cotangents are needed anyway and tell at a glance where there is nothing to flip.
+        if broken or has_negative_weight(self.triangulation.twin, cots):
+            flipped = make_delaunay(self.triangulation, log_scale)
+            if len(flipped):
+                self.records.append(flipped)
+                self._pattern = None
+                broken = sum_angles(*arrays)
+        curvature = self.flat_turn - sums
+        residual = np.where(self.fixed, 0.0, self.target - curvature)
+        self.last = State(log_scale, curvature, cots, broken, residual)
+        return self.last
+
+    def factorize(self, state: State) -> Factor:
+        """Factorize the Hessian of the state just evaluated."""
+        if self._pattern is None:
+            self._pattern = HessianPattern(self.triangulation)
+        held = self.fixed | self.pinned
+        self.steps += 1
+        return factorize(self._pattern.matrix(state.cots, held))
+
+    def direction(self, factor: Factor, state: State) -> FloatArray:
+        """Return the Newton direction of a state; 0 at vertices that are held."""
+        held = self.fixed | self.pinned
+        return np.where(held, 0.0, factor.solve(np.where(held, 0.0, state.residual)))
+
+
+def minimize(problem: ConformalProblem, log_scale: FloatArray, tolerance: float, max_steps: int) -> State:
+    """Return the state with the least residual that Newton's method reaches.
+
+    The line search looks at the slope of the energy along the step, (K - target) . d, not at its values,
+    whose rounding hides what a step gains near the end. It halves the step while the slope is positive. The
+    energy being convex, a step with a slope below zero stops short of the minimum along the line, so the
+    energy has fallen, and by at least half of what was to be had when the step before it, twice as long,
+    went beyond. The slope is negative at length 0 and continuous: some length is accepted. A step beyond the
+    minimum is taken only if it halves the least residual so far, which can happen but finitely often. So the
+    search can neither stall nor cycle.
+
+    On a bounded surface the theory does not hold, since edges of the boundary are not flipped; there no
+    state with broken triangles is accepted, and the search ends early if it finds no other.
+    """
+    bounded = problem.is_bounded
+    state = best = problem.evaluate(log_scale)
+    if bounded and state.broken:
+        state = best = problem.evaluate(np.where(problem.fixed, log_scale, 0.0))
+    factor: Factor | None = None
+    while best.largest > GOAL and not (bounded and state.broken):
+        fresh = factor is None
+        if factor is None:
+            if problem.steps == max_steps or best.largest <= tolerance / 100:
+                break
+            if problem.last is not state:  # the Hessian needs the triangulation of its own metric
+                state = problem.evaluate(state.log_scale)
+            try:
+                factor = problem.factorize(state)
+            except MetricError:  # singular in double precision: the best so far has to do
+                break
+        step = problem.direction(factor, state)
+        halvings = 0
+        if fresh and best.largest > tolerance:
+            halvings = HALVINGS_BOUNDED if bounded else HALVINGS
+        trial, length = search_line(problem, state, step, best.largest, halvings)
+        if trial is None:
+            if fresh:
+                break
+            factor = None
+            continue
+        if length < 1 or trial.largest > CONTRACTION * state.largest:
+            factor = None
+        gained = trial.largest <= best.largest / 2
+        state = trial
+        if state.largest < best.largest:
+            best = state
+        if best.largest <= tolerance and not gained:
+            break
+    return best if best is problem.last else problem.evaluate(best.log_scale)
+
+
+def search_line(
+    problem: ConformalProblem, state: State, step: FloatArray, least: float, halvings: int
+) -> tuple[State | None, float]:
+    """Return the first trial accepted and its length; None if there is none."""
+    reach = float(np.abs(step).max(initial=0.0))
+    if not np.isfinite(reach) or reach == 0.0:
+        return None, 0.0
+    length = min(1.0, LARGEST_STEP / reach)
+    for _ in range(halvings + 1):
+        trial = problem.evaluate(state.log_scale + length * step)
+        slope = -float(trial.residual @ step)
+        if (slope <= 0 or trial.largest <= least / 2) and not (problem.is_bounded and trial.broken):
+            return trial, length
+        length /= 2
+    return None, 0.0

@@ -1,0 +1,184 @@
+"""Exact flattenings: what is prescribed is there in the layout itself, to rounding."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+from coneflat import TriangleMesh, errors, flatten, read_mesh
+
+SHAPES = {
+    "sphere": shapes.sphere(3),
+    "torus": shapes.torus(),
+    "disk": shapes.hill(),
+    "annulus": shapes.annulus(),
+    "genus 2": shapes.genus(2),
+}
+
+
+def turned_angles(result):
+    """Return the sum of the layout's angles at each vertex."""
+    z = result.corner_uv @ [1, 1j]
+    angles = np.stack([np.angle((z[:, k - 1] - z[:, k]) / (z[:, k - 2] - z[:, k])) for k in range(3)], axis=1)
+    return np.bincount(result.faces.ravel(), angles.ravel(), minlength=len(result.vertices))
+
+
+def boundary_loop(vertices, faces):
+    """Return the vertices of a disk's boundary in order."""
+    mesh = TriangleMesh(vertices, faces)
+    start = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
+    after = dict(zip(mesh.tails[start].tolist(), mesh.heads[start].tolist(), strict=True))
+    loop = [min(after)]
+    while (v := after[loop[-1]]) != loop[0]:
+        loop.append(v)
+    return np.array(loop)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("at_cones", ["scale", "curvature"])
+def test_angles_of_the_layout_are_flat_but_at_cones(name, at_cones):
+    vertices, faces = SHAPES[name]
+    result = flatten(vertices, faces, epsilon=0.5, at_cones=at_cones)
+    d = result.distortion
+    assert d.flipped == d.degenerate == 0
+    assert d.curvature_error_max < 1e-10
+    assert d.seam_mismatch_max < 1e-9
+    assert d.seam_motion_mismatch < 1e-7
+    inside = ~TriangleMesh(vertices, faces).is_boundary_vertex
+    expected = np.full(len(vertices), 2 * np.pi)
+    expected[result.cones] -= result.curvatures
+    np.testing.assert_allclose(turned_angles(result)[inside], expected[inside], atol=1e-8)
+    if at_cones == "scale" and len(result.cones):
+        np.testing.assert_allclose(np.ptp(result.log_scale[result.cones]), 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["sphere", "disk", "genus 2"])
+def test_curvatures_that_came_out_can_be_put_back_in(name):
+    vertices, faces = SHAPES[name]
+    one = flatten(vertices, faces, epsilon=0.5)
+    two = flatten(vertices, faces, cones=dict(zip(one.cones.tolist(), one.curvatures.tolist(), strict=True)))
+    np.testing.assert_allclose(two.log_scale, one.log_scale, atol=1e-8)
+    assert two.distortion.qc_mean == pytest.approx(one.distortion.qc_mean, abs=1e-8)
+
+
+def test_rectangle_from_four_corners():
+    vertices, faces = SHAPES["disk"]
+    loop = boundary_loop(vertices, faces)
+    corners = loop[np.isin(loop, [0, 20, 504, 524])]
+    result = flatten(vertices, faces, cones="none", boundary=corners)
+    angles = turned_angles(result)
+    np.testing.assert_allclose(angles[corners], np.pi / 2, atol=1e-9)
+    np.testing.assert_allclose(angles[np.setdiff1d(loop, corners)], np.pi, atol=1e-9)
+    # So it fills its bounding box once it stands straight.
+    at = np.empty((len(vertices), 2))
+    at[result.faces] = result.corner_uv
+    sides = np.linalg.norm(np.diff(at[[*corners, corners[0]]], axis=0), axis=1)
+    np.testing.assert_allclose(sides[:2], sides[2:], rtol=1e-8)
+    one, two = (result.corner_uv[:, k] - result.corner_uv[:, 0] for k in (1, 2))
+    area = np.sum(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
+    assert area == pytest.approx(sides[0] * sides[1], rel=1e-8)
+
+
+def test_polygon_with_angles_of_its_own():
+    vertices, faces = SHAPES["disk"]
+    corners = boundary_loop(vertices, faces)[[0, 30, 60]].tolist()
+    curvatures = [np.pi / 2, 0.7 * np.pi, 0.8 * np.pi]
+    result = flatten(vertices, faces, cones="none", boundary=dict(zip(corners, curvatures, strict=True)))
+    np.testing.assert_allclose(turned_angles(result)[corners], np.pi - np.array(curvatures), atol=1e-9)
+
+
+def test_disk_is_round():
+    vertices, faces = SHAPES["disk"]
+    result = flatten(vertices, faces, cones="none", boundary="disk")
+    at = np.empty((len(vertices), 2))
+    at[result.faces] = result.corner_uv
+    rim = at[boundary_loop(vertices, faces)]
+    middle, spread = rim.mean(axis=0), np.ptp(rim, axis=0).max()
+    # Three points of the circle through them all: fit centre and radius.
+    solution = np.linalg.lstsq(np.c_[2 * rim, np.ones(len(rim))], (rim**2).sum(axis=1), rcond=None)[0]
+    radii = np.linalg.norm(rim - solution[:2], axis=1)
+    assert np.ptp(radii) < 0.01 * spread
+    assert np.linalg.norm(middle - solution[:2]) < spread
+
+
+def test_annulus_with_prescribed_boundary_has_round_loops():
+    vertices, faces = SHAPES["annulus"]
+    result = flatten(vertices, faces, cones="none", boundary="disk")
+    mesh = TriangleMesh(vertices, faces)
+    loop = mesh.boundary_loops[1]
+    turning = np.where(mesh.is_boundary_vertex, np.pi - turned_angles(result), 0)
+    totals = sorted(turning[loop == k].sum() / np.pi for k in (0, 1))
+    np.testing.assert_allclose(totals, [-2, 2], atol=1e-9)
+
+
+def test_boundary_lengths_are_kept():
+    vertices, faces = SHAPES["disk"]
+    result = flatten(vertices, faces, boundary="lengths")
+    mesh = TriangleMesh(vertices, faces)
+    rim = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
+    f, i = rim // 3, rim % 3
+    flat = np.linalg.norm(result.corner_uv[f, (i + 2) % 3] - result.corner_uv[f, (i + 1) % 3], axis=1)
+    model = np.linalg.norm(vertices[mesh.heads[rim]] - vertices[mesh.tails[rim]], axis=1)
+    np.testing.assert_allclose(flat / result.uv_scale, model, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "message"),
+    [
+        ({"boundary": "square"}, errors.OptionError, "unknown boundary 'square'"),
+        ({"boundary": []}, errors.OptionError, "no corners"),
+        ({"boundary": [0, 1, 40]}, errors.OptionError, "corner 40 does not lie on the boundary"),
+        ({"boundary": [0, 1]}, errors.CurvatureError, "corner 0 would have a curvature of 1 pi"),
+        ({"boundary": {0: 3.0, 1: 3.0}}, errors.CurvatureError, r"must sum to 2 pi, but sum to 1\.90986 pi"),
+        ({"boundary": "disk", "metric": "linear"}, errors.OptionError, "linear metric has a free boundary"),
+        ({"boundary": "disk", "at_cones": "scale"}, errors.OptionError, "prescribed boundary needs"),
+        ({"cones": {40: 1.0}, "at_cones": "scale"}, errors.OptionError, "give positions only"),
+        ({"at_cones": "both"}, errors.OptionError, "unknown at_cones 'both'"),
+    ],
+)
+def test_bad_choices_are_named(options, kind, message):
+    vertices, faces = SHAPES["disk"]
+    with pytest.raises(kind, match=message):
+        flatten(vertices, faces, **{"cones": "none", **options})
+
+
+def test_too_few_cones_on_a_sphere():
+    with pytest.raises(errors.CurvatureError, match="2 cones cannot carry .* 4 pi"):
+        flatten(*SHAPES["sphere"], cones=[1, 100])
+
+
+def test_unconverged_metric_is_refused_unless_asked(monkeypatch):
+    from coneflat import metrics
+
+    exact = metrics.exact_metric
+    monkeypatch.setattr(
+        metrics,
+        "exact_metric",
+        lambda *args, **options: exact(*args, **options, tolerance=1e-30, max_steps=1),
+    )
+    with pytest.raises(errors.ConvergenceError, match="did not converge: after .* vertex .* is off by"):
+        flatten(*SHAPES["sphere"])
+    assert flatten(*SHAPES["sphere"], best_effort=True).solve.residual < 1
+
+
+ALL = ["fandisk.obj", "rocker-arm.obj", "hand.obj", "bunny.obj", "elephant.obj", "spot.obj", "3holes.off",
+       "camelhead.off", "horse.ply", "stanford-bunny.obj", "kitten.obj", "face.obj", "human.obj", "knight.off",
+       "plane-holes.obj"]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_real_models_flatten_exactly(shared, name):
+    result = flatten(read_mesh(shared(name)))
+    d = result.distortion
+    assert d.curvature_error_max * np.pi <= 1e-9
+    assert d.seam_mismatch_max <= 1e-9
+    assert d.flipped == 0
+    assert d.degenerate == 0
+    untouched = turned_angles(result)
+    # Untangling moves vertices, and the angles around them, but never the sum of the angles at one.
+    used = np.unique(result.faces)
+    inside = used[~TriangleMesh(result.vertices, result.faces).is_boundary_vertex[used]]
+    expected = np.full(len(result.vertices), 2 * np.pi)
+    expected[result.cones] -= result.curvatures
+    np.testing.assert_allclose(untouched[inside], expected[inside], atol=1e-6)

@@ -1,0 +1,203 @@
+"""From a flat metric to points in the plane: unfolding, and untangling before it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+from coneflat import TriangleMesh, cut_open, find_seams
+from coneflat.conformal.exact import exact_metric
+from coneflat.geometry import edge_lengths
+from coneflat.geometry.intrinsic import halfedge_twins
+from coneflat.layout.straighten import FlatTriangles, straight_triangles
+from coneflat.layout.unfold import unfold
+from coneflat.layout.untangle import DEGENERATE, heights, untangle
+
+
+def flat_surface(shape, cones, seed=0):
+    """A mesh, its cut, its flat triangles, and the cones, where phi is 0."""
+    mesh = TriangleMesh(*shape)
+    inside = np.flatnonzero(~mesh.is_boundary_vertex)
+    chosen = np.random.default_rng(seed).choice(inside, cones, replace=False)
+    fixed = mesh.is_boundary_vertex.copy()
+    fixed[chosen] = True
+    metric = exact_metric(mesh, edge_lengths(*shape), np.zeros(len(fixed)), fixed=fixed)
+    assert metric.converged
+    costs = np.linalg.norm(mesh.vertices[mesh.edges[:, 0]] - mesh.vertices[mesh.edges[:, 1]], axis=1)
+    cut_mesh = cut_open(mesh, find_seams(mesh, chosen, costs))
+    return mesh, cut_mesh, straight_triangles(metric.triangulation, metric.flips), chosen
+
+
+def planar(points, faces):
+    """Flat triangles of a drawing in the plane, one frame for all."""
+    mesh = TriangleMesh(np.column_stack([points, np.zeros(len(points))]), faces)
+    place = (points[:, 0] + 1j * points[:, 1])[faces]
+    sides = place[:, [2, 0, 1]] - place[:, [1, 2, 0]]
+    return mesh, FlatTriangles(sides.ravel(), np.ones(sides.size, dtype=complex), halfedge_twins(mesh))
+
+
+def side_vectors(uv, corners):
+    points = (uv[:, 0] + 1j * uv[:, 1])[corners]
+    return points[:, [2, 0, 1]] - points[:, [1, 2, 0]]
+
+
+def seam_mismatch(flat, cut, uv, corners):
+    lengths = np.abs(side_vectors(uv, corners)).ravel()
+    seam = cut & (flat.twin >= 0)
+    return np.abs(lengths[seam] / lengths[flat.twin[seam]] - 1).max(initial=0)
+
+
+SURFACES = {
+    "sphere": (shapes.sphere(4), 6),
+    "torus": (shapes.torus(), 4),
+    "disk": (shapes.hill(), 3),
+    "annulus": (shapes.annulus(), 2),
+    "genus 3": (shapes.genus(3), 5),
+}
+
+
+class TestUnfold:
+    @pytest.mark.parametrize("name", SURFACES)
+    def test_every_triangle_keeps_its_shape(self, name):
+        _, cut_mesh, flat, _ = flat_surface(*SURFACES[name])
+        cut = halfedge_twins(cut_mesh.mesh) < 0
+        corners = cut_mesh.mesh.faces
+        sides = side_vectors(unfold(flat, corners, cut), corners)
+        shape = flat.sides.reshape(-1, 3)
+        turn = sides[:, 0] / shape[:, 0]
+        np.testing.assert_allclose(np.abs(turn), 1, rtol=1e-10)
+        np.testing.assert_allclose(turn[:, None] * shape, sides, rtol=1e-9)
+
+    @pytest.mark.parametrize("name", SURFACES)
+    def test_both_sides_of_a_seam_are_equal(self, name):
+        _, cut_mesh, flat, _ = flat_surface(*SURFACES[name])
+        cut = halfedge_twins(cut_mesh.mesh) < 0
+        uv = unfold(flat, cut_mesh.mesh.faces, cut)
+        assert seam_mismatch(flat, cut, uv, cut_mesh.mesh.faces) < 1e-12
+
+    @pytest.mark.parametrize("rounds", [3, 5])
+    def test_rounding_does_not_grow_with_the_mesh(self, rounds):
+        _, cut_mesh, flat, _ = flat_surface(shapes.sphere(rounds), 8)
+        corners = cut_mesh.mesh.faces
+        cut = halfedge_twins(cut_mesh.mesh) < 0
+        uv = unfold(flat, corners, cut)
+        assert seam_mismatch(flat, cut, uv, corners) < 1e-12
+        lengths, wanted = np.abs(side_vectors(uv, corners)).ravel(), np.abs(flat.sides)
+        np.testing.assert_allclose(lengths, wanted, rtol=1e-11)
+
+    def test_a_plane_figure_stays_what_it_is(self):
+        points, faces = shapes.grid(9, 7)
+        _, flat = planar(points[:, :2], faces)
+        uv = unfold(flat, faces, flat.twin < 0)
+        np.testing.assert_allclose(uv - uv[0], points[:, :2] - points[0, :2], atol=1e-14)
+
+    def test_charts_are_laid_out_one_by_one(self):
+        points, faces = shapes.join(shapes.grid(4, 3), shapes.grid(3, 5))
+        _, flat = planar(points[:, :2], faces)
+        uv = unfold(flat, faces, flat.twin < 0)
+        count = 5 * 4
+        for part in (slice(0, count), slice(count, None)):
+            given = points[part, :2]
+            np.testing.assert_allclose(uv[part] - uv[part][0], given - given[0], atol=1e-14)
+
+    def test_triangles_turned_over_are_laid_out_that_way(self):
+        points, faces = shapes.grid(4, 4)
+        points[12] += [0.6, 0.1, 0]  # an inner vertex, across its neighbours
+        _, flat = planar(points[:, :2], faces)
+        assert flat.is_inverted.any()
+        uv = unfold(flat, faces, flat.twin < 0)
+        np.testing.assert_allclose(uv - uv[0], points[:, :2] - points[0, :2], atol=1e-14)
+
+
+class TestUntangle:
+    def test_one_vertex_on_the_wrong_side(self):
+        points, faces = shapes.grid(8, 8)
+        points[40] += [0.2, 0.05, 0]
+        mesh, flat = planar(points[:, :2], faces)
+        nobody = np.zeros(len(points), dtype=bool)
+        border = mesh.is_boundary_vertex
+        result = untangle(flat, faces, nobody, nobody, border)
+        assert len(result.left) == 0
+        assert not border[result.moved].any()
+        assert len(result.moved) < 20
+        assert 0 < result.largest_move < 3
+        uv = unfold(result.flat, faces, flat.twin < 0)
+        assert (heights(side_vectors(uv, faces)) > DEGENERATE).all()
+        still = np.setdiff1d(np.arange(len(points)), result.moved)
+        offset = uv[still] - points[still, :2]
+        np.testing.assert_allclose(offset, offset[:1].repeat(len(still), 0), atol=1e-13)
+
+    def test_nothing_to_do(self):
+        points, faces = shapes.grid(4, 4)
+        mesh, flat = planar(points[:, :2], faces)
+        nobody = np.zeros(len(points), dtype=bool)
+        result = untangle(flat, faces, nobody, nobody, mesh.is_boundary_vertex)
+        assert result.flat.sides is flat.sides
+        assert len(result.moved) == len(result.left) == 0
+        assert result.largest_move == 0
+
+    def test_what_cannot_be_untangled_is_reported(self):
+        points, faces = shapes.grid(4, 4)
+        points[12] += [0.6, 0.1, 0]
+        mesh, flat = planar(points[:, :2], faces)
+        nobody = np.zeros(len(points), dtype=bool)
+        result = untangle(flat, faces, ~nobody, nobody, mesh.is_boundary_vertex)
+        np.testing.assert_array_equal(result.left, np.flatnonzero(flat.is_inverted))
+        assert len(result.moved) == 0
+
+    def test_seams_stay_equal_where_their_vertices_move(self):
+        """A vertex on a seam is dragged across its neighbours, on the surface: both copies with it."""
+        mesh, cut_mesh, flat, cones = flat_surface(shapes.sphere(3), 4)
+        n = len(mesh.vertices)
+        pinned = np.zeros(n, dtype=bool)
+        pinned[cones] = True
+        seam = np.bincount(cut_mesh.origin, minlength=n) > 1
+        victim = int(np.flatnonzero(seam & ~pinned)[3])
+        tangled = drag(flat, mesh.faces, victim, 1.3)
+        assert tangled.is_inverted.any()
+        nobody = np.zeros(n, dtype=bool)
+        result = untangle(tangled, mesh.faces, pinned, nobody, mesh.is_boundary_vertex)
+        assert len(result.left) == 0
+        assert victim in result.moved
+        assert not pinned[result.moved].any()
+        inner = result.flat.twin
+        np.testing.assert_allclose(
+            result.flat.turns * result.flat.sides[inner], -result.flat.sides, rtol=1e-10
+        )
+        cut = halfedge_twins(cut_mesh.mesh) < 0
+        corners = cut_mesh.mesh.faces
+        uv = unfold(result.flat, corners, cut)
+        assert (heights(side_vectors(uv, corners)) > DEGENERATE).all()
+        assert seam_mismatch(result.flat, cut, uv, corners) < 1e-12
+
+    def test_vertices_beside_a_seam_are_moved_first(self):
+        mesh, cut_mesh, flat, cones = flat_surface(shapes.sphere(3), 4)
+        n = len(mesh.vertices)
+        pinned = np.zeros(n, dtype=bool)
+        pinned[cones] = True
+        seam = np.bincount(cut_mesh.origin, minlength=n) > 1
+        near = np.zeros(n, dtype=bool)
+        near[mesh.faces[seam[mesh.faces].any(axis=1)]] = True
+        victim = int(np.flatnonzero(near & ~seam)[0])
+        result = untangle(
+            drag(flat, mesh.faces, victim, 1.3), mesh.faces, pinned, seam, mesh.is_boundary_vertex
+        )
+        assert len(result.left) == 0
+        assert not seam[result.moved].any()
+
+
+def drag(flat, faces, vertex, amount):
+    """Move a flat vertex along one of its edges by a multiple of its length."""
+    sides = flat.sides.copy()
+    tails = faces[:, [1, 2, 0]].ravel()
+    h = first = int(np.flatnonzero(tails == vertex)[0])
+    shift = amount * sides[h]
+    while True:
+        before = h - h % 3 + (h + 2) % 3
+        sides[h] -= shift
+        sides[before] += shift
+        h = int(flat.twin[before])
+        if h == first:
+            return FlatTriangles(sides, flat.turns, flat.twin)
+        shift *= flat.turns[h]
