@@ -13,8 +13,6 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import numpy as np
-
 ROOT = Path(__file__).resolve().parents[1]
 MODELS = ROOT.parent / "shared" / "meshes"
 sys.path.insert(0, str(ROOT / "tests"))
@@ -25,7 +23,7 @@ from coneflat import check_mesh, cut_open, edge_lengths, find_seams, read_mesh  
 from coneflat.cones import greedy_cones  # noqa: E402
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents  # noqa: E402
 from coneflat.mesh import TriangleMesh  # noqa: E402
-from coneflat.metrics import ExactChoices, FlatMetric, linear_metric, solve_exact  # noqa: E402
+from coneflat.methods import ExactChoices, LaidOut, exact_flattening, linear_flattening  # noqa: E402
 
 CONES = 20
 
@@ -69,15 +67,14 @@ def main() -> None:
         solution = greedy_cones(*surface, max_cones=CONES)
         seams = find_seams(mesh, solution.cones, lengths.ravel()[mesh.edge_halfedges[:, 0]])
         disk = cut_open(mesh, seams).mesh
-        choices = ExactChoices(True, None, True, False, np.arange(len(mesh.vertices)))
-        found: list[FlatMetric] = []
+        found: list[LaidOut] = []
 
         def exact() -> None:
-            found.append(solve_exact(mesh, lengths, solution, choices))  # noqa: B023
-            found[-1].lay_out(disk, seams)  # noqa: B023
+            metric = exact_flattening(mesh, lengths, solution, ExactChoices())  # noqa: B023
+            found.append(metric.lay_out(disk, seams))  # noqa: B023
 
         def linear() -> None:
-            linear_metric(mesh, lengths, solution, "integral").lay_out(disk, seams)  # noqa: B023
+            linear_flattening(mesh, lengths, solution).lay_out(disk, seams)  # noqa: B023
 
         if name == "sphere":
             exact()  # compiles, or loads what was compiled

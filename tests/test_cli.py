@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -39,7 +40,8 @@ def model(tmp_path):
 def test_flatten_writes_mesh_report_and_table(model, tmp_path):
     done = run("flatten", model, "-o", "out.obj", "--report", "report.json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+    # On a slow machine it says what it is doing, and nothing else.
+    assert all(re.fullmatch(r" +\d+\.\d s  \w+.*", line) for line in done.stderr.splitlines())
     for word in ("cones", "QC distortion", "seam length", "wrote out.obj", "wrote report.json", "layout"):
         assert word in done.stdout
     report = json.loads((tmp_path / "report.json").read_text())

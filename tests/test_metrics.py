@@ -134,6 +134,7 @@ def test_boundary_lengths_are_kept():
         ({"boundary": "disk", "metric": "linear"}, errors.OptionError, "linear metric has a free boundary"),
         ({"boundary": "disk", "at_cones": "scale"}, errors.OptionError, "prescribed boundary needs"),
         ({"cones": {40: 1.0}, "at_cones": "scale"}, errors.OptionError, "give positions only"),
+        ({"refine": True, "metric": "linear"}, errors.OptionError, "no common subdivision"),
         ({"at_cones": "both"}, errors.OptionError, "unknown at_cones 'both'"),
     ],
 )
@@ -149,17 +150,43 @@ def test_too_few_cones_on_a_sphere():
 
 
 def test_unconverged_metric_is_refused_unless_asked(monkeypatch):
-    from coneflat import metrics
+    from coneflat.methods import exact as method
 
-    exact = metrics.exact_metric
+    exact = method.exact_metric
     monkeypatch.setattr(
-        metrics,
+        method,
         "exact_metric",
         lambda *args, **options: exact(*args, **options, tolerance=1e-30, max_steps=1),
     )
     with pytest.raises(errors.ConvergenceError, match="did not converge: after .* vertex .* is off by"):
         flatten(*SHAPES["sphere"])
     assert flatten(*SHAPES["sphere"], best_effort=True).solve.residual < 1
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_refinement_is_the_same_surface(name):
+    vertices, faces = SHAPES[name]
+    rng = np.random.default_rng(1)
+    vertices = vertices + rng.normal(size=vertices.shape) * 0.02
+    result = flatten(vertices, faces, epsilon=0.5, refine=True)
+    assert result.solve.refined_triangles == len(result.faces) - len(faces) > 0
+    assert result.distortion.flipped == result.distortion.degenerate == 0
+    assert result.distortion.curvature_error_max < 1e-9
+    assert result.distortion.seam_mismatch_max < 1e-9
+    np.testing.assert_array_equal(result.vertices[: len(vertices)], vertices)
+    assert (result.vertex_origin[len(vertices) :] == -1).all()
+    before, after = (np.linalg.norm(np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]]), axis=1)
+                     for v, f in ((vertices, faces), (result.vertices, result.faces)))  # fmt: skip
+    np.testing.assert_allclose(np.bincount(result.face_origin, after), before, rtol=1e-9)
+
+
+def test_refinement_of_several_components_and_a_file(tmp_path):
+    vertices, faces = shapes.join(shapes.sphere(2), shapes.hill(9, 8))
+    vertices = vertices + np.random.default_rng(1).normal(size=vertices.shape) * 0.02
+    result = flatten(vertices, faces, refine=True)
+    assert result.distortion.charts == 2
+    result.save(tmp_path / "refined.obj")
+    assert len(read_mesh(tmp_path / "refined.obj").offsets) - 1 == len(result.faces)
 
 
 ALL = ["fandisk.obj", "rocker-arm.obj", "hand.obj", "bunny.obj", "elephant.obj", "spot.obj", "3holes.off",

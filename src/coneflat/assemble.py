@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ._arrays import IntArray
+from ._arrays import FloatArray, IntArray
 from .distortion import curvature_errors, measure
 from .figures import SolveFigures
 from .inputs import InputMesh
@@ -39,47 +39,81 @@ def assemble(
         pieces: the flattened components.
         options, stages: what the result tells about itself.
     """
-    mesh = checked.mesh
-    with stages("layout"):
-        charts, scale = arrange([piece.points for piece in pieces])
-        first = np.cumsum([0] + [len(chart) for chart in charts])
-        uv_faces = np.empty_like(mesh.faces)
-        for (_, _, faces), piece, start in zip(parts, pieces, first[:-1], strict=True):
-            uv_faces[faces] = piece.corners + start
-        uv = np.concatenate(charts)
-
-    log_scale, target, curvature = (np.empty(len(mesh.vertices)) for _ in range(3))
-    for (_, vertices, _), piece in zip(parts, pieces, strict=True):
-        log_scale[vertices] = piece.log_scale
-        target[vertices] = piece.target
-        curvature[vertices] = piece.curvature
-    cones = np.concatenate([v[p.cones] for (_, v, _), p in zip(parts, pieces, strict=True)])
-    with stages("measure"):
-        distortion = measure(mesh, uv[uv_faces], curvature_errors(target, curvature), cones)
-
     points = np.asarray(given.vertices, dtype=np.float64)
     number, vertex_origin = result_numbering(checked, len(points))
-    every_log_scale, every_residual = np.full((2, len(vertex_origin)), np.nan)
-    every_log_scale[number], every_residual[number] = log_scale, target - curvature
-    seams = [vertices[piece.seams] for (_, vertices, _), piece in zip(parts, pieces, strict=True)]
+    numbers, positions = _number_vertices(number, points[vertex_origin], parts, pieces)
+    laid_out = [piece.laid_out for piece in pieces]
+    face_origin = np.concatenate(
+        [faces[one.face_origin] for (_, _, faces), one in zip(parts, laid_out, strict=True)]
+    )
+    order = np.argsort(face_origin, kind="stable")
+    faces = np.concatenate([ids[one.mesh.faces] for ids, one in zip(numbers, laid_out, strict=True)])[order]
+
+    with stages("layout"):
+        charts, scale = arrange([one.points for one in laid_out])
+        first = np.cumsum([0] + [len(chart) for chart in charts[:-1]])
+        corners = np.concatenate([one.corners + start for one, start in zip(laid_out, first, strict=True)])[
+            order
+        ]
+        uv = np.concatenate(charts)
+
+    def spread(values: Sequence[FloatArray]) -> FloatArray:
+        every = np.full(len(positions), np.nan)
+        for ids, value in zip(numbers, values, strict=True):
+            every[ids] = value
+        return every
+
+    target = spread([one.target for one in laid_out])
+    residual = target - spread([one.curvature for one in laid_out])
+    cones = np.concatenate([ids[piece.cones] for ids, piece in zip(numbers, pieces, strict=True)])
+    with stages("measure"):
+        distortion = measure(
+            TriangleMesh(positions, faces),
+            uv[corners],
+            curvature_errors(residual[np.isfinite(residual)]),
+            cones,
+        )
+    refined = any(one.figures.refined_triangles for one in laid_out)
+    face_corners = (
+        None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
+    )
     return Flattening(
-        vertices=points[vertex_origin],
-        faces=number[mesh.faces],
+        vertices=positions,
+        faces=faces,
         uv=uv,
-        uv_faces=uv_faces,
+        uv_faces=corners,
         uv_scale=scale,
-        cones=number[cones],
+        cones=cones,
         curvatures=target[cones],
-        log_scale=every_log_scale,
-        curvature_residual=every_residual,
-        seams=number[np.concatenate(seams)],
+        log_scale=spread([one.log_scale for one in laid_out]),
+        curvature_residual=residual,
+        seams=np.concatenate([ids[one.seams] for ids, one in zip(numbers, laid_out, strict=True)]),
         distortion=distortion,
         seconds=dict(stages.seconds),
         notes=checked.notes + tuple(piece.note for piece in pieces if piece.note),
         settings=options.as_dict(),
-        solve=SolveFigures.of_all(piece.figures for piece in pieces),
-        vertex_origin=vertex_origin,
-        face_origin=checked.face_origin,
-        face_corners=None if given.face_corners is None else turn_corners(checked, given.face_corners),
+        solve=SolveFigures.of_all(one.figures for one in laid_out),
+        vertex_origin=np.concatenate([vertex_origin, np.full(len(positions) - len(vertex_origin), -1)]),
+        face_origin=checked.face_origin[face_origin[order]],
+        face_corners=face_corners,
         source=given.source,
     )
+
+
+def _number_vertices(
+    number: IntArray,
+    positions: FloatArray,
+    parts: Sequence[tuple[TriangleMesh, IntArray, IntArray]],
+    pieces: Sequence[Piece],
+) -> tuple[list[IntArray], FloatArray]:
+    """Return the number in the result of each vertex of each piece, and the positions of all.
+
+    Vertices that a refinement added come last.
+    """
+    numbers, blocks, count = [], [positions], len(positions)
+    for (_, vertices, _), piece in zip(parts, pieces, strict=True):
+        added = piece.laid_out.mesh.vertices[len(vertices) :]
+        numbers.append(np.concatenate([number[vertices], np.arange(count, count + len(added))]))
+        blocks.append(added)
+        count += len(added)
+    return numbers, np.concatenate(blocks)

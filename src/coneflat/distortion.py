@@ -59,10 +59,15 @@ class Distortion:
     curvature_error_max: float = float("nan")
 
 
-def curvature_errors(target: FloatArray, curvature: FloatArray) -> tuple[float, float]:
-    """Return ||target - K||_2 / n as in Table 1 of the paper, and the largest |target - K|, both over pi."""
-    error = (target - curvature) / np.pi
-    return float(np.linalg.norm(error) / len(error)), float(np.abs(error).max())
+def curvature_errors(residual: FloatArray) -> tuple[float, float]:
+    """Return ||target - K||_2 / n as in Table 1 of the paper, and the largest |target - K|, both over pi.
+
+    residual: (n,) target - K, radians.
+    """
+    return (
+        float(np.linalg.norm(residual) / len(residual) / np.pi),
+        float(np.abs(residual).max() / np.pi),
+    )
 
 
 def measure(

@@ -46,6 +46,7 @@ class Options:
     at_cones: str = "auto"
     boundary: Boundary = "free"
     best_effort: bool = False
+    refine: bool = False
     repair: bool = False
     strict: bool = False
     given_cones: Mapping[int, float | None] = field(init=False, default_factory=dict)
@@ -67,6 +68,8 @@ class Options:
             raise OptionError(
                 "the linear metric has a free boundary and no choice at cones: use metric 'exact'"
             )
+        if self.metric == "linear" and self.refine:
+            raise OptionError("the linear metric has no common subdivision to refine to: use metric 'exact'")
         if self.at_cones == "scale" and any(k is not None for k in self.given_cones.values()):
             raise OptionError("with the scale fixed at cones their curvatures come out: give positions only")
         if self.at_cones == "scale" and self.boundary_kind not in ("free", "lengths"):

@@ -13,7 +13,6 @@ from ._arrays import BoolArray, FloatArray, IntArray
 from .assemble import assemble
 from .cones import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
 from .conformal.boundary import prescribed_boundary
-from .figures import SolveFigures
 from .geometry import (
     angle_defect,
     corner_angles,
@@ -24,7 +23,7 @@ from .geometry import (
 )
 from .inputs import as_input
 from .mesh import TriangleMesh
-from .metrics import ExactChoices, FlatMetric, linear_metric, solve_exact
+from .methods import ExactChoices, FlatMetric, LaidOut, exact_flattening, linear_flattening
 from .numbering import locate, select, turn_corners
 from .options import Boundary, Cones, Options
 from .result import Flattening
@@ -45,6 +44,7 @@ def flatten(
     at_cones: str = "auto",
     boundary: Boundary = "free",
     best_effort: bool = False,
+    refine: bool = False,
     repair: bool = False,
     strict: bool = False,
     progress: Progress | None = None,
@@ -71,6 +71,8 @@ def flatten(
             make it a polygon with these corners and straight sides between, all of one angle, and a map
             from vertex to curvature in radians one with these.
         best_effort: return a metric that did not converge to its tolerance, instead of refusing it.
+        refine: of the exact metric: return the mesh cut along the edges of the flat triangulation, on which the
+            map has no inverted triangle by construction, instead of the input's own triangles.
         repair: drop, split and cut what makes the input no manifold, instead of refusing it.
         strict: refuse triangles without area, instead of opening them by a tiny perturbation.
         progress: called with the name of each stage and the fraction of triangles done.
@@ -82,7 +84,17 @@ def flatten(
         MetricError: the computation found no finite result.
     """
     options = Options(
-        cones, epsilon, max_cones, metric, length_rule, at_cones, boundary, best_effort, repair, strict
+        cones,
+        epsilon,
+        max_cones,
+        metric,
+        length_rule,
+        at_cones,
+        boundary,
+        best_effort,
+        refine,
+        repair,
+        strict,
     )
     stages = Stages(progress)
     with stages("check"):
@@ -132,23 +144,13 @@ class Piece:
     """One connected component, flattened.
 
     Attributes:
-        points: (c, 2) layout at the model's own scale.
-        corners: (m, 3) index into `points` of every triangle corner.
+        laid_out: its layout.
         cones: (s,) vertices.
-        log_scale, target, curvature: (n,) of the metric that was laid out.
-        seams: (k, 2) vertex pairs.
-        figures: how the metric and the layout were found.
         note: what was done to triangles without area, if anything.
     """
 
-    points: FloatArray
-    corners: IntArray
+    laid_out: LaidOut
     cones: IntArray
-    log_scale: FloatArray
-    target: FloatArray
-    curvature: FloatArray
-    seams: IntArray
-    figures: SolveFigures
     note: str | None
 
 
@@ -171,19 +173,7 @@ def flatten_component(mesh: TriangleMesh, given: Given, options: Options, stages
         disk = cut_open(mesh, seams).mesh
 
     with stages("layout"):
-        points, figures = metric.lay_out(disk, seams)
-
-    return Piece(
-        points,
-        disk.faces,
-        solution.cones,
-        metric.log_scale,
-        metric.target,
-        metric.curvature,
-        mesh.edges[seams],
-        figures,
-        note,
-    )
+        return Piece(metric.lay_out(disk, seams), solution.cones, note)
 
 
 def find_cones(
@@ -209,7 +199,7 @@ def find_metric(
 ) -> FlatMetric:
     """Return the flat metric that the options name."""
     if options.metric == "linear":
-        return linear_metric(mesh, lengths, solution, options.length_rule)
+        return linear_flattening(mesh, lengths, solution, options.length_rule)
     is_prescribed = options.boundary_kind == "disk" or len(given.corners) > 0
     boundary = None
     if is_prescribed and mesh.is_boundary_vertex.any():
@@ -222,6 +212,7 @@ def find_metric(
         boundary=boundary,
         keep_area=options.boundary_kind != "lengths",
         best_effort=options.best_effort,
+        refine=options.refine,
         names=given.names,
     )
-    return solve_exact(mesh, lengths, solution, choices)
+    return exact_flattening(mesh, lengths, solution, choices)

@@ -73,8 +73,9 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
             f"triangles upside down; {solve.untangled_triangles:,} were, until {solve.untangled_vertices:,} vertices "
             f"moved by at most {solve.untangled_move:.2g} edges"
         )
+    added = f"; {solve.refined_triangles:,} more by the refinement" if solve.refined_triangles else ""
     return [
-        ("triangles", f"{len(result.faces):,}", f"{len(result.vertices):,} vertices"),
+        ("triangles", f"{len(result.faces):,}", f"{len(result.vertices):,} vertices{added}"),
         ("cones", cones, "singular vertices, and their curvatures"),
         (
             "curvature error",

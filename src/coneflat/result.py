@@ -20,7 +20,8 @@ class Flattening:
 
     Attributes:
         vertices: (n, 3) positions in model units; the input's own, or the repaired mesh's.
-        faces: (m, 3) vertex indices, consistently oriented, in the input's order of faces.
+        faces: (m, 3) vertex indices, consistently oriented, in the input's order of faces; of a refinement, its
+            triangles, in the order of the faces that they are parts of.
         uv: (u, 2) points of the layout, in [0, 1]^2, all charts at one scale.
         uv_faces: (m, 3) index into `uv` of every triangle corner.
         uv_scale: UV units per model unit; `uv / uv_scale` is the layout at the model's own scale.
@@ -35,7 +36,7 @@ class Flattening:
         notes: what was done to the input, one sentence each.
         settings: the options it was made with.
         solve: how the metric and the layout were found: Newton steps, flips, untangled triangles.
-        vertex_origin: (n,) the input vertex that each vertex came from.
+        vertex_origin: (n,) the input vertex that each vertex came from, -1 for those that a refinement added.
         face_origin: (m,) the input face that each face came from.
         face_corners: (m, 3) for a mesh read from a file: the polygon corner of `source` at each
             triangle corner; else None.

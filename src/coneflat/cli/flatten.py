@@ -9,7 +9,7 @@ import click
 from click.core import ParameterSource
 
 SEARCH_OPTIONS = ("cones", "epsilon", "max_cones")
-EXACT_OPTIONS = ("at_cones", "boundary", "corner", "best_effort")
+EXACT_OPTIONS = ("at_cones", "boundary", "corner", "best_effort", "refine")
 METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "metric", "lengths", *EXACT_OPTIONS)
 
 
@@ -84,6 +84,11 @@ METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "metric", "lengths", *E
     show_default=True,
     help="Linear metric: scale an edge by the mean of the scale along it, or by the scale at the mean.",
 )
+@click.option(
+    "--refine",
+    is_flag=True,
+    help="Exact metric: cut the input's triangles along the flat triangulation's edges; nothing can be inverted.",
+)
 @click.option("--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces.")
 @click.option("--strict", is_flag=True, help="Refuse triangles without area instead of opening them.")
 @click.option(
@@ -109,6 +114,7 @@ def flatten(
     boundary: str,
     corner: tuple[str, ...],
     best_effort: bool,
+    refine: bool,
     lengths: str,
     repair: bool,
     strict: bool,
@@ -146,6 +152,7 @@ def flatten(
             "at_cones": at_cones,
             "boundary": corners or boundary,
             "best_effort": best_effort,
+            "refine": refine,
         }
     run(mesh, output, {**options, "repair": repair, "strict": strict}, weld=weld, report=report, quiet=quiet)
 

@@ -1,0 +1,57 @@
+"""What every method gives to the pipeline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from .._arrays import FloatArray, IntArray
+from ..figures import SolveFigures
+from ..mesh import TriangleMesh
+
+
+@dataclass(frozen=True)
+class LaidOut:
+    """A connected mesh with its layout.
+
+    Attributes:
+        mesh: the mesh that was laid out: the one that was given, or its refinement, whose vertices are those of
+            the given one followed by new ones.
+        face_origin: (m,) the given face of each of its faces.
+        points: (c, 2) points of the plane, model units.
+        corners: (m, 3) index into `points` of every triangle corner.
+        seams: (k, 2) vertex pairs.
+        log_scale: (n,) phi; flat lengths are about l * exp(phi).
+        target, curvature: (n,) curvature wanted and reached, radians.
+        figures: how it was found.
+    """
+
+    mesh: TriangleMesh
+    face_origin: IntArray
+    points: FloatArray
+    corners: IntArray
+    seams: IntArray
+    log_scale: FloatArray
+    target: FloatArray
+    curvature: FloatArray
+    figures: SolveFigures
+
+
+class FlatMetric(Protocol):
+    """A flat metric on a connected mesh."""
+
+    def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
+        """Lay the mesh out.
+
+        Args:
+            disk: the mesh, cut open.
+            seams: (k,) the edges along which it was cut.
+        """
+        ...
+
+
+def all_faces(mesh: TriangleMesh) -> IntArray:
+    """Return (m,) the numbers of a mesh's faces, which are their own origin."""
+    return np.arange(len(mesh.faces))

@@ -1,0 +1,195 @@
+"""The exact method: no curvature error, seams equal on both sides, no flipped triangle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..cones import ConeSolution
+from ..conformal.boundary import BoundaryCurvature
+from ..conformal.exact import ExactMetric, exact_metric
+from ..errors import ConvergenceError
+from ..figures import SolveFigures
+from ..geometry import angle_defect, corner_angles, double_areas
+from ..layout.straighten import straight_triangles
+from ..layout.unfold import unfold
+from ..layout.untangle import untangle
+from ..mesh import TriangleMesh
+from ..seams import cut_open
+from .base import LaidOut, all_faces
+
+# The curvature of a round boundary is found from the metric it leads to, over and over: rounds at most, and the
+# change relative to the largest one at which to stop. Waiting for less is in vain: disks have a family of maps
+# to themselves, along which the iteration drifts. What is solved for in the end is exact in any case.
+ROUNDS, ROUND_CHANGE = 15, 1e-3
+
+
+@dataclass(frozen=True)
+class ExactChoices:
+    """What is prescribed for an exact metric, and how it is laid out.
+
+    Attributes:
+        scale_at_cones: phi = 0 at the cones, whose curvatures come out; else their curvatures are prescribed.
+        boundary: curvature wanted on the boundary; None leaves it free, phi = 0 there.
+        keep_area: scale the metric to the area of the input; else phi stays 0 on a free boundary, whose
+            lengths are then kept.
+        best_effort: return a metric that did not converge.
+        refine: lay out the common subdivision instead of the mesh's own triangles on straight sides.
+        names: (n,) what the user calls each vertex; None if he has no other numbers.
+    """
+
+    scale_at_cones: bool = True
+    boundary: BoundaryCurvature | None = None
+    keep_area: bool = True
+    best_effort: bool = False
+    refine: bool = False
+    names: IntArray | None = None
+
+
+@dataclass(frozen=True)
+class ExactFlatMetric:
+    """An exact metric on the mesh.
+
+    Attributes:
+        mesh: the mesh.
+        cones: (s,) cone vertices.
+        target: (n,) curvature that was prescribed, or came out where the scale was.
+        solved: the metric.
+        shrink: factor that brings it to the wanted size.
+        refine: lay out the common subdivision.
+    """
+
+    mesh: TriangleMesh
+    cones: IntArray
+    target: FloatArray
+    solved: ExactMetric
+    shrink: float
+    refine: bool
+
+    @property
+    def figures(self) -> SolveFigures:
+        """How the metric was found."""
+        return SolveFigures(
+            newton_steps=self.solved.steps,
+            euclidean_flips=self.solved.euclidean_flips,
+            ptolemy_flips=self.solved.ptolemy_flips,
+            residual=self.solved.residual,
+        )
+
+    def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
+        """Unfold the metric; on the mesh's own triangles, after turning over what is inverted there."""
+        return self._lay_out_refined(seams) if self.refine else self._lay_out_straight(disk, seams)
+
+    def _lay_out_straight(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
+        mesh, solved = self.mesh, self.solved
+        flat = straight_triangles(solved.triangulation, solved.flips, len(mesh.faces))
+        cut = mesh.is_boundary_edge.copy()
+        cut[seams] = True
+        pinned, on_seam = np.zeros((2, len(mesh.vertices)), dtype=bool)
+        pinned[self.cones] = True
+        on_seam[mesh.edges[seams]] = True
+        untangled = untangle(flat, mesh.faces, pinned, on_seam, mesh.is_boundary_vertex)
+        return LaidOut(
+            mesh=mesh,
+            face_origin=all_faces(mesh),
+            points=unfold(untangled.flat, disk.faces, cut[mesh.halfedge_edges]) * self.shrink,
+            corners=disk.faces,
+            seams=mesh.edges[seams],
+            log_scale=solved.log_scale + np.log(self.shrink),
+            target=self.target,
+            curvature=solved.curvature,
+            figures=replace(
+                self.figures,
+                untangled_triangles=int(flat.is_inverted.sum()),
+                untangled_vertices=len(untangled.moved),
+                untangled_move=untangled.largest_move,
+            ),
+        )
+
+    def _lay_out_refined(self, seams: IntArray) -> LaidOut:
+        from ..layout.refine import refine
+
+        refined = refine(self.mesh, self.solved)
+        mesh, edges = refined.mesh, refined.edges_on(seams)
+        disk = cut_open(mesh, edges).mesh
+        cut = mesh.is_boundary_edge.copy()
+        cut[edges] = True
+        angles = corner_angles(np.abs(refined.flat.sides).reshape(-1, 3))
+        return LaidOut(
+            mesh=mesh,
+            face_origin=refined.face_origin,
+            points=unfold(refined.flat, disk.faces, cut[mesh.halfedge_edges]) * self.shrink,
+            corners=disk.faces,
+            seams=mesh.edges[edges],
+            log_scale=refined.log_scale + np.log(self.shrink),
+            target=np.concatenate([self.target, np.zeros(len(mesh.vertices) - len(self.target))]),
+            curvature=angle_defect(mesh.faces, angles, mesh.is_boundary_vertex),
+            figures=replace(self.figures, refined_triangles=len(mesh.faces) - len(self.mesh.faces)),
+        )
+
+
+def exact_flattening(
+    mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, choices: ExactChoices
+) -> ExactFlatMetric:
+    """Return the exact discrete conformal metric that the linear solution is the first step to.
+
+    Args:
+        mesh: connected.
+        lengths: (m, 3) side lengths, model units.
+        solution: cones, target curvatures and the linear log scale.
+        choices: what is prescribed.
+
+    Raises:
+        ConvergenceError: the solve ends short of its tolerance, unless `best_effort`.
+        CurvatureError: no metric has the curvatures.
+    """
+    fixed = np.zeros(len(mesh.vertices), dtype=bool)
+    if choices.scale_at_cones:
+        fixed[solution.cones] = True
+    if choices.boundary is None:
+        fixed |= mesh.is_boundary_vertex
+    solved, target = _solve(mesh, lengths, solution, choices, fixed)
+    if not (solved.converged or choices.best_effort):
+        worst = solved.worst_vertex if choices.names is None else choices.names[solved.worst_vertex]
+        raise ConvergenceError(
+            f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is off "
+            f"by {solved.residual:.2g} rad; --best-effort takes it as it is, --metric linear needs no convergence, "
+            "--repair or remeshing may help"
+        )
+    shrink = 1.0
+    if choices.keep_area:
+        flat = solved.triangulation.length.reshape(-1, 3)
+        copies = len(flat) / len(mesh.faces)  # 2 where the surface was doubled
+        shrink = float(np.sqrt(copies * double_areas(lengths).sum() / double_areas(flat).sum()))
+    target = np.where(fixed, solved.curvature, target)
+    return ExactFlatMetric(mesh, solution.cones, target, solved, shrink, choices.refine)
+
+
+def _solve(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    solution: ConeSolution,
+    choices: ExactChoices,
+    fixed: BoolArray,
+) -> tuple[ExactMetric, FloatArray]:
+    """Return the metric and the curvature it was solved for; a round boundary follows from the metric."""
+    boundary = choices.boundary
+
+    def solve(wanted: FloatArray, start: FloatArray) -> ExactMetric:
+        # The common subdivision is that of the mesh's own conformal class, without flips before the solve.
+        return exact_metric(mesh, lengths, wanted, fixed=fixed, start=start, delaunay=not choices.refine)
+
+    inside = np.where(mesh.is_boundary_vertex, 0.0, solution.target)
+    if boundary is None:
+        return solve(inside, solution.log_scale), inside
+    wanted = inside + boundary.target(lengths, solution.log_scale)
+    solved = solve(wanted, solution.log_scale)
+    for _ in range(ROUNDS if boundary.has_round_loops else 0):
+        before, wanted = wanted, inside + boundary.target(lengths, solved.log_scale)
+        change = np.abs(wanted - before).max()
+        if not solved.converged or change < ROUND_CHANGE * np.abs(wanted).max():
+            return solved, before
+        solved = solve(wanted, solved.log_scale)
+    return solved, wanted

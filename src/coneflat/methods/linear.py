@@ -1,0 +1,67 @@
+"""The paper's method: a linear system for the scale, lengths by an edge integral, layout by least squares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._arrays import FloatArray, IntArray
+from ..cones import ConeSolution
+from ..conformal.linear import scaled_lengths
+from ..figures import SolveFigures
+from ..geometry import angle_defect, corner_angles, double_areas, is_broken
+from ..layout import least_squares_layout
+from ..mesh import TriangleMesh
+from .base import LaidOut, all_faces
+
+
+@dataclass(frozen=True)
+class LinearFlatMetric:
+    """Nearly flat lengths of the mesh's own triangles.
+
+    Attributes:
+        mesh: the mesh.
+        lengths: (m, 3) scaled side lengths, model units.
+        log_scale, target: (n,) phi and the curvature it is to give.
+    """
+
+    mesh: TriangleMesh
+    lengths: FloatArray
+    log_scale: FloatArray
+    target: FloatArray
+
+    def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
+        """Return the least squares reconstruction, at the scale of the metric."""
+        points = least_squares_layout(disk, self.lengths)
+        one, two = (points[disk.faces[:, k]] - points[disk.faces[:, 0]] for k in (1, 2))
+        area = np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum()
+        return LaidOut(
+            mesh=self.mesh,
+            face_origin=all_faces(self.mesh),
+            points=points * np.sqrt(double_areas(self.lengths).sum() / area),
+            corners=disk.faces,
+            seams=self.mesh.edges[seams],
+            log_scale=self.log_scale,
+            target=self.target,
+            curvature=angle_defect(
+                self.mesh.faces, corner_angles(self.lengths), self.mesh.is_boundary_vertex
+            ),
+            figures=SolveFigures(broken=int(is_broken(self.lengths).sum())),
+        )
+
+
+def linear_flattening(
+    mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, rule: str = "integral"
+) -> LinearFlatMetric:
+    """Return the paper's metric (Section 2.3) for cones and their log scale.
+
+    Args:
+        mesh: connected.
+        lengths: (m, 3) side lengths, model units.
+        solution: cones, target curvatures and the linear log scale.
+        rule: as in `scaled_lengths`.
+    """
+    scaled = scaled_lengths(lengths, mesh.faces, solution.log_scale, rule)
+    shrink = float(np.sqrt(double_areas(lengths).sum() / double_areas(scaled).sum()))
+    return LinearFlatMetric(mesh, scaled * shrink, solution.log_scale + np.log(shrink), solution.target)
