@@ -41,7 +41,7 @@ def test_flatten_writes_mesh_report_and_table(model, tmp_path):
     done = run("flatten", model, "-o", "out.obj", "--report", "report.json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     # On a slow machine it says what it is doing, and nothing else.
-    assert all(re.fullmatch(r" +\d+\.\d s  \w+.*", line) for line in done.stderr.splitlines())
+    assert all(re.fullmatch(r" +\d+\.\d s +\d+%  \w+.*", line) for line in done.stderr.splitlines())
     for word in ("cones", "QC distortion", "seam length", "wrote out.obj", "wrote report.json", "layout"):
         assert word in done.stdout
     report = json.loads((tmp_path / "report.json").read_text())
@@ -80,7 +80,9 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "-o", "x.fbx"], "'.fbx'"),
         (["model.obj", "-o", "missing/x.obj"], "missing"),
         (["model.obj", "--report", "missing/x.json"], "missing"),
-        (["model.obj", "-o", "model.obj"], "input itself"),
+        (["model.obj", "-o", "model.obj"], "is the input and the output"),
+        (["model.obj", "-o", "z.obj", "--report", "model.obj"], "is the input and the report"),
+        (["model.obj", "-o", "z.obj", "--report", "./z.obj"], "is the output and the report"),
         (["model.obj", "--epsilon", "0"], "epsilon must be a positive number"),
         (["model.obj", "--epsilon", "few"], "not a valid float"),
         (["model.obj", "--max-cones", "0"], "at most 0"),

@@ -55,7 +55,9 @@ def flattening(vertices, faces, uv, uv_faces, source=None, face_corners=None, or
         curvature_residual=np.zeros(len(vertices)),
         seams=np.array([[1, 4]]),
         vertex_origin=np.arange(len(vertices)) if origin is None else np.asarray(origin),
+        face_origin=None,
         face_corners=face_corners,
+        distortion=SimpleNamespace(qc=np.ones(len(faces)), log_area_scale=np.zeros(len(faces))),
         source=source,
         report=lambda: {"faces": len(faces), "note": "größer"},
     )
@@ -281,8 +283,11 @@ class TestSplitFormats:
             "seams",
         ]
         names += ["vertex_origin", "uv_scale"]
+        measures = {"face_origin": np.arange(len(result.faces)), "qc": result.distortion.qc}
         with np.load(out, allow_pickle=False) as arrays:
-            assert set(arrays.files) == {*names, "report"}
+            assert set(arrays.files) == {*names, *measures, "log_area_scale", "report"}
+            for name, values in measures.items():
+                np.testing.assert_array_equal(arrays[name], values)
             for name in names:
                 np.testing.assert_array_equal(arrays[name], getattr(result, name))
             assert json.loads(str(arrays["report"])) == result.report()

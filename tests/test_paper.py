@@ -21,7 +21,7 @@ def test_rocker_arm_as_in_tables_1_and_2(shared):
     assert d.qc_mean == pytest.approx(1.028, abs=0.001)
 
 
-@pytest.mark.parametrize("name", ["fandisk.obj", "rocker-arm.obj"])
+@pytest.mark.parametrize("name", ["fandisk.obj", "rocker-arm.obj", "spot.obj"])
 def test_scale_motion_and_numbering(shared, name):
     model = read_mesh(shared(name))
     vertices, faces = model.vertices, model.corners.reshape(-1, 3)

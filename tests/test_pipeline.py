@@ -100,6 +100,9 @@ def test_cones_of_the_users_own():
     again = flatten(vertices, faces, cones=given)
     np.testing.assert_allclose(again.log_scale, computed.log_scale, atol=1e-9)
     np.testing.assert_allclose(again.uv, computed.uv, atol=1e-7)
+    np.testing.assert_array_equal(
+        flatten(vertices, faces, cones=(v for v in (1, 2, 3, 4, 100))).uv, computed.uv
+    )
     # Isolated vertices before them shift nothing.
     shifted = flatten(np.r_[vertices[:2], vertices], faces + 2, cones=[3, 4, 5, 6, 102])
     np.testing.assert_allclose(shifted.uv, computed.uv, atol=1e-12)
@@ -130,7 +133,10 @@ def test_cones_of_the_users_own():
         ({"cones": [1, 2, 642]}, errors.OptionError, "cone 642 is no vertex .* 0 to 641"),
         ({"cones": [1, 2, -1]}, errors.OptionError, "cone -1"),
         ({"cones": [1.5]}, errors.OptionError, "whole number"),
-        ({"cones": 3.5}, errors.OptionError, "cones must be|whole number"),
+        ({"cones": 3.5}, errors.OptionError, "cones must be vertices"),
+        ({"cones": None}, errors.OptionError, "not NoneType"),
+        ({"cones": {10**30: 1.0}}, errors.OptionError, "whole number"),
+        ({"cones": [True, False]}, errors.OptionError, "whole number"),
         ({"cones": {1: 2.0, 2: None}}, errors.OptionError, "vertex 2 has none"),
         ({"cones": {1: float("nan")}}, errors.OptionError, "curvature of cone 1 is nan"),
         ({"cones": {1: 2.0, 2: 3.0}}, errors.CurvatureError, r"must sum to 2 pi chi = 12\.56637"),
@@ -163,6 +169,67 @@ def test_triangles_without_area_are_opened_and_reported():
     assert "Opened 2 triangles without area" in result.notes[0]
     with pytest.raises(errors.DegenerateFaceError, match="2 triangles without area"):
         flatten(vertices, faces, strict=True)
+    # The message has the input's own numbers, in whatever component they are.
+    apart = shapes.join(SHAPES["sphere"], (vertices, faces))
+    bad = 1280 + np.flatnonzero(np.isin(faces, [24, 25]).sum(axis=1) == 2)
+    assert f"({bad[0]}, {bad[1]})" in flatten(*apart).notes[0]
+
+
+def test_flat_corners_count_as_without_area():
+    """A vertex on the side of its triangle makes an area of rounding's size, whatever its sign."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        a, b, c = rng.normal(size=(3, 3))
+        t = rng.uniform(0.2, 0.8)
+        vertices = np.array([a, b, (1 - t) * a + t * b, c])
+        with pytest.raises(errors.DegenerateFaceError, match="1 triangle without area: 0"):
+            flatten(vertices, [[0, 1, 2], [1, 0, 3]], strict=True)
+
+
+def test_components_without_area_do_not_spoil_the_rest():
+    vertices, faces = SHAPES["sphere"]
+    line = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 0], [2, 2, 2], [2, 2, 2], [2, 2, 2.0]])
+    result = flatten(np.r_[vertices, line], np.r_[faces, [[642, 643, 644], [645, 646, 647]]])
+    assert "Opened 2 triangles without area (1280, 1281)" in result.notes[-1]
+    assert result.distortion.charts == 3
+    assert np.isfinite(result.uv).all()
+    with pytest.raises(errors.DegenerateFaceError, match="no area: 1,280 triangles on a line"):
+        flatten(vertices * [1, 0, 0], faces)
+
+
+@pytest.mark.parametrize("scale", [1e-150, 1e-80, 1e100, 1e160, 1e300])
+def test_any_unit_of_length_will_do(scale):
+    vertices, faces = SHAPES["sphere"]
+    base, scaled = flatten(vertices, faces), flatten(vertices * scale, faces)
+    same(scaled, base)
+    np.testing.assert_array_equal(scaled.vertices, vertices * scale)
+    assert scaled.uv_scale == pytest.approx(base.uv_scale / scale, rel=1e-6)
+
+
+def test_mirror_images_are_told_apart():
+    """On a symmetric shape every choice ties; it must not hang on the numbering or on rounding."""
+    vertices, faces = shapes.sphere(3)
+    vertices = vertices * (
+        1 + 0.3 * vertices[:, :1] ** 2 + 0.2 * np.cos(4 * vertices[:, 2:]) * vertices[:, :1]
+    )
+    vertices[:, 1] = np.where(np.abs(vertices[:, 1]) < 1e-12, 0, vertices[:, 1])
+    base = flatten(vertices, faces, epsilon=0.5)
+    new_vertices, new_faces, new = shapes.renumber(vertices @ shapes.rotation().T, faces)
+    turned = flatten(new_vertices, new_faces, epsilon=0.5)
+    assert set(turned.cones.tolist()) == set(new[base.cones].tolist())
+    same(turned, base)
+
+
+def test_extreme_metrics_are_refused_in_one_line():
+    with pytest.raises(errors.MetricError, match="more than numbers can hold"):
+        flatten(*shapes.hill(20, 20), cones={200: 1.0, 220: -1e6}, metric="linear")
+
+
+def test_search_for_very_many_cones_ends():
+    vertices, faces = SHAPES["sphere"]
+    result = flatten(vertices, faces, epsilon=1e-3, metric="linear")
+    assert len(result.cones) > 256  # so that it has started over from its cones
+    assert np.ptp(result.log_scale) < 1e-3
 
 
 def test_meshes_of_other_packages():
@@ -190,6 +257,11 @@ def test_meshes_of_other_packages():
         assert len(flatten(mesh).faces) == 4
     with pytest.raises(errors.ArrayShapeError, match="its cells are: tetra"):
         flatten(meshio.Mesh(vertices, [("tetra", [[0, 1, 2, 3]])]))
+    flat_mesh = meshio.Mesh(flat[:, :2], [("quad", quads)])
+    assert len(flatten(flat_mesh).faces) == 4
+    for broken in ([-1, 0, 1], [3, 0, 1, 2, 4, 0, 1, 2], [0, 3, 0, 1, 2]):
+        with pytest.raises(errors.ArrayShapeError, match="flat array of faces is broken at"):
+            flatten(type("PolyData", (), {"points": vertices, "faces": np.array(broken)})())
     with pytest.raises(errors.ArrayShapeError, match="cannot read a mesh from int"):
         flatten(3)
 

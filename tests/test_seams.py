@@ -5,7 +5,7 @@ import pytest
 import shapes
 
 from coneflat import TriangleMesh, cut_open, errors, find_seams
-from coneflat.seams.paths import MultiGraph
+from coneflat.graph import MultiGraph
 from coneflat.seams.steiner import steiner_tree
 
 SURFACES = {

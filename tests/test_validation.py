@@ -62,6 +62,11 @@ def test_isolated_vertices_are_left_out():
     assert checked.notes == ("Left out 2 vertices without a face.",)
 
 
+def test_vertices_without_a_face_may_be_anywhere():
+    result = flatten(np.r_[V, [[np.nan, 0, 0]]], F)
+    assert np.isfinite(result.uv).all()
+
+
 def test_touching_surfaces_are_refused_or_split():
     vertices, faces = shapes.join(shapes.tetrahedron(), shapes.tetrahedron())
     faces[faces == 4] = 0

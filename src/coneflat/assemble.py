@@ -20,29 +20,29 @@ from .stages import Stages
 from .validation import CheckedMesh
 
 if TYPE_CHECKING:
-    from .pipeline import Piece
+    from .methods import LaidOut
 
 
 def assemble(
     given: InputMesh,
     checked: CheckedMesh,
     parts: Sequence[tuple[TriangleMesh, IntArray, IntArray]],
-    pieces: Sequence[Piece],
+    laid_out: Sequence[LaidOut],
     options: Options,
     stages: Stages,
+    notes: tuple[str, ...],
 ) -> Flattening:
     """Arrange the pieces in the unit square, number everything as in the input, and measure.
 
     Args:
         given, checked: the input, and what the check made of it.
         parts: for each component its mesh, and its vertices and faces in the checked mesh.
-        pieces: the flattened components.
-        options, stages: what the result tells about itself.
+        laid_out: the flattened components.
+        options, stages, notes: what the result tells about itself.
     """
     points = np.asarray(given.vertices, dtype=np.float64)
     number, vertex_origin = result_numbering(checked, len(points))
-    numbers, positions = _number_vertices(number, points[vertex_origin], parts, pieces)
-    laid_out = [piece.laid_out for piece in pieces]
+    numbers, positions = _number_vertices(number, points[vertex_origin], parts, laid_out, checked.exponent)
     face_origin = np.concatenate(
         [faces[one.face_origin] for (_, _, faces), one in zip(parts, laid_out, strict=True)]
     )
@@ -65,14 +65,11 @@ def assemble(
 
     target = spread([one.target for one in laid_out])
     residual = target - spread([one.curvature for one in laid_out])
-    cones = np.concatenate([ids[piece.cones] for ids, piece in zip(numbers, pieces, strict=True)])
+    cones = np.concatenate([ids[one.cones] for ids, one in zip(numbers, laid_out, strict=True)])
     with stages("measure"):
-        distortion = measure(
-            TriangleMesh(positions, faces),
-            uv[corners],
-            curvature_errors(residual[np.isfinite(residual)]),
-            cones,
-        )
+        scaled = TriangleMesh(np.ldexp(positions, checked.exponent), faces)
+        errors = curvature_errors(residual[np.isfinite(residual)])
+        distortion = measure(scaled, uv[corners], errors, cones)
     refined = any(one.figures.refined_triangles for one in laid_out)
     face_corners = (
         None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
@@ -82,7 +79,7 @@ def assemble(
         faces=faces,
         uv=uv,
         uv_faces=corners,
-        uv_scale=scale,
+        uv_scale=float(np.ldexp(scale, checked.exponent)),
         cones=cones,
         curvatures=target[cones],
         log_scale=spread([one.log_scale for one in laid_out]),
@@ -90,7 +87,7 @@ def assemble(
         seams=np.concatenate([ids[one.seams] for ids, one in zip(numbers, laid_out, strict=True)]),
         distortion=distortion,
         seconds=dict(stages.seconds),
-        notes=checked.notes + tuple(piece.note for piece in pieces if piece.note),
+        notes=checked.notes + notes,
         settings=options.as_dict(),
         solve=SolveFigures.of_all(one.figures for one in laid_out),
         vertex_origin=np.concatenate([vertex_origin, np.full(len(positions) - len(vertex_origin), -1)]),
@@ -104,16 +101,17 @@ def _number_vertices(
     number: IntArray,
     positions: FloatArray,
     parts: Sequence[tuple[TriangleMesh, IntArray, IntArray]],
-    pieces: Sequence[Piece],
+    laid_out: Sequence[LaidOut],
+    exponent: int,
 ) -> tuple[list[IntArray], FloatArray]:
-    """Return the number in the result of each vertex of each piece, and the positions of all.
+    """Return the number in the result of each vertex of each component, and the positions of all.
 
     Vertices that a refinement added come last.
     """
     numbers, blocks, count = [], [positions], len(positions)
-    for (_, vertices, _), piece in zip(parts, pieces, strict=True):
-        added = piece.laid_out.mesh.vertices[len(vertices) :]
+    for (_, vertices, _), one in zip(parts, laid_out, strict=True):
+        added = one.mesh.vertices[len(vertices) :]
         numbers.append(np.concatenate([number[vertices], np.arange(count, count + len(added))]))
-        blocks.append(added)
+        blocks.append(np.ldexp(added, -exponent))
         count += len(added)
     return numbers, np.concatenate(blocks)

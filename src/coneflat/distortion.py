@@ -13,7 +13,7 @@ ZERO_AREA = 1e-12  # twice the area over the longest side squared: no digit of t
 JOINED = 1e-6  # UV distance over UV edge length at which two sides of an edge count as one
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Distortion:
     """Quality of a flattening.
 

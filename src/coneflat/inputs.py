@@ -14,7 +14,7 @@ from .errors import ArrayShapeError
 from .io import MeshFile, is_polygon_side, read_mesh, triangulate
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class InputMesh:
     """Triangles to flatten, and the polygons they are parts of.
 
@@ -91,13 +91,23 @@ def _from_pyvista(mesh: Any) -> InputMesh:
     position = 0
     while position < padded.size:
         size = int(padded[position])
-        polygons.append(padded[position + 1 : position + 1 + size].tolist())
-        position += 1 + size
+        end = position + 1 + size
+        if size < 1 or end > padded.size:
+            raise ArrayShapeError(
+                f"the flat array of faces is broken at {position}: a face of {size} corners with "
+                f"{padded.size - position - 1} numbers left"
+            )
+        polygons.append(padded[position + 1 : end].tolist())
+        position = end
     return _from_polygons(mesh.points, polygons)
 
 
 def _from_polygons(points: ArrayLike, polygons: list[list[int]]) -> InputMesh:
     vertices = np.asarray(points, dtype=np.float64)
+    if vertices.ndim == 2 and vertices.shape[1] == 2:  # meshes of the plane
+        vertices = np.column_stack([vertices, np.zeros(len(vertices))])
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise ArrayShapeError(f"points must have the shape (n, 3), not {vertices.shape}")
     offsets = np.concatenate([[0], np.cumsum([len(polygon) for polygon in polygons])]).astype(np.int64)
     corners = np.array([v for polygon in polygons for v in polygon], dtype=np.int64)
     return InputMesh(vertices, triangulate(vertices, corners, offsets)[0])

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
 from ._arrays import BoolArray, FloatArray, IntArray
 from .errors import OptionError
+from .mesh import TriangleMesh
 from .validation import CheckedMesh
 
 
@@ -27,6 +29,14 @@ def result_numbering(checked: CheckedMesh, input_count: int) -> tuple[IntArray, 
 
 
 Values = TypeVar("Values", IntArray, BoolArray)
+
+
+def at_unit_size(checked: CheckedMesh) -> CheckedMesh:
+    """Return the mesh scaled by a power of two, which rounds nothing, so that squares of lengths are no extremes."""
+    size = float(np.abs(checked.mesh.vertices).max())
+    exponent = -int(np.frexp(size)[1])
+    mesh = TriangleMesh(np.ldexp(checked.mesh.vertices, exponent), checked.mesh.faces)
+    return replace(checked, mesh=mesh, exponent=exponent)
 
 
 def turn_corners(checked: CheckedMesh, per_corner: Values) -> Values:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -17,8 +17,8 @@ LENGTH_RULES = ("integral", "mean")
 AT_CONES = ("auto", "scale", "curvature")
 BOUNDARIES = ("free", "lengths", "disk")
 
-Cones = str | Mapping[int, float] | Iterable[int]
-Boundary = str | Mapping[int, float] | Iterable[int]
+Cones = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
+Boundary = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
 
 #: The published method: `flatten(mesh, **PAPER)`.
 PAPER: Mapping[str, Any] = {
@@ -81,11 +81,7 @@ class Options:
         epsilon = _number("epsilon", self.epsilon)
         if not 0 < epsilon < math.inf:
             raise OptionError(f"epsilon must be a positive number, not {epsilon:g}")
-        if self.max_cones is not None and (
-            isinstance(self.max_cones, bool) or self.max_cones != _whole("max_cones", self.max_cones)
-        ):
-            raise OptionError(f"max_cones must be a whole number, not {self.max_cones!r}")
-        if self.max_cones is not None and self.max_cones < 0:
+        if self.max_cones is not None and _whole("max_cones", self.max_cones) < 0:
             raise OptionError(f"max_cones cannot be negative ({self.max_cones})")
 
     @property
@@ -108,7 +104,7 @@ class Options:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the options as plain values, given cones and corners as a map to curvature or None."""
-        values = asdict(self)
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
         for name, given in (("cones", values.pop("given_cones")), ("boundary", values.pop("corners"))):
             if not isinstance(values[name], str):
                 values[name] = given
@@ -129,24 +125,28 @@ def _number(name: str, value: object) -> float:
 
 def _whole(name: str, value: object) -> int:
     number = _number(name, value)
-    if not number.is_integer():
+    if isinstance(value, (bool, np.bool_)) or not number.is_integer() or abs(number) >= 2**62:
         raise OptionError(f"{name} must be a whole number, not {value!r}")
     return int(number)
 
 
-def _given_vertices(noun: str, vertices: Mapping[int, float] | Iterable[int]) -> dict[int, float | None]:
+def _given_vertices(noun: str, vertices: object) -> dict[int, float | None]:
     """Return vertex -> curvature, None where it is to be computed: for all or for none."""
     if isinstance(vertices, Mapping):
         given: dict[int, float | None] = {
             _whole(f"a {noun}'s vertex", v): None if k is None else _number(f"a {noun}'s curvature", k)
             for v, k in vertices.items()
         }
-    else:
-        listed = [_whole(f"a {noun}'s vertex", v) for v in np.asarray(vertices).ravel().tolist()]
+    elif isinstance(vertices, Iterable):
+        listed = [_whole(f"a {noun}'s vertex", v) for v in np.ravel(list(vertices)).tolist()]
         given = dict.fromkeys(listed)
         if len(given) < len(listed):
             twice = next(v for v in listed if listed.count(v) > 1)
             raise OptionError(f"vertex {twice} is given as a {noun} twice")
+    else:
+        raise OptionError(
+            f"{noun}s must be vertices, or a map from vertex to curvature, not {type(vertices).__name__}"
+        )
     unknown = [v for v, k in given.items() if k is None]
     if unknown and len(unknown) < len(given):
         raise OptionError(

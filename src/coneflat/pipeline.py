@@ -13,6 +13,7 @@ from ._arrays import BoolArray, FloatArray, IntArray
 from .assemble import assemble
 from .cones import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
 from .conformal.boundary import prescribed_boundary
+from .errors import CurvatureError
 from .geometry import (
     angle_defect,
     corner_angles,
@@ -21,10 +22,11 @@ from .geometry import (
     edge_lengths,
     mollify,
 )
+from .geometry.ties import tie_key
 from .inputs import as_input
 from .mesh import TriangleMesh
 from .methods import ExactChoices, FlatMetric, LaidOut, exact_flattening, linear_flattening
-from .numbering import locate, select, turn_corners
+from .numbering import at_unit_size, locate, select, turn_corners
 from .options import Boundary, Cones, Options
 from .result import Flattening
 from .seams import cut_open, find_seams
@@ -99,38 +101,48 @@ def flatten(
     stages = Stages(progress)
     with stages("check"):
         given = as_input(mesh, faces)
-        checked = check_mesh(given.vertices, given.faces, repair=repair)
+        checked = at_unit_size(check_mesh(given.vertices, given.faces, repair=repair))
+        lengths, note = mollify(
+            edge_lengths(checked.mesh.vertices, checked.mesh.faces), strict=strict, names=checked.face_origin
+        )
         is_diagonal = turn_corners(checked, ~given.is_side())
         given_cones = locate(checked, "cone", options.given_cones)
         corners = locate(checked, "corner", options.corners)
         parts = checked.mesh.split_components()
     pieces = []
-    done = 0
     for part, vertices, part_faces in parts:
-        stages.fraction = done / len(checked.mesh.faces)
         given_here = Given(
+            lengths[part_faces],
             *select(given_cones, vertices),
             *select(corners, vertices),
             is_diagonal[part_faces],
             checked.vertex_origin[vertices],
         )
-        pieces.append(flatten_component(part, given_here, options, stages))
-        done += len(part_faces)
-    stages.fraction = 1.0
-    return assemble(given, checked, parts, pieces, options, stages)
+        stages.share = len(part_faces) / len(checked.mesh.faces)
+        try:
+            pieces.append(flatten_component(part, given_here, options, stages))
+        except CurvatureError as error:
+            if len(parts) == 1:
+                raise
+            where = f"in the component of vertex {given_here.names[0]} ({len(part_faces):,} triangles)"
+            raise CurvatureError(f"{where}: {error}") from error
+        stages.done += stages.share
+    return assemble(given, checked, parts, pieces, options, stages, () if note is None else (note,))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Given:
     """What the input says about a component.
 
     Attributes:
+        lengths: (m, 3) side lengths, with which every triangle has area.
         cones, cone_curvatures: (s,) vertices and radians; NaN where the curvature is to be computed.
         corners, corner_curvatures: (c,) the same of corners of the boundary.
         is_diagonal: (m, 3) sides inside a polygon of the input, which should not be cut.
         names: (n,) what the user calls each vertex.
     """
 
+    lengths: FloatArray
     cones: IntArray
     cone_curvatures: FloatArray
     corners: IntArray
@@ -139,50 +151,46 @@ class Given:
     names: IntArray
 
 
-@dataclass(frozen=True)
-class Piece:
-    """One connected component, flattened.
-
-    Attributes:
-        laid_out: its layout.
-        cones: (s,) vertices.
-        note: what was done to triangles without area, if anything.
-    """
-
-    laid_out: LaidOut
-    cones: IntArray
-    note: str | None
-
-
-def flatten_component(mesh: TriangleMesh, given: Given, options: Options, stages: Stages) -> Piece:
+def flatten_component(mesh: TriangleMesh, given: Given, options: Options, stages: Stages) -> LaidOut:
     """Flatten a connected mesh to one disk."""
-    with stages("cones"):
-        lengths, note = mollify(edge_lengths(mesh.vertices, mesh.faces), strict=options.strict)
+    lengths = given.lengths
+    with stages("cones", 0.4):
         curvature = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
         laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths), len(mesh.vertices))
-        solution = find_cones(mesh, laplacian, curvature, given, options)
+        solution = find_cones(mesh, laplacian, curvature, given, options, stages)
 
-    with stages("metric"):
-        metric = find_metric(mesh, lengths, solution, given, options)
+    with stages("metric", 0.75):
+        metric = find_metric(mesh, solution, given, options)
 
-    with stages("cut"):
+    with stages("cut", 0.85):
         edge_costs = lengths.ravel()[mesh.edge_halfedges[:, 0]]
         avoided = np.zeros(len(mesh.edges), dtype=bool)
         avoided[mesh.halfedge_edges[given.is_diagonal.ravel()]] = True
         seams = find_seams(mesh, solution.cones, edge_costs, avoided)
         disk = cut_open(mesh, seams).mesh
 
-    with stages("layout"):
-        return Piece(metric.lay_out(disk, seams), solution.cones, note)
+    with stages("layout", 1.0):
+        return metric.lay_out(disk, seams)
 
 
 def find_cones(
-    mesh: TriangleMesh, laplacian: csc_matrix, curvature: FloatArray, given: Given, options: Options
+    mesh: TriangleMesh,
+    laplacian: csc_matrix,
+    curvature: FloatArray,
+    given: Given,
+    options: Options,
+    stages: Stages,
 ) -> ConeSolution:
     """Return cones with their curvatures and linear log scale by the method that the options name."""
     surface = laplacian, curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     if options.method == "greedy":
-        solution = greedy_cones(*surface, epsilon=options.epsilon, max_cones=options.max_cones)
+        solution = greedy_cones(
+            *surface,
+            epsilon=options.epsilon,
+            max_cones=options.max_cones,
+            tie_key=tie_key(mesh.vertices),
+            progress=stages.tell,
+        )
     elif len(given.cones) and np.isfinite(given.cone_curvatures).all():
         solution = cones_with_curvature(*surface, given.cones, given.cone_curvatures)
     else:
@@ -190,14 +198,16 @@ def find_cones(
     if options.scale_at_cones and options.metric == "exact":
         check_enough(len(solution.cones), mesh)
     else:
-        check_feasible(solution.cones, solution.curvatures, given.names, "add cones or move them")
+        advice = (
+            "allow more of them (--max-cones)" if options.method == "greedy" else "add cones or move them"
+        )
+        check_feasible(solution.cones, solution.curvatures, given.names, advice)
     return solution
 
 
-def find_metric(
-    mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, given: Given, options: Options
-) -> FlatMetric:
+def find_metric(mesh: TriangleMesh, solution: ConeSolution, given: Given, options: Options) -> FlatMetric:
     """Return the flat metric that the options name."""
+    lengths = given.lengths
     if options.metric == "linear":
         return linear_flattening(mesh, lengths, solution, options.length_rule)
     is_prescribed = options.boundary_kind == "disk" or len(given.corners) > 0

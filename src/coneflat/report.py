@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,7 +35,7 @@ MEASURES = (
 def as_dict(result: Flattening) -> dict[str, Any]:
     """Return every measure as plain values; what is not finite becomes None, so that it is valid JSON."""
     report: dict[str, Any] = {
-        "input": str(result.source.path) if result.source else None,
+        "input": _printable(result.source.path) if result.source else None,
         "vertices": len(result.vertices),
         "triangles": len(result.faces),
         "cones": len(result.cones),
@@ -59,6 +61,11 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def _printable(path: Path) -> str:
+    """Return a path as text that is valid in any encoding, whatever bytes its name has."""
+    return os.fsencode(path).decode("utf-8", "replace")
+
+
 def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
     """Return (measure, value, meaning) rows of the table that the commands print."""
     d = result.distortion
@@ -75,7 +82,7 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
         )
     added = f"; {solve.refined_triangles:,} more by the refinement" if solve.refined_triangles else ""
     return [
-        ("triangles", f"{len(result.faces):,}", f"{len(result.vertices):,} vertices{added}"),
+        ("triangles", f"{len(result.faces):,}", f"{len(np.unique(result.faces)):,} vertices{added}"),
         ("cones", cones, "singular vertices, and their curvatures"),
         (
             "curvature error",

@@ -14,7 +14,7 @@ from .figures import SolveFigures
 from .io.model import MeshFile
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Flattening:
     """A flattened mesh: n vertices, m triangles, u points in the plane.
 

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+#: Called with what is being done and the fraction of the whole that is done.
 Progress = Callable[[str, float], None]
 
 
@@ -14,20 +15,35 @@ class Stages:
 
     Attributes:
         seconds: wall time of each stage so far, in order of first appearance.
+        done: fraction of the whole that is done before the part at hand.
+        share: fraction of the whole that the part at hand makes up.
     """
 
     def __init__(self, progress: Progress | None = None) -> None:
         self.seconds: dict[str, float] = {}
-        self.fraction = 0.0
+        self.done = 0.0
+        self.share = 0.0
+        self._name = ""
+        self._within = 0.0
         self._progress = progress
 
     @contextmanager
-    def __call__(self, name: str) -> Iterator[None]:
-        """Time the block as the named stage; stages of one name add up."""
-        if self._progress is not None:
-            self._progress(name, self.fraction)
+    def __call__(self, name: str, until: float = 0.0) -> Iterator[None]:
+        """Time the block as the named stage; stages of one name add up.
+
+        until: roughly the fraction of the part at hand that is done when the stage ends.
+        """
+        self._name = name
+        self.tell()
         start = time.perf_counter()
         try:
             yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+        self._within = until if until < 1 else 0.0
+
+    def tell(self, detail: str = "") -> None:
+        """Tell the listener what is being done, with a detail about the stage."""
+        if self._progress is not None:
+            text = f"{self._name}: {detail}" if detail else self._name
+            self._progress(text, min(self.done + self.share * self._within, 1.0))

@@ -17,13 +17,14 @@ from .errors import (
     NonManifoldError,
     NonOrientableError,
 )
+from .graph import MultiGraph
 from .mesh import NEXT, PREVIOUS, TriangleMesh, corner_fans, label_components
 from .text import list_some, plural
 
 REPAIR_ADVICE = "run with --repair (repair=True)"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CheckedMesh:
     """A mesh that can be flattened, and how it came from the input.
 
@@ -33,6 +34,7 @@ class CheckedMesh:
         face_origin: (m,) the input face of each of its faces.
         is_turned: (m,) True for faces whose orientation was reversed (corners 1 and 2 exchanged).
         notes: what was done, one sentence each.
+        exponent: the mesh has been scaled by two to the power of this.
     """
 
     mesh: TriangleMesh
@@ -40,6 +42,7 @@ class CheckedMesh:
     face_origin: IntArray
     is_turned: BoolArray
     notes: tuple[str, ...]
+    exponent: int = 0
 
 
 def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -> CheckedMesh:
@@ -61,7 +64,8 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -
     """
     points = _as_vertices(vertices)
     triangles = _as_faces(faces, len(points))
-    work = _Repair(points, triangles, repair)
+    _require_finite(points, triangles)
+    work = _Check(points, triangles, repair)
     work.drop_degenerate_faces()
     work.pair_halfedges()
     work.orient()
@@ -81,12 +85,6 @@ def _as_vertices(vertices: ArrayLike) -> FloatArray:
         raise EmptyMeshError("the mesh has no vertices")
     if points.ndim != 2 or points.shape[1] != 3:
         raise ArrayShapeError(f"vertices must have the shape (n, 3), not {points.shape}")
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if len(bad):
-        raise NonFiniteError(
-            f"{plural(len(bad), 'vertex', 'vertices')} of {len(points)} with NaN or infinite coordinates: "
-            f"{list_some(bad)}; remove or mend them"
-        )
     return points
 
 
@@ -115,8 +113,23 @@ def _as_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
     return triangles
 
 
-class _Repair:
-    """The faces on their way to a manifold, with a record of what happened to them."""
+def _require_finite(points: FloatArray, triangles: IntArray) -> None:
+    """Raise NonFiniteError if a face has a vertex that is nowhere; vertices without a face do not matter."""
+    is_bad: BoolArray = np.any(~np.isfinite(points), axis=1)
+    if is_bad.any():
+        bad = np.unique(triangles[is_bad[triangles]])
+        if len(bad):
+            raise NonFiniteError(
+                f"{plural(len(bad), 'vertex', 'vertices')} of {len(points):,} with NaN or infinite coordinates: "
+                f"{list_some(bad)}; remove or mend them"
+            )
+
+
+class _Check:
+    """The faces on their way to a manifold, with a record of what happened to them.
+
+    The steps build on one another and run in the order in which they stand here.
+    """
 
     def __init__(self, vertices: FloatArray, faces: IntArray, repair: bool) -> None:
         self.vertices = vertices
@@ -178,8 +191,6 @@ class _Repair:
 
     def orient(self) -> None:
         """Turn faces so that neighbours agree, the fewest of each component."""
-        from .seams.paths import MultiGraph
-
         count = len(self.faces)
         tails = self.faces[:, NEXT].ravel()
         same_way = tails[self.pairs[:, 0]] == tails[self.pairs[:, 1]]

@@ -16,8 +16,9 @@ from rich.table import Table
 from ..report import as_rows
 from ..result import Flattening
 
-PATIENCE = 1.0  # seconds before a plain line says what is going on
+PATIENCE = 1.0  # seconds between the plain lines that say what is going on
 PLAIN_WIDTH = 110
+EXTREME_QC = 2.0  # far from conformal, on average
 
 
 class Console:
@@ -26,11 +27,12 @@ class Console:
     def __init__(self, quiet: bool) -> None:
         self.quiet = quiet
         self._start = time.perf_counter()
+        self._last_line = 0.0
         self._bar: Progress | None = None
         if not quiet and sys.stderr.isatty():
             self._bar = Progress(
                 SpinnerColumn(),
-                TextColumn("{task.description:8}"),
+                TextColumn("{task.description:28}"),
                 BarColumn(),
                 TimeElapsedColumn(),
                 console=RichConsole(stderr=True),
@@ -50,13 +52,13 @@ class Console:
             self._bar.stop()
 
     def progress(self, stage: str, fraction: float) -> None:
-        """Show the stage that begins, and the fraction of triangles that are done."""
+        """Show what is being done, and the fraction of the whole that is done."""
         elapsed = time.perf_counter() - self._start
         if self._bar:
             self._bar.update(self._task, description=stage, completed=fraction)
-        elif not self.quiet and elapsed > PATIENCE:
-            done = f"  ({fraction:.0%} of triangles done)" if 0 < fraction < 1 else ""
-            click.echo(f"{elapsed:6.1f} s  {stage}{done}", err=True)
+        elif not self.quiet and elapsed - self._last_line > PATIENCE:
+            self._last_line = elapsed
+            click.echo(f"{elapsed:6.1f} s  {fraction:4.0%}  {stage}", err=True)
 
     def finish(self, result: Flattening, written: Sequence[Path]) -> None:
         """Print notes, measures, where the time went, and what was written."""
@@ -82,10 +84,20 @@ class Console:
         self._warn(out, result)
 
     def _warn(self, out: RichConsole, result: Flattening) -> None:
-        bad = result.distortion.flipped + result.distortion.degenerate
+        measures, solve = result.distortion, result.solve
+        bad = measures.flipped + measures.degenerate
         if bad:
+            broken = (
+                f"; {solve.broken:,} break the triangle inequality in this metric" if solve.broken else ""
+            )
             out.print(
-                f"warning: {bad} of {len(result.faces):,} triangles are flipped or collapsed in the plane; "
-                f"{result.solve.broken} break the triangle inequality in this metric",
+                f"warning: {bad:,} of {len(result.faces):,} triangles are flipped or collapsed in the plane{broken}",
                 style="yellow",
+                soft_wrap=True,
+            )
+        if measures.qc_mean > EXTREME_QC:
+            out.print(
+                f"warning: the mean QC distortion of {measures.qc_mean:.3g} is extreme; more cones would lower it",
+                style="yellow",
+                soft_wrap=True,
             )

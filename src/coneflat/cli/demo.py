@@ -21,15 +21,15 @@ def demo(output: Path, quiet: bool) -> None:
     """Flatten the sample that comes with coneflat; write the textured mesh, its report and a picture."""
     from ..errors import MeshFileError
     from ..sample import sample_path
+    from ..view import demo_figure, new_figure, save_figure
     from .run import run
 
+    new_figure(1, 1)  # says what is missing before the work
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise MeshFileError(f"cannot make the folder {output}: {error.strerror}") from error
     result = run(sample_path(), output / "sample.obj", {}, report=output / "sample.json", quiet=quiet)
-
-    from ..view import demo_figure, save_figure
 
     picture = output / "sample.png"
     save_figure(demo_figure(result), picture)

@@ -45,6 +45,9 @@ def main() -> NoReturn:
         # The reader of our output is gone, as in `coneflat ... | head`; keep the shutdown quiet, too.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = INTERNAL_ERROR
+    except OSError as error:
+        # Files are read and written under errors of our own; what is left is the terminal or pipe.
+        code = _fail(f"cannot print: {error.strerror or error}", INTERNAL_ERROR)
     except MemoryError:
         code = _fail("not enough memory for this mesh", INTERNAL_ERROR)
     except Exception as error:

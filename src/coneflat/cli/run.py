@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -41,8 +42,7 @@ def run(
     check_output(output)
     if report is not None:
         check_target(report)
-    if mesh.exists() and output.exists() and mesh.samefile(output):
-        raise OptionError(f"{output} is the input itself: choose another name for the output")
+    _require_distinct({"input": mesh, "output": output, "report": report})
 
     with Console(quiet) as console:
         stages = Stages(console.progress)
@@ -53,7 +53,7 @@ def run(
         if source.welded:
             note = f"Merged {source.welded:,} vertices at the same positions."
             result = replace(result, notes=(note, *result.notes))
-        stages.fraction = 1.0
+        stages.done = 1.0
         with stages("write"):
             result.save(output)
         result = replace(result, seconds=dict(stages.seconds))
@@ -63,3 +63,17 @@ def run(
                 file.write("\n")
         console.finish(result, [path for path in (output, report) if path is not None])
     return result
+
+
+def _require_distinct(files: Mapping[str, Path | None]) -> None:
+    """Raise OptionError if two names mean one file, of which one would overwrite the other."""
+    seen: dict[str, str] = {}
+    for role, path in files.items():
+        if path is None:
+            continue
+        where = os.path.normcase(os.path.realpath(path))
+        if where in seen:
+            raise OptionError(
+                f"{path} is the {seen[where]} and the {role}: choose another name for one of them"
+            )
+        seen[where] = role

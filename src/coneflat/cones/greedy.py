@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.sparse import csc_matrix
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import CurvatureError, OptionError
+from ..geometry.ties import argmax_tied
 from .solution import FULL_TURN, ConeSolution, GroundedLaplacian, target_from_log_scale
 
 
@@ -19,6 +22,8 @@ def greedy_cones(
     *,
     epsilon: float = 1.0,
     max_cones: int | None = None,
+    tie_key: FloatArray | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> ConeSolution:
     """Find cones for a connected mesh by the greedy search of the paper.
 
@@ -32,6 +37,8 @@ def greedy_cones(
         euler_characteristic: chi of the mesh.
         epsilon: stop when max(phi) - min(phi) is at most this.
         max_cones: stop at this many cones; None for no limit.
+        tie_key: (n,) decides between vertices that are equal but for rounding, as on symmetric meshes.
+        progress: called with how far the search is, before each step.
 
     Raises:
         OptionError: epsilon is not positive, or max_cones is negative.
@@ -41,13 +48,19 @@ def greedy_cones(
         raise OptionError(f"epsilon must be positive, not {epsilon:g}")
     if max_cones is not None and max_cones < 0:
         raise OptionError(f"the maximum number of cones cannot be negative ({max_cones})")
-    search = _Search(laplacian, curvature, is_boundary, euler_characteristic, max_cones)
+    search = _Search(laplacian, curvature, is_boundary, euler_characteristic, max_cones, tie_key)
     while True:
+        if progress is not None:
+            progress(f"{len(search.cones)} so far, spread {np.ptp(search.phi):.3g}")
         chosen = search.next_pair(epsilon)
         if not chosen:
             break
         search.add(chosen)
     return search.solution()
+
+
+# Green's functions that are kept. More would cost more than the factorization that makes them needless.
+MOST_COLUMNS = 256
 
 
 class _Search:
@@ -60,7 +73,9 @@ class _Search:
         is_boundary: BoolArray,
         euler_characteristic: int,
         max_cones: int | None,
+        tie_key: FloatArray | None,
     ) -> None:
+        self.tie_key = np.zeros(len(curvature)) if tie_key is None else tie_key
         self.laplacian = laplacian
         self.curvature = curvature
         self.is_singular = is_boundary.copy()
@@ -70,7 +85,7 @@ class _Search:
         self.floating = not is_boundary.any() and euler_characteristic == 0
         if not is_boundary.any():
             sign = -1.0 if euler_characteristic < 0 else 1.0
-            pin = int(np.argmax(sign * curvature))
+            pin = argmax_tied(sign * curvature, self.tie_key)
             grounded[pin] = True
             if not self.floating:
                 self._require_cone(euler_characteristic)
@@ -95,7 +110,7 @@ class _Search:
 
     def next_pair(self, epsilon: float) -> list[int]:
         """Return the vertices of largest and smallest phi, or nothing when the search is over."""
-        top, bottom = int(np.argmax(self.phi)), int(np.argmin(self.phi))
+        top, bottom = argmax_tied(self.phi, self.tie_key), argmax_tied(-self.phi, self.tie_key)
         room = self.limit - len(self.cones)
         if self.floating:
             # On a torus one cone alone has curvature 0 and does nothing: two, or none.
@@ -146,10 +161,19 @@ class _Search:
         self.phi -= g * (self.phi[vertex] / g[vertex])
         self._mark(vertex)
         self.phi[self.cones] = 0.0  # rounding left there would enter max - min
+        if len(self.anchors) == MOST_COLUMNS:
+            self._ground_all()
+            return
         if len(self.anchors) == self.columns.shape[1]:
             self.columns = np.asfortranarray(np.hstack([self.columns, np.empty_like(self.columns)]))
         self.columns[:, len(self.anchors)] = g
         self.anchors.append(vertex)
+
+    def _ground_all(self) -> None:
+        """Start over from all cones so far: one more factorization, and the columns are free again."""
+        self.grounded = GroundedLaplacian(self.laplacian, self.is_singular)
+        self.phi = self.grounded.solve(-self.curvature)
+        self.anchors, self.reference = [], None
 
     def solution(self) -> ConeSolution:
         cones: IntArray = np.array(self.cones, dtype=np.int64)

@@ -16,7 +16,7 @@ from ..text import plural
 FULL_TURN = 2 * np.pi
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ConeSolution:
     """Cones, target curvatures and the log scale that produces them to first order.
 

@@ -11,7 +11,7 @@ from ..errors import CurvatureError
 from ..mesh import TriangleMesh
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BoundaryCurvature:
     """Curvature wanted on the boundary of a connected mesh.
 

@@ -19,7 +19,7 @@ from .newton import ConformalProblem, State, minimize
 SUM_TOLERANCE = 1e-8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ExactMetric:
     """A metric of prescribed curvature, discretely conformal to the input.
 

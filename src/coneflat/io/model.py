@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .obj import ObjText
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeshFile:
     """A mesh read from a file, with its polygons untouched.
 

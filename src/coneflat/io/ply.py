@@ -30,14 +30,14 @@ _STRUCT = {
 _CORNERS = ("vertex_indices", "vertex_index")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Property:
     name: str
     kind: str  # numpy code of the value, or of a list's items
     count: str | None = None  # numpy code of a list's length
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Element:
     name: str
     length: int

@@ -45,6 +45,9 @@ def _write_npz(result: Flattening, stream: IO[bytes], path: Path) -> None:
         "curvature_residual": result.curvature_residual,
         "seams": result.seams,
         "vertex_origin": np.arange(len(result.vertices)) if origin is None else origin,
+        "face_origin": np.arange(len(result.faces)) if result.face_origin is None else result.face_origin,
+        "qc": result.distortion.qc,
+        "log_area_scale": result.distortion.log_area_scale,
         "uv_scale": np.float64(result.uv_scale),
         "report": np.array(json.dumps(result.report())),
     }

@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import dijkstra
 from .._arrays import FloatArray, IntArray
 from ..errors import MetricError
 from ..geometry import corner_angles, is_broken
+from ..geometry.ties import argmax_tied, tie_key
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from ..solver import factorize
 
@@ -30,6 +31,8 @@ def least_squares_layout(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
     Raises:
         MetricError: the system has no finite solution.
     """
+    if not np.isfinite(lengths).all():
+        raise MetricError(f"{int((~np.isfinite(lengths)).sum())} of the metric's lengths are not finite")
     equations = _equations(disk, lengths)
     pins = _pins(disk, lengths)
     normal = csr_matrix(equations.conj().T @ equations)
@@ -81,14 +84,13 @@ def _pins(disk: TriangleMesh, lengths: FloatArray) -> IntArray:
     allowed[disk.faces[is_broken(lengths)]] = False
     if allowed.sum() < 2:
         allowed[:] = True
-    # A start that does not depend on the numbering: the vertex farthest out, inside if possible, since the
-    # two copies of a seam vertex are equally far.
-    offset = ((disk.vertices - disk.vertices.mean(axis=0)) ** 2).sum(axis=1)
+    key = tie_key(disk.vertices)
+    # A start that does not depend on the numbering: far out, and inside, as both copies of a seam vertex are alike.
     inside = allowed & ~disk.is_boundary_vertex
-    pins = [int(np.argmax(np.where(inside if inside.any() else allowed, offset, -1)))]
+    pins = [int(np.argmax(np.where(inside if inside.any() else allowed, key, -np.inf)))]
     for _ in range(2):  # the farthest from there, then the farthest from that
         distance = dijkstra(graph, directed=False, indices=pins[-1])
         distance[~allowed] = -1
         distance[pins[-1]] = -1
-        pins.append(int(np.argmax(distance)))
+        pins.append(argmax_tied(distance, key))
     return np.array(pins[1:])

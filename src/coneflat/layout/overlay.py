@@ -11,7 +11,7 @@ from ..errors import MetricError
 from ..geometry.intrinsic import IntrinsicTriangulation
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Overlay:
     """A triangulation and its flipped edges, drawn tight: x crossings. Flat half-edges are those after the flips.
 

@@ -17,7 +17,7 @@ from .overlay import Overlay
 MOST_CORNERS = 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pieces:
     """r triangles, each in a given triangle and in a flat one.
 

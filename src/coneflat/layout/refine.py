@@ -18,7 +18,7 @@ from .pieces import Pieces, find_pieces
 from .straighten import FlatTriangles
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Refinement:
     """A mesh cut into r triangles along the edges of another triangulation, with a flat metric.
 

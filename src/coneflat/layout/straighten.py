@@ -11,7 +11,7 @@ from ..geometry.intrinsic import IntrinsicTriangulation
 from .complex_arrays import ComplexArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FlatTriangles:
     """Triangles in the plane, each in a frame of its own.
 

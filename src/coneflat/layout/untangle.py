@@ -35,7 +35,7 @@ ARMIJO, HALVINGS = 1e-4, 20
 PARTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Untangled:
     """Flat triangles after untangling.
 

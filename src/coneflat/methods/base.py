@@ -12,7 +12,7 @@ from ..figures import SolveFigures
 from ..mesh import TriangleMesh
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LaidOut:
     """A connected mesh with its layout.
 
@@ -22,6 +22,7 @@ class LaidOut:
         face_origin: (m,) the given face of each of its faces.
         points: (c, 2) points of the plane, model units.
         corners: (m, 3) index into `points` of every triangle corner.
+        cones: (s,) vertices.
         seams: (k, 2) vertex pairs.
         log_scale: (n,) phi; flat lengths are about l * exp(phi).
         target, curvature: (n,) curvature wanted and reached, radians.
@@ -32,6 +33,7 @@ class LaidOut:
     face_origin: IntArray
     points: FloatArray
     corners: IntArray
+    cones: IntArray
     seams: IntArray
     log_scale: FloatArray
     target: FloatArray

@@ -26,7 +26,7 @@ from .base import LaidOut, all_faces
 ROUNDS, ROUND_CHANGE = 15, 1e-3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ExactChoices:
     """What is prescribed for an exact metric, and how it is laid out.
 
@@ -48,7 +48,7 @@ class ExactChoices:
     names: IntArray | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ExactFlatMetric:
     """An exact metric on the mesh.
 
@@ -96,6 +96,7 @@ class ExactFlatMetric:
             face_origin=all_faces(mesh),
             points=unfold(untangled.flat, disk.faces, cut[mesh.halfedge_edges]) * self.shrink,
             corners=disk.faces,
+            cones=self.cones,
             seams=mesh.edges[seams],
             log_scale=solved.log_scale + np.log(self.shrink),
             target=self.target,
@@ -122,6 +123,7 @@ class ExactFlatMetric:
             face_origin=refined.face_origin,
             points=unfold(refined.flat, disk.faces, cut[mesh.halfedge_edges]) * self.shrink,
             corners=disk.faces,
+            cones=self.cones,
             seams=mesh.edges[edges],
             log_scale=refined.log_scale + np.log(self.shrink),
             target=np.concatenate([self.target, np.zeros(len(mesh.vertices) - len(self.target))]),

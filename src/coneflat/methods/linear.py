@@ -9,6 +9,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..cones import ConeSolution
 from ..conformal.linear import scaled_lengths
+from ..errors import MetricError
 from ..figures import SolveFigures
 from ..geometry import angle_defect, corner_angles, double_areas, is_broken
 from ..layout import least_squares_layout
@@ -16,17 +17,19 @@ from ..mesh import TriangleMesh
 from .base import LaidOut, all_faces
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LinearFlatMetric:
     """Nearly flat lengths of the mesh's own triangles.
 
     Attributes:
         mesh: the mesh.
+        cones: (s,) vertices.
         lengths: (m, 3) scaled side lengths, model units.
         log_scale, target: (n,) phi and the curvature it is to give.
     """
 
     mesh: TriangleMesh
+    cones: IntArray
     lengths: FloatArray
     log_scale: FloatArray
     target: FloatArray
@@ -41,6 +44,7 @@ class LinearFlatMetric:
             face_origin=all_faces(self.mesh),
             points=points * np.sqrt(double_areas(self.lengths).sum() / area),
             corners=disk.faces,
+            cones=self.cones,
             seams=self.mesh.edges[seams],
             log_scale=self.log_scale,
             target=self.target,
@@ -61,7 +65,19 @@ def linear_flattening(
         lengths: (m, 3) side lengths, model units.
         solution: cones, target curvatures and the linear log scale.
         rule: as in `scaled_lengths`.
+
+    Raises:
+        MetricError: scales are so far apart that lengths overflow.
     """
-    scaled = scaled_lengths(lengths, mesh.faces, solution.log_scale, rule)
-    shrink = float(np.sqrt(double_areas(lengths).sum() / double_areas(scaled).sum()))
-    return LinearFlatMetric(mesh, scaled * shrink, solution.log_scale + np.log(shrink), solution.target)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        scaled = scaled_lengths(lengths, mesh.faces, solution.log_scale, rule)
+        shrink = float(np.sqrt(double_areas(lengths).sum() / double_areas(scaled).sum()))
+        scaled *= shrink
+    # Layouts square lengths.
+    if not (np.isfinite(scaled).all() and scaled.min() > 1e-150):
+        raise MetricError(
+            f"the scale would vary by a factor of e^{np.ptp(solution.log_scale):.4g} over the mesh, more than numbers "
+            f"can hold: {len(solution.cones)} cones are too few, or their curvatures too extreme"
+        )
+    log_scale = solution.log_scale + np.log(shrink)
+    return LinearFlatMetric(mesh, solution.cones, scaled, log_scale, solution.target)

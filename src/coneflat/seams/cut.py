@@ -11,7 +11,7 @@ from ..errors import MetricError
 from ..mesh import TriangleMesh, corner_fans
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CutMesh:
     """A mesh opened along seams: a topological disk.
 

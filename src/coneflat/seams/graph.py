@@ -12,8 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..geometry.ties import tie_key
+from ..graph import MultiGraph, trace_back
 from ..mesh import TriangleMesh
-from .paths import MultiGraph, trace_back
 from .steiner import SteinerTree, steiner_tree
 
 # Relative: on grids many paths are equally long, and rounding should not choose among them, lest the result
@@ -35,7 +36,8 @@ def find_seams(
         edge_costs: (e,) positive; the length of each edge, say.
         is_forbidden: (e,) edges to cut only if nothing else serves, such as diagonals of polygons.
     """
-    edge_costs = edge_costs * (1 + TIE_BREAK * _remoteness(mesh))
+    key = tie_key(mesh.vertices)
+    edge_costs = edge_costs * (1 + TIE_BREAK * key[mesh.edges].sum(axis=1))
     if is_forbidden is not None and is_forbidden.any():
         edge_costs = np.where(is_forbidden, edge_costs + edge_costs.sum(), edge_costs)
     node_of, node_count, loop_nodes = _contract_loops(mesh)
@@ -44,7 +46,7 @@ def find_seams(
     graph = MultiGraph(node_count, ends[:, 0], ends[:, 1], edge_costs[inside])
 
     terminals = np.union1d(node_of[cones], loop_nodes)
-    tree = steiner_tree(graph, terminals if len(terminals) else _base_point(mesh))
+    tree = steiner_tree(graph, terminals if len(terminals) else _base_point(key))
     handles = _handle_edges(mesh, graph, inside, tree) if mesh.genus() else np.empty(0, dtype=np.int64)
     return inside[_prune(graph, np.union1d(tree.edges, handles), terminals)]
 
@@ -63,16 +65,9 @@ def _contract_loops(mesh: TriangleMesh) -> tuple[IntArray, int, IntArray]:
     return node_of, len(mesh.vertices), representative
 
 
-def _base_point(mesh: TriangleMesh) -> IntArray:
-    """Return where the loops of a surface without terminals meet: the vertex farthest from the centre."""
-    return np.array([np.argmax(((mesh.vertices - mesh.vertices.mean(axis=0)) ** 2).sum(axis=1))])
-
-
-def _remoteness(mesh: TriangleMesh) -> FloatArray:
-    """Return (e,) the squared distance of each edge's ends from the centre, the farthest being 1."""
-    squares = ((mesh.vertices - mesh.vertices.mean(axis=0)) ** 2).sum(axis=1)
-    far: FloatArray = squares[mesh.edges].sum(axis=1)
-    return far / far.max()
+def _base_point(key: FloatArray) -> IntArray:
+    """Return where the loops of a surface without terminals meet: far out."""
+    return np.array([np.argmax(key)])
 
 
 def _handle_edges(mesh: TriangleMesh, graph: MultiGraph, inside: IntArray, tree: SteinerTree) -> IntArray:

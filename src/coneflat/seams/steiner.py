@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from .paths import MultiGraph, trace_back
+from ..graph import MultiGraph, trace_back
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SteinerTree:
     """A tree through terminals.
 

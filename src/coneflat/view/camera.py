@@ -14,7 +14,7 @@ THREE_QUARTERS = (0.55, 0.38, 0.75)
 """The default eye as seen from the model: to the right, up and in front; shows three sides of a box."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Camera:
     """An orthographic view into a picture of `width` by `height` pixels.
 

@@ -29,7 +29,7 @@ SEGMENT_STEP = 2.0
 """Pixels between the places where the visibility of a line is tested."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeshPicture:
     """A picture of a mesh, and what is needed to draw on it.
 

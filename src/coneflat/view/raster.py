@@ -15,7 +15,7 @@ FRAGMENTS_PER_CHUNK = 2_000_000
 """About how many covered pixels are held at once; bounds the memory, not the result."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Coverage:
     """What a picture of h by w pixels sees; row 0 is at the top.
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
-from .._arrays import FloatArray, IntArray
+from ._arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
