@@ -71,6 +71,11 @@ def assemble(
         errors = curvature_errors(residual[np.isfinite(residual)])
         distortion = measure(scaled, uv[corners], errors, cones)
     refined = any(one.figures.refined_triangles for one in laid_out)
+    lost: tuple[str, ...] = ()
+    if refined and given.source is not None:
+        lost = (
+            "The refinement has triangles of its own: polygons, groups and materials of the file are not kept.",
+        )
     face_corners = (
         None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
     )
@@ -87,9 +92,9 @@ def assemble(
         seams=np.concatenate([ids[one.seams] for ids, one in zip(numbers, laid_out, strict=True)]),
         distortion=distortion,
         seconds=dict(stages.seconds),
-        notes=checked.notes + notes,
+        notes=(*checked.notes, *notes, *(note for one in laid_out for note in one.notes), *lost),
         settings=options.as_dict(),
-        solve=SolveFigures.of_all(one.figures for one in laid_out),
+        solve=SolveFigures.of_all([one.figures for one in laid_out], [one.area for one in laid_out]),
         vertex_origin=np.concatenate([vertex_origin, np.full(len(positions) - len(vertex_origin), -1)]),
         face_origin=checked.face_origin[face_origin[order]],
         face_corners=face_corners,

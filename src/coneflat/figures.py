@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,9 @@ class SolveFigures:
         untangled_vertices: vertices that were moved for this.
         untangled_move: their longest way, relative to the mean edge around them.
         refined_triangles: triangles that were added by the common subdivision.
+        area_distortion_linear: E of the linear model that the cones were chosen in: the standard deviation of
+            the log scale, by area.
+        area_distortion: E of the metric that was laid out.
     """
 
     newton_steps: int = 0
@@ -31,16 +36,23 @@ class SolveFigures:
     untangled_vertices: int = 0
     untangled_move: float = 0.0
     refined_triangles: int = 0
+    area_distortion_linear: float = 0.0
+    area_distortion: float = 0.0
 
     @classmethod
-    def of_all(cls, parts: Iterable[SolveFigures]) -> SolveFigures:
-        """Return counts summed and magnitudes maximised over components."""
-        parts = list(parts)
+    def of_all(cls, parts: Sequence[SolveFigures], areas: Sequence[float]) -> SolveFigures:
+        """Return the figures of components together: counts add up, deviations combine by area."""
         values = {}
         for field in fields(cls):
-            every = [getattr(part, field.name) for part in parts]
-            values[field.name] = max(every) if field.name in _MAXIMA else sum(every)
+            every = np.array([getattr(part, field.name) for part in parts])
+            if field.name in _MAXIMA:
+                values[field.name] = every.max().item()
+            elif field.name in _DEVIATIONS:
+                values[field.name] = float(np.sqrt(np.average(every**2, weights=areas)))
+            else:
+                values[field.name] = every.sum().item()
         return cls(**values)
 
 
 _MAXIMA = ("newton_steps", "residual", "untangled_move")
+_DEVIATIONS = ("area_distortion_linear", "area_distortion")

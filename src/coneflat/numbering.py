@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
-from ._arrays import BoolArray, FloatArray, IntArray
-from .errors import OptionError
+from ._arrays import BoolArray, IntArray
 from .mesh import TriangleMesh
 from .validation import CheckedMesh
 
@@ -43,46 +41,3 @@ def turn_corners(checked: CheckedMesh, per_corner: Values) -> Values:
     """Bring values at the input's triangle corners (m, 3) to the faces of the checked mesh."""
     values = per_corner[checked.face_origin]
     return np.where(checked.is_turned[:, None], values[:, [0, 2, 1]], values)
-
-
-def locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) -> tuple[IntArray, FloatArray]:
-    """Return given cones or corners as vertices of the checked mesh, with curvatures, NaN where none is given.
-
-    Args:
-        checked: the mesh.
-        noun: "cone", which must be inside, or "corner", which must be on the boundary.
-        given: input vertex -> curvature or None.
-
-    Raises:
-        OptionError: one is no vertex of the input, has no face, or is not where it must be.
-    """
-    names = np.array(list(given), dtype=np.int64)
-    highest = int(checked.vertex_origin[-1])
-    for name in names[(names < 0) | (names > highest)]:
-        raise OptionError(f"{noun} {name} is no vertex of a face: these are numbered from 0 to {highest}")
-    found = np.searchsorted(checked.vertex_origin, names)
-    for name in names[checked.vertex_origin[found] != names]:
-        raise OptionError(f"{noun} {name} cannot be used: no face uses this vertex")
-    on_boundary = checked.mesh.is_boundary_vertex[found]
-    if noun == "cone":
-        for name in names[on_boundary]:
-            raise OptionError(
-                f"cone {name} lies on the boundary, which takes what curvature it needs: choose inner vertices, "
-                "or prescribe the boundary's curvature (boundary, --corner)"
-            )
-    else:
-        for name in names[~on_boundary]:
-            raise OptionError(f"corner {name} does not lie on the boundary")
-    curvatures = np.array([np.nan if k is None else k for k in given.values()], dtype=np.float64)
-    return found, curvatures
-
-
-def select(given: tuple[IntArray, FloatArray], vertices: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return those of the given vertices that are in a component, numbered there.
-
-    Args:
-        given: vertices of the whole mesh, and a value for each.
-        vertices: (n,) vertices of the component, ascending.
-    """
-    inside = np.isin(given[0], vertices)
-    return np.searchsorted(vertices, given[0][inside]), given[1][inside]

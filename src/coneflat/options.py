@@ -8,14 +8,15 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .errors import OptionError
 
-CONES = ("greedy", "none")
+CONES = ("auto", "pursuit", "greedy", "none")
 METRICS = ("exact", "linear")
 LENGTH_RULES = ("integral", "mean")
 AT_CONES = ("auto", "scale", "curvature")
-BOUNDARIES = ("free", "lengths", "disk")
+BOUNDARIES = ("free", "lengths", "disk", "straight")
 
 Cones = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
 Boundary = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
@@ -38,9 +39,20 @@ class Options:
         OptionError: a value makes no sense.
     """
 
-    cones: Cones = "greedy"
-    epsilon: float = 1.0
+    cones: Cones = "auto"
+    distortion: float = 0.2
+    cone_count: int | None = None
     max_cones: int | None = None
+    min_cone_angle: float = math.pi / 2
+    max_cone_angle: float | None = 4 * math.pi
+    positive_only: bool = False
+    weights: ArrayLike | str | None = None
+    required_cones: Iterable[int] = ()
+    forbidden_cones: Iterable[int] = ()
+    allowed_cones: Iterable[int] | None = None
+    quantum: float | None = None
+    correct_handles: bool = False
+    epsilon: float = 1.0
     metric: str = "exact"
     length_rule: str = "integral"
     at_cones: str = "auto"
@@ -81,24 +93,58 @@ class Options:
         epsilon = _number("epsilon", self.epsilon)
         if not 0 < epsilon < math.inf:
             raise OptionError(f"epsilon must be a positive number, not {epsilon:g}")
-        if self.max_cones is not None and _whole("max_cones", self.max_cones) < 0:
-            raise OptionError(f"max_cones cannot be negative ({self.max_cones})")
+        for name in ("cone_count", "max_cones"):
+            value = getattr(self, name)
+            if value is not None and _whole(name, value) < 0:
+                raise OptionError(f"{name} cannot be negative ({value})")
+        if not 0 < _number("distortion", self.distortion) < math.inf:
+            raise OptionError(f"distortion must be a positive number, not {self.distortion:g}")
+        for name in ("required_cones", "forbidden_cones", "allowed_cones"):
+            if getattr(self, name) is not None:
+                noun = name.replace("_", " ").removesuffix("s")
+                object.__setattr__(self, name, tuple(_given_vertices(noun, getattr(self, name))))
+        self._check_pursuit()
+
+    def _check_pursuit(self) -> None:
+        """Check the options that only a pursuit takes, and those of whole quanta."""
+        if self.boundary_kind == "straight" and not self.searches_cones:
+            raise OptionError("a straight boundary gets its corners from the search: use cones 'pursuit'")
+        if self.quantum is None:
+            if self.correct_handles:
+                raise OptionError(
+                    "rotations along handles are made whole for whole quanta only: give a quantum"
+                )
+            return
+        if not 0 < _number("quantum", self.quantum) <= 2 * math.pi * (1 + 1e-6):
+            raise OptionError(f"the quantum must be positive and at most 2 pi, not {self.quantum:g} radians")
+        if not self.searches_cones:
+            raise OptionError(
+                f"cones of whole quanta are found by the pursuit, not with cones {self.method!r}"
+            )
+        if self.correct_handles and self.metric != "exact":
+            raise OptionError("rotations along handles are corrected in the exact metric only")
 
     @property
     def method(self) -> str:
-        """The way cones are found: "greedy", "none" or "given"."""
+        """The way cones are found: "auto", "pursuit", "greedy", "none" or "given"."""
         return self.cones if isinstance(self.cones, str) else "given"
 
     @property
     def boundary_kind(self) -> str:
-        """What the boundary becomes: "free", "lengths", "disk" or "polygon"."""
+        """What the boundary becomes: "free", "lengths", "disk", "straight" or "polygon"."""
         return self.boundary if isinstance(self.boundary, str) else "polygon"
+
+    @property
+    def searches_cones(self) -> bool:
+        """Whether the pursuit finds the cones, where the boundary is not prescribed."""
+        return self.method in ("auto", "pursuit")
 
     @property
     def scale_at_cones(self) -> bool:
         """Whether phi = 0 is prescribed at cones, not curvature."""
         if self.at_cones == "auto":
-            has_curvatures = any(k is not None for k in self.given_cones.values())
+            # The pursuit keeps cone angles within bounds, which those that came out need not respect.
+            has_curvatures = self.searches_cones or any(k is not None for k in self.given_cones.values())
             return not has_curvatures and self.boundary_kind in ("free", "lengths")
         return self.at_cones == "scale"
 
@@ -108,6 +154,7 @@ class Options:
         for name, given in (("cones", values.pop("given_cones")), ("boundary", values.pop("corners"))):
             if not isinstance(values[name], str):
                 values[name] = given
+        values["weights"] = self.weights if isinstance(self.weights, (str, type(None))) else "given"
         return values
 
 

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .text import plural
+
 if TYPE_CHECKING:
     from .result import Flattening
 
@@ -66,6 +68,16 @@ def _printable(path: Path) -> str:
     return os.fsencode(path).decode("utf-8", "replace")
 
 
+def _allowed(result: Flattening) -> str:
+    """Return what the search for cones was to reach."""
+    settings = result.settings
+    if settings.get("cones") not in ("auto", "pursuit"):
+        return "no search for it"
+    if settings.get("cone_count") is not None:
+        return "the least for so many cones"
+    return f"{settings['distortion']:g} allowed"
+
+
 def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
     """Return (measure, value, meaning) rows of the table that the commands print."""
     d = result.distortion
@@ -75,10 +87,11 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
     if len(result.cones):
         cones += f"  ({curvatures.min():+.3f} to {curvatures.max():+.3f} pi)"
     untangled = ""
-    if solve.untangled_triangles:
+    if solve.untangled_vertices:
         untangled = (
-            f"triangles upside down; {solve.untangled_triangles:,} were, until {solve.untangled_vertices:,} vertices "
-            f"moved by at most {solve.untangled_move:.2g} edges"
+            f"triangles upside down; {plural(solve.untangled_triangles, 'was', 'were')}, until "
+            f"{plural(solve.untangled_vertices, 'vertex', 'vertices')} moved by at most "
+            f"{solve.untangled_move:.2g} edges"
         )
     added = f"; {solve.refined_triangles:,} more by the refinement" if solve.refined_triangles else ""
     return [
@@ -94,7 +107,16 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
             f"{d.qc_mean:.4f}",
             f"1 is conformal; 95% below {d.qc_p95:.4f}, worst {d.qc_max:.4g}",
         ),
-        ("area distortion", f"{d.area_std:.4f}", "standard deviation of the log of the scale"),
+        (
+            "area distortion",
+            f"{d.area_std:.4f}",
+            "standard deviation of the log of the scale, by area",
+        ),
+        (
+            "of the metric",
+            f"{solve.area_distortion:.4f}",
+            f"the same of the metric; {solve.area_distortion_linear:.4f} in the linear model, of {_allowed(result)}",
+        ),
         ("flipped", f"{d.flipped:,}", untangled or "triangles upside down"),
         (
             "degenerate",

@@ -8,7 +8,10 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-SEARCH_OPTIONS = ("cones", "epsilon", "max_cones")
+from .search import PURSUIT_OPTIONS, Angle, as_keywords, search_options
+
+QUANTUM_OPTIONS = ("quantise", "correct_handles")
+SEARCH_OPTIONS = ("cones", "epsilon", "max_cones", *PURSUIT_OPTIONS, *QUANTUM_OPTIONS)
 EXACT_OPTIONS = ("at_cones", "boundary", "corner", "best_effort", "refine")
 METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "metric", "lengths", *EXACT_OPTIONS)
 
@@ -24,10 +27,23 @@ METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "metric", "lengths", *E
 @click.option("--paper", is_flag=True, help="The method exactly as published (Ben-Chen et al. 2008).")
 @click.option(
     "--cones",
-    type=click.Choice(["greedy", "none"]),
-    default="greedy",
+    type=click.Choice(["auto", "pursuit", "greedy", "none"]),
+    default="auto",
     show_default=True,
-    help="How to find cones; none suits bounded meshes and tori.",
+    help="How to find cones.  pursuit: the fewest for the distortion allowed.  greedy: the paper's.  none: for bounded "
+    "meshes and tori.  auto: pursuit, but none where the boundary is prescribed.",
+)
+@search_options
+@click.option(
+    "--quantise",
+    type=Angle(),
+    metavar="ANGLE",
+    help="Cones whose curvatures are multiples of this, pi/2 say, so that seams turn by such multiples.",
+)
+@click.option(
+    "--correct-handles",
+    is_flag=True,
+    help="With --quantise: make rotations around handles multiples, too, by a map that is not quite conformal.",
 )
 @click.option(
     "--cone",
@@ -46,9 +62,9 @@ METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "metric", "lengths", *E
     type=float,
     default=1.0,
     show_default=True,
-    help="The greedy search stops when the log scale varies by at most this.",
+    help="The greedy search stops when the log of the scale varies by at most this.",
 )
-@click.option("--max-cones", type=int, help="The greedy search stops at this many cones.")
+@click.option("--max-cones", type=int, help="Searches stop at this many cones.")
 @click.option(
     "--metric",
     type=click.Choice(["exact", "linear"]),
@@ -65,10 +81,11 @@ METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "metric", "lengths", *E
 )
 @click.option(
     "--boundary",
-    type=click.Choice(["free", "lengths", "disk"]),
+    type=click.Choice(["free", "lengths", "disk", "straight"]),
     default="free",
     show_default=True,
-    help="Exact metric: free (least area distortion), lengths (kept at the model's scale), or a round disk.",
+    help="Exact metric: free (least area distortion), lengths (kept at the model's scale), a round disk, or "
+    "straight sides between corners that the search finds.",
 )
 @click.option(
     "--corner",
@@ -101,12 +118,15 @@ METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "metric", "lengths", *E
 @click.pass_context
 def flatten(
     context: click.Context,
+    /,
     mesh: Path,
     output: Path | None,
     paper: bool,
     cones: str,
     cone: tuple[str, ...],
     cones_file: Path | None,
+    quantise: float | None,
+    correct_handles: bool,
     epsilon: float,
     max_cones: int | None,
     metric: str,
@@ -121,20 +141,21 @@ def flatten(
     weld: bool | None,
     report: Path | None,
     quiet: bool,
+    **search: Any,
 ) -> None:
     """Flatten MESH (.obj, .ply, .stl, .off, .gltf, .glb) and write it with UV coordinates.
 
     \b
     Examples:
       coneflat flatten horse.ply -o horse.obj
-      coneflat flatten hand.obj -o hand.glb --max-cones 20 --report hand.json
+      coneflat flatten hand.obj -o hand.glb --distortion 0.1 --report hand.json
       coneflat flatten part.stl --cone 12 --cone 507 --cone 1044
-      coneflat flatten face.obj -o face.obj --corner 10 --corner 95 --corner 230 --corner 310
+      coneflat flatten sheet.obj -o flat.obj --corner 10 --corner 95 --corner 230 --corner 310
     """
     from .given import parse_vertices
     from .run import run
 
-    _check_combinations(context, paper, metric, bool(cone or cones_file))
+    _check_combinations(context)
     given = parse_vertices("cone", cone, cones_file)
     corners = parse_vertices("corner", corner)
     options: dict[str, Any]
@@ -145,6 +166,9 @@ def flatten(
     else:
         options = {
             "cones": given or cones,
+            **as_keywords(search),
+            "quantum": quantise,
+            "correct_handles": correct_handles,
             "epsilon": epsilon,
             "max_cones": max_cones,
             "metric": metric,
@@ -157,10 +181,21 @@ def flatten(
     run(mesh, output, {**options, "repair": repair, "strict": strict}, weld=weld, report=report, quiet=quiet)
 
 
-def _check_combinations(context: click.Context, paper: bool, metric: str, has_given: bool) -> None:
+def _check_combinations(context: click.Context) -> None:
+    """Refuse options that would have no effect."""
+    params = context.params
+    cones, metric = params["cones"], params["metric"]
     rules = [
-        (paper, METHOD_OPTIONS, "--paper fixes the method"),
-        (has_given, SEARCH_OPTIONS, "with cones given there is nothing to search"),
+        (params["paper"], METHOD_OPTIONS, "--paper fixes the method"),
+        (
+            params["cone"] or params["cones_file"],
+            SEARCH_OPTIONS,
+            "with cones given there is nothing to search",
+        ),
+        (cones == "none", SEARCH_OPTIONS[1:], "--cones none searches for none"),
+        (cones == "greedy", (*PURSUIT_OPTIONS, *QUANTUM_OPTIONS), "--cones greedy has no such choice"),
+        (cones in ("auto", "pursuit"), ("epsilon",), "only --cones greedy has this choice"),
+        (params["cone_count"] is not None, ("distortion", "max_cones"), "the number of cones is given"),
         (metric == "linear", EXACT_OPTIONS, "--metric linear has no such choice"),
         (metric == "exact", ("lengths",), "only --metric linear has this choice"),
     ]

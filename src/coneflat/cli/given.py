@@ -7,7 +7,11 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
+from .._arrays import FloatArray
 from ..errors import MeshFileError, OptionError
+from .search import is_file
 
 _CURVATURE = re.compile(
     r"(?P<number>[-+]?(?:\d+\.?\d*(?:e[-+]?\d+)?|\.\d+)?)\s*\*?\s*(?P<unit>pi|π|deg|°|rad)?\s*(?:/\s*(?P<by>\d+\.?\d*))?",
@@ -48,7 +52,50 @@ def parse_vertices(noun: str, words: Sequence[str], path: Path | None = None) ->
     return given
 
 
-def parse_curvature(text: str, where: str) -> float:
+def read_vertices(option: str, text: str) -> tuple[int, ...]:
+    """Return vertices from "3,17,8", or from a text file of such.
+
+    Raises:
+        OptionError: it is neither.
+        MeshFileError: the file cannot be read.
+    """
+    if is_file(text):
+        lines = _lines(Path(text))
+        option, text = text, " ".join(line.split("#", 1)[0] for line in lines)
+    words = text.replace(",", " ").split()
+    for word in words:
+        if not re.fullmatch(r"[-+]?[0-9]{1,18}", word):
+            raise OptionError(f"{option}: {word!r} is no vertex, and there is no such file")
+    return tuple(dict.fromkeys(int(word) for word in words))
+
+
+def read_weights(text: str) -> str | FloatArray:
+    """Return the numbers of a file, or the text, which then is the name of a property.
+
+    Raises:
+        MeshFileError: the file cannot be read.
+    """
+    if not is_file(text):
+        return text
+    path = Path(text)
+    try:
+        values = np.load(path, allow_pickle=False) if path.suffix == ".npy" else np.loadtxt(path, ndmin=1)
+        return np.asarray(values, dtype=np.float64)
+    except (OSError, ValueError, TypeError, EOFError) as error:
+        reason = " ".join(str(error).split())
+        raise MeshFileError(f"cannot read weights from {path}: {reason}") from error
+
+
+def parse_angle(text: str) -> float:
+    """Return radians from "1.57", "pi/2", "-0.5pi", "90deg".
+
+    Raises:
+        OptionError: it is none of these.
+    """
+    return parse_curvature(text, "an angle", "angle")
+
+
+def parse_curvature(text: str, where: str, noun: str = "curvature") -> float:
     """Return radians from "1.57", "pi/2", "-0.5pi", "90deg".
 
     Raises:
@@ -58,7 +105,7 @@ def parse_curvature(text: str, where: str) -> float:
     number = match["number"] if match else ""
     unit = match["unit"].lower() if match and match["unit"] else None
     if match is None or (number in ("", "+", "-") and unit not in ("pi", "π")):
-        raise OptionError(f"{where}: {text.strip()!r} is no curvature; write 1.57, pi/2, -0.5pi or 90deg")
+        raise OptionError(f"{where}: {text.strip()!r} is no {noun}; write 1.57, pi/2, -0.5pi or 90deg")
     factor = float(number + "1" if number in ("", "+", "-") else number)
     divisor = float(match["by"] or 1)
     if divisor == 0:

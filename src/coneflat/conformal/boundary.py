@@ -51,6 +51,12 @@ class BoundaryCurvature:
         return target
 
 
+def straight_boundary(mesh: TriangleMesh, target: FloatArray) -> BoundaryCurvature:
+    """Return straight sides between corners; `target` (n,) has their curvature on the boundary, else 0."""
+    corners = np.where(mesh.is_boundary_vertex, target, 0.0)
+    return BoundaryCurvature(mesh, corners, np.full(mesh.boundary_loops[0], np.nan))
+
+
 def prescribed_boundary(
     mesh: TriangleMesh,
     lengths: FloatArray,
@@ -100,8 +106,9 @@ def prescribed_boundary(
         values[corners] += (needed - found) / len(corners)
         worst = corners[np.argmax(values[corners])]
         if values[worst] >= np.pi:
+            advice = "give more corners" if np.isnan(curvatures).all() else "ask for less"
             raise CurvatureError(
                 f"corner {names[worst]} would have a curvature of {values[worst] / np.pi:.4g} pi, but a corner of "
-                "a flat surface has less than pi; give more corners"
+                f"a flat surface has less than pi; {advice}"
             )
     return BoundaryCurvature(mesh, values, round_total)

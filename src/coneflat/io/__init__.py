@@ -5,10 +5,12 @@ from __future__ import annotations
 from .atomic import atomic_write
 from .model import MeshFile
 from .polygons import is_polygon_side, triangulate
+from .raw import COLOURS
 from .read import INPUT_FORMATS, read_mesh
 from .write import OUTPUT_FORMATS, check_output, write_flattening
 
 __all__ = [
+    "COLOURS",
     "INPUT_FORMATS",
     "OUTPUT_FORMATS",
     "MeshFile",

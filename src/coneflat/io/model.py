@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,8 @@ class MeshFile:
         offsets: (p + 1,) polygon i owns corners[offsets[i]:offsets[i + 1]].
         welded: how many vertices were merged because they lay at the same position.
         obj: the text of an OBJ file, from which the output keeps groups, materials and comments.
+        properties: what the file says of every vertex besides its position, by name, each (n,): `quality` or
+            `red` of a PLY file, say. Colours are 0 to 1.
     """
 
     path: Path
@@ -31,3 +34,4 @@ class MeshFile:
     offsets: IntArray
     welded: int = 0
     obj: ObjText | None = None
+    properties: Mapping[str, FloatArray] = field(default_factory=dict)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from .._arrays import BoolArray, IntArray
 from ..errors import EmptyMeshError, FaceIndexError, MeshFileError
-from .raw import RawMesh
+from .raw import COLOURS, RawMesh
 from .text import parse_indices, parse_points
 
 _VERTEX, _FACE, _TEXTURE, _ELEMENT = 1, 2, 3, 4
@@ -53,7 +53,7 @@ class ObjText:
 def parse_obj(path: Path, content: bytes) -> RawMesh:
     """Return the mesh of an OBJ file.
 
-    Vertex colours and the weight w behind the coordinates are not used; they survive in the text.
+    The weight w behind the coordinates is not used; it survives in the text.
 
     Raises:
         EmptyMeshError: there is no vertex or no face.
@@ -78,7 +78,10 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
     def bad_face(i: int, reason: str) -> NoReturn:
         raise MeshFileError(f"{path}, line {line_number(int(face_rows[i]))}: {reason}")
 
-    vertices = parse_points([plain[row][1:] for row in vertex_rows.tolist()], bad_vertex)
+    points = parse_points([plain[row][1:] for row in vertex_rows.tolist()], bad_vertex)
+    vertices = np.ascontiguousarray(points[:, :3])
+    # Many programs write a colour behind the position.
+    colours = zip(COLOURS, points[:, 3:6].T, strict=True) if points.shape[1] in (6, 7) else ()
     if not len(vertices):
         raise EmptyMeshError(f"{path} has no vertices")
     if not len(face_rows):
@@ -107,7 +110,7 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
         normals=normals,
         newline=_newline(lines),
     )
-    return RawMesh(vertices, corners, offsets, text)
+    return RawMesh(vertices, corners, offsets, text, dict(colours))
 
 
 def _logical_lines(content: bytes) -> list[bytes]:

@@ -42,7 +42,9 @@ def parse_off(path: Path, content: bytes) -> RawMesh:
     def bad_face(i: int, reason: str) -> NoReturn:
         raise MeshFileError(f"{path}, line {face_rows[i][0]}: {reason}")
 
-    vertices = parse_points([line + b"\n" for _, line in vertex_rows], bad_vertex)
+    vertices = np.ascontiguousarray(
+        parse_points([line + b"\n" for _, line in vertex_rows], bad_vertex)[:, :3]
+    )
     if not face_rows:
         return RawMesh(vertices, np.empty(0, np.int64), np.zeros(1, np.int64))
 

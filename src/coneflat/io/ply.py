@@ -12,7 +12,7 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..errors import EmptyMeshError, MeshFileError
-from .raw import RawMesh
+from .raw import COLOURS, RawMesh
 from .text import first_unreadable, shown
 
 _TYPES = {
@@ -61,6 +61,7 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
         order = "<" if form == "binary_little_endian" else ">"
 
     vertices: FloatArray | None = None
+    properties: dict[str, FloatArray] = {}
     polygons: tuple[IntArray, IntArray] | None = None
     for element in elements:
         wanted = _wanted(path, element)
@@ -71,7 +72,9 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
                 f"{path} ends before the {element.length} {element.name} elements its header promises"
             ) from error
         if element.name == "vertex":
-            vertices = np.stack([np.asarray(c, np.float64) for c in columns], axis=1)
+            names = [element.properties[i].name for i in wanted]
+            vertices = np.stack([np.asarray(c, np.float64) for c in columns[:3]], axis=1)
+            properties = {name: _shade(name, c) for name, c in zip(names[3:], columns[3:], strict=True)}
         elif element.name == "face":
             sizes, corners = columns
             polygons = (sizes.astype(np.int64), _whole(path, corners))
@@ -81,7 +84,7 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
         raise EmptyMeshError(f"{path} has no vertices")
     if polygons is None or not len(polygons[0]):
         raise EmptyMeshError(f"{path} has no faces")
-    return RawMesh(vertices, polygons[1], np.concatenate(([0], np.cumsum(polygons[0]))))
+    return RawMesh(vertices, polygons[1], np.concatenate(([0], np.cumsum(polygons[0]))), None, properties)
 
 
 def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
@@ -127,7 +130,8 @@ def _wanted(path: Path, element: _Element) -> list[int]:
         missing = [axis for axis in "xyz" if axis not in names]
         if missing:
             raise MeshFileError(f"{path}: its vertices have no property {missing[0]!r}")
-        return [names.index(axis) for axis in "xyz"]
+        axes = [names.index(axis) for axis in "xyz"]
+        return axes + [i for i, p in enumerate(element.properties) if i not in axes and not p.count]
     if element.name == "face":
         lists = [i for i, p in enumerate(element.properties) if p.count]
         named = [i for i in lists if element.properties[i].name in _CORNERS]
@@ -135,6 +139,12 @@ def _wanted(path: Path, element: _Element) -> list[int]:
             raise MeshFileError(f"{path}: its faces have no list 'vertex_indices'")
         return named[:1] or lists
     return []
+
+
+def _shade(name: str, values: Column) -> FloatArray:
+    """Return a property as doubles; colours, which are bytes in most files, from 0 to 1."""
+    numbers = np.asarray(values, np.float64)
+    return numbers / 255 if name in COLOURS and numbers.max(initial=0.0) > 1 else numbers
 
 
 class _EndOfFile(Exception):

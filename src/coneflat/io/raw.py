@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,13 +17,21 @@ if TYPE_CHECKING:
     from .obj import ObjText
 
 
+#: Names of the properties that are a vertex's colour.
+COLOURS = ("red", "green", "blue")
+
+
 class RawMesh(NamedTuple):
-    """The content of a mesh file: (n, 3) vertices, (c,) corners, (p + 1,) offsets, and an OBJ file's text."""
+    """The content of a mesh file: (n, 3) vertices, (c,) corners, (p + 1,) offsets, and what else it has.
+
+    That is an OBJ file's text, and numbers that it gives each vertex, by name.
+    """
 
     vertices: FloatArray
     corners: IntArray
     offsets: IntArray
     obj: ObjText | None = None
+    properties: Mapping[str, FloatArray] = MappingProxyType({})
 
 
 def read_bytes(path: Path) -> bytes:

@@ -68,9 +68,10 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
         raise MeshFileError(
             f"{path} is not a readable {ending[1:].upper()} file: {reason or type(error).__name__}"
         ) from error
-    vertices, corners, welded = mesh.vertices, mesh.corners, 0
+    vertices, corners, welded, properties = mesh.vertices, mesh.corners, 0, mesh.properties
     if ending in _WELDED_BY_DEFAULT if weld is None else weld:
         kept, merged = weld_vertices(vertices)
         welded = len(vertices) - len(kept)
         vertices, corners = vertices[kept], merged[corners]
-    return MeshFile(path, vertices, corners, mesh.offsets, welded, mesh.obj)
+        properties = {name: values[kept] for name, values in properties.items()}
+    return MeshFile(path, vertices, corners, mesh.offsets, welded, mesh.obj, properties)

@@ -38,7 +38,10 @@ def tokens_per_line(text: bytes) -> IntArray:
 
 
 def parse_points(lines: Sequence[bytes], fail: Fail) -> FloatArray:
-    """Return (k, 3) the first three numbers of each of k lines; `fail` is told of the first bad line."""
+    """Return (k, 3) the first three numbers of each of k lines, with those behind where all lines have as many.
+
+    `fail` is told of the first bad line.
+    """
     if not lines:
         return np.empty((0, 3))
     text = join_lines(lines)
@@ -50,7 +53,7 @@ def parse_points(lines: Sequence[bytes], fail: Fail) -> FloatArray:
     if numbers is None:
         _blame(text.split(), counts, float, fail)
     if np.all(counts == counts[0]):
-        return np.ascontiguousarray(numbers.reshape(len(lines), -1)[:, :3])
+        return numbers.reshape(len(lines), -1)
     return np.asarray(numbers[(np.cumsum(counts) - counts)[:, None] + np.arange(3)])
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..figures import SolveFigures
+from ..geometry import double_areas, edge_lengths
 from ..mesh import TriangleMesh
 
 
@@ -27,6 +28,7 @@ class LaidOut:
         log_scale: (n,) phi; flat lengths are about l * exp(phi).
         target, curvature: (n,) curvature wanted and reached, radians.
         figures: how it was found.
+        notes: what falls short, one sentence each.
     """
 
     mesh: TriangleMesh
@@ -39,6 +41,12 @@ class LaidOut:
     target: FloatArray
     curvature: FloatArray
     figures: SolveFigures
+    notes: tuple[str, ...] = ()
+
+    @property
+    def area(self) -> float:
+        """The area of the mesh in space."""
+        return float(double_areas(edge_lengths(self.mesh.vertices, self.mesh.faces)).sum() / 2)
 
 
 class FlatMetric(Protocol):

@@ -12,8 +12,8 @@ from ..conformal.boundary import BoundaryCurvature
 from ..conformal.exact import ExactMetric, exact_metric
 from ..errors import ConvergenceError
 from ..figures import SolveFigures
-from ..geometry import angle_defect, corner_angles, double_areas
-from ..layout.straighten import straight_triangles
+from ..geometry import angle_defect, double_areas
+from ..layout.straighten import FlatTriangles, straight_triangles
 from ..layout.unfold import unfold
 from ..layout.untangle import untangle
 from ..mesh import TriangleMesh
@@ -21,9 +21,11 @@ from ..seams import cut_open
 from .base import LaidOut, all_faces
 
 # The curvature of a round boundary is found from the metric it leads to, over and over: rounds at most, and the
-# change relative to the largest one at which to stop. Waiting for less is in vain: disks have a family of maps
-# to themselves, along which the iteration drifts. What is solved for in the end is exact in any case.
-ROUNDS, ROUND_CHANGE = 15, 1e-3
+# largest relative change at a vertex at which to stop. What is solved for in the end is exact in any case.
+ROUNDS, ROUND_CHANGE = 40, 1e-3
+# How much of the change is made in each round on holes. The m-th harmonic of the change answers with -1/m there, so
+# that the first would go back and forth for ever; on the outer loop the answer is 1/m.
+HOLE_STEP = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +61,7 @@ class ExactFlatMetric:
         solved: the metric.
         shrink: factor that brings it to the wanted size.
         refine: lay out the common subdivision.
+        notes: what falls short of what was wanted.
     """
 
     mesh: TriangleMesh
@@ -67,6 +70,7 @@ class ExactFlatMetric:
     solved: ExactMetric
     shrink: float
     refine: bool
+    notes: tuple[str, ...] = ()
 
     @property
     def figures(self) -> SolveFigures:
@@ -100,13 +104,14 @@ class ExactFlatMetric:
             seams=mesh.edges[seams],
             log_scale=solved.log_scale + np.log(self.shrink),
             target=self.target,
-            curvature=solved.curvature,
+            curvature=curvature_on(mesh, untangled.flat),
             figures=replace(
                 self.figures,
                 untangled_triangles=int(flat.is_inverted.sum()),
                 untangled_vertices=len(untangled.moved),
                 untangled_move=untangled.largest_move,
             ),
+            notes=self.notes,
         )
 
     def _lay_out_refined(self, seams: IntArray) -> LaidOut:
@@ -117,7 +122,6 @@ class ExactFlatMetric:
         disk = cut_open(mesh, edges).mesh
         cut = mesh.is_boundary_edge.copy()
         cut[edges] = True
-        angles = corner_angles(np.abs(refined.flat.sides).reshape(-1, 3))
         return LaidOut(
             mesh=mesh,
             face_origin=refined.face_origin,
@@ -127,9 +131,17 @@ class ExactFlatMetric:
             seams=mesh.edges[edges],
             log_scale=refined.log_scale + np.log(self.shrink),
             target=np.concatenate([self.target, np.zeros(len(mesh.vertices) - len(self.target))]),
-            curvature=angle_defect(mesh.faces, angles, mesh.is_boundary_vertex),
+            curvature=curvature_on(mesh, refined.flat),
             figures=replace(self.figures, refined_triangles=len(mesh.faces) - len(self.mesh.faces)),
+            notes=self.notes,
         )
+
+
+def curvature_on(mesh: TriangleMesh, flat: FlatTriangles) -> FloatArray:
+    """Return (n,) the curvature of flat triangles as they are laid out; the angles of inverted ones are negative."""
+    sides = flat.sides.reshape(-1, 3)
+    angles = np.angle(-sides[:, [1, 2, 0]] * np.conj(sides[:, [2, 0, 1]]))
+    return angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
 
 
 def exact_flattening(
@@ -153,20 +165,26 @@ def exact_flattening(
     if choices.boundary is None:
         fixed |= mesh.is_boundary_vertex
     solved, target = _solve(mesh, lengths, solution, choices, fixed)
-    if not (solved.converged or choices.best_effort):
+    notes: tuple[str, ...] = ()
+    if not solved.converged:
         worst = solved.worst_vertex if choices.names is None else choices.names[solved.worst_vertex]
-        raise ConvergenceError(
+        failure = (
             f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is off "
-            f"by {solved.residual:.2g} rad; --best-effort takes it as it is, --metric linear needs no convergence, "
-            "--repair or remeshing may help"
+            f"by {solved.residual:.2g} rad"
         )
+        if not choices.best_effort:
+            raise ConvergenceError(
+                f"{failure}; --best-effort takes it as it is, --metric linear needs no convergence, other cones, "
+                "--repair or remeshing may help"
+            )
+        notes = (f"{failure[0].upper()}{failure[1:]}.",)
     shrink = 1.0
     if choices.keep_area:
         flat = solved.triangulation.length.reshape(-1, 3)
         copies = len(flat) / len(mesh.faces)  # 2 where the surface was doubled
         shrink = float(np.sqrt(copies * double_areas(lengths).sum() / double_areas(flat).sum()))
     target = np.where(fixed, solved.curvature, target)
-    return ExactFlatMetric(mesh, solution.cones, target, solved, shrink, choices.refine)
+    return ExactFlatMetric(mesh, solution.cones, target, solved, shrink, choices.refine, notes)
 
 
 def _solve(
@@ -186,12 +204,13 @@ def _solve(
     inside = np.where(mesh.is_boundary_vertex, 0.0, solution.target)
     if boundary is None:
         return solve(inside, solution.log_scale), inside
-    wanted = inside + boundary.target(lengths, solution.log_scale)
-    solved = solve(wanted, solution.log_scale)
+    wanted = boundary.target(lengths, solution.log_scale)
+    solved = solve(inside + wanted, solution.log_scale)
+    step = np.where(wanted < 0, HOLE_STEP, 1.0)
     for _ in range(ROUNDS if boundary.has_round_loops else 0):
-        before, wanted = wanted, inside + boundary.target(lengths, solved.log_scale)
-        change = np.abs(wanted - before).max()
-        if not solved.converged or change < ROUND_CHANGE * np.abs(wanted).max():
-            return solved, before
-        solved = solve(wanted, solved.log_scale)
-    return solved, wanted
+        change = boundary.target(lengths, solved.log_scale) - wanted
+        if not solved.converged or not (np.abs(change) > ROUND_CHANGE * np.abs(wanted)).any():
+            break
+        wanted = wanted + step * change
+        solved = solve(inside + wanted, solved.log_scale)
+    return solved, inside + wanted

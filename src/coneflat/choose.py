@@ -1,0 +1,107 @@
+"""Cones of a connected mesh by the method that the options name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csc_matrix
+
+from ._arrays import FloatArray
+from .cones import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
+from .geometry.ties import tie_key
+from .mesh import TriangleMesh
+from .options import Options
+from .stages import Stages
+from .wishes import Wishes
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A connected mesh with what the choice of cones needs of its metric.
+
+    Attributes:
+        mesh: the mesh.
+        lengths: (m, 3) side lengths, with which every triangle has area.
+        laplacian: (n, n) cotangent Laplacian.
+        curvature: (n,) angle defect, radians.
+        areas: (n,) vertex areas.
+    """
+
+    mesh: TriangleMesh
+    lengths: FloatArray
+    laplacian: csc_matrix
+    curvature: FloatArray
+    areas: FloatArray
+
+
+def pursues(mesh: TriangleMesh, options: Options) -> bool:
+    """Whether the pursuit finds the cones of a mesh."""
+    is_prescribed = options.boundary_kind in ("disk", "polygon") and mesh.is_boundary_vertex.any()
+    return options.method == "pursuit" or (options.method == "auto" and not is_prescribed)
+
+
+def choose_cones(surface: Surface, wishes: Wishes, options: Options, stages: Stages) -> ConeSolution:
+    """Return cones with their curvatures and linear log scale."""
+    mesh = surface.mesh
+    if pursues(mesh, options):
+        return _pursued(surface, wishes, options)
+    given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
+    if options.method == "greedy":
+        solution = greedy_cones(
+            *given,
+            epsilon=options.epsilon,
+            max_cones=options.max_cones,
+            tie_key=tie_key(mesh.vertices),
+            progress=stages.tell,
+        )
+    elif len(wishes.cones) and np.isfinite(wishes.cones.curvatures).all():
+        solution = cones_with_curvature(*given, wishes.cones.vertices, wishes.cones.curvatures)
+    else:
+        solution = cones_at(*given, wishes.cones.vertices)
+    if options.scale_at_cones and options.metric == "exact":
+        check_enough(len(solution.cones), mesh)
+    else:
+        advice = (
+            "allow more of them (--max-cones)" if options.method == "greedy" else "add cones or move them"
+        )
+        check_feasible(solution.cones, solution.curvatures, wishes.names, advice)
+    return solution
+
+
+def _pursued(surface: Surface, wishes: Wishes, options: Options) -> ConeSolution:
+    """Return the fewest cones for the distortion allowed, or the best of the number asked for."""
+    from .cones.pursuit import open_search, pursue
+    from .cones.quantise import quantise_cones
+
+    mesh = surface.mesh
+    is_straight = options.boundary_kind == "straight"
+    # Corners of a straightened boundary are part of the trade, like the cones inside.
+    takes_rest = mesh.is_boundary_vertex & (not is_straight)
+    given = surface.laplacian, surface.curvature, takes_rest, mesh.euler_characteristic
+    if not (wishes.is_allowed & ~takes_rest).any() and (takes_rest.any() or mesh.euler_characteristic == 0):
+        return cones_at(*given, wishes.required.vertices)
+    has_corners = is_straight and mesh.is_boundary_vertex.any()
+    search = open_search(
+        *given[:2],
+        surface.areas,
+        *given[2:],
+        tie_key=tie_key(mesh.vertices),
+        # A corner of angle a has a curvature of pi - a: cones inside keep to the same bound.
+        min_cone_angle=options.min_cone_angle + (np.pi if has_corners else 0.0),
+        max_cone_angle=options.max_cone_angle,
+        positive_only=options.positive_only,
+        weights=wishes.weights,
+        required=wishes.required.vertices,
+        allowed=wishes.is_allowed,
+    )
+
+    def ask(count: int | None) -> ConeSolution:
+        if options.quantum is None:
+            return pursue(search, distortion=options.distortion, count=count).solution
+        return quantise_cones(search, options.quantum, distortion=options.distortion, count=count).solution
+
+    found = ask(options.cone_count)
+    if options.max_cones is not None and len(found.cones) > options.max_cones:
+        found = ask(options.max_cones)
+    return replace(found, cones=found.cones[~mesh.is_boundary_vertex[found.cones]])

@@ -1,0 +1,104 @@
+"""The biharmonic kernel on a coarse basis, dense: cones are searched there first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import lapack
+from scipy.sparse import csr_matrix
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..errors import MetricError
+from .coarsen import coarse_basis, representatives
+from .green import GreenOperator
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseModel:
+    """G A G on functions of a coarse basis.
+
+    Attributes:
+        basis: (f, m).
+        kernel: (m, m).
+        slope: (m,) minus the kernel times the curvature, which makes E^2 = constant + 2 slope k + k kernel k.
+        constant: E^2 without cones.
+    """
+
+    basis: csr_matrix
+    kernel: FloatArray
+    slope: FloatArray
+    constant: float
+
+    def at(self, unknowns: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return kernel and slope at vertices of the mesh."""
+        rows = self.basis[unknowns]
+        return np.asarray((rows @ (rows @ self.kernel).T).T), np.asarray(rows @ self.slope)
+
+    def squared_distances(self, one: int, others: IntArray) -> FloatArray:
+        """Return (p,) the squared norm of the difference of two Green's functions, for each of the others."""
+        rows = self.basis[np.append(others, one)]
+        columns, local = np.unique(rows.indices, return_inverse=True)
+        dense = np.zeros((len(others) + 1, len(columns)))
+        dense[np.repeat(np.arange(len(dense)), np.diff(rows.indptr)), local.ravel()] = rows.data
+        dense = dense[:-1] - dense[-1]
+        result: FloatArray = ((dense @ self.kernel[np.ix_(columns, columns)]) * dense).sum(axis=1)
+        return np.maximum(result, 0.0)
+
+
+def coarse_model(
+    operator: GreenOperator, curvature: FloatArray, log_scale: FloatArray, size: int
+) -> CoarseModel:
+    """Return a coarse model whose E without cones is exact.
+
+    Aggregates make a Laplacian that is too stiff by a factor that is nearly the same for all smooth functions, so
+    one number takes most of the error away.
+
+    Args:
+        operator: of the mesh.
+        curvature: (f,).
+        log_scale: (f,) -G curvature.
+        size: the number of basis functions, about.
+    """
+    areas = operator.areas
+    coarse = coarse_basis(operator.laplacian, areas, size)
+    basis = coarse.functions
+    weights = basis.T @ areas
+    stiffness = coarse.laplacian.toarray()
+    if operator.is_closed:
+        # Makes it definite, and means the same: what a source has in sum is taken off in proportion to area.
+        stiffness += np.outer(weights, weights) * (stiffness.trace() / (weights @ weights) / len(weights))
+    green = inverse_of_definite(stiffness)
+    weighted = np.asarray(coarse.mass @ green) - np.outer(weights, weights @ green)
+    kernel = green @ weighted
+    kernel = (kernel + kernel.T) / 2
+    bare = basis.T @ curvature
+    slope = -(kernel @ bare)
+    constant = float(-(slope @ bare))
+    exact = float(log_scale @ operator.weighted(log_scale))
+    scale = exact / constant if constant > 0 else 1.0
+    return CoarseModel(basis, kernel * scale, slope * scale, exact)
+
+
+def candidates(model: CoarseModel, usable: BoolArray) -> IntArray:
+    """Return the unknowns among which cones are searched: one for each basis function, if any is usable."""
+    if np.count_nonzero(usable) <= model.basis.shape[1]:
+        return np.flatnonzero(usable)
+    return representatives(model.basis, usable.astype(np.float64))
+
+
+def inverse_of_definite(matrix: FloatArray) -> FloatArray:
+    """Return the inverse of a dense symmetric positive definite matrix.
+
+    Raises:
+        MetricError: rounding has made it indefinite.
+    """
+    factor, failed = lapack.dpotrf(matrix, lower=0)
+    if failed:
+        raise MetricError(
+            f"the coarse Laplacian of {len(matrix)} unknowns is not positive definite: the mesh has triangles too "
+            "thin for double precision; remesh them, or run with --repair"
+        )
+    half, _ = lapack.dpotri(factor, lower=0)
+    upper = np.triu(half)
+    return upper + np.triu(half, 1).T

@@ -1,0 +1,95 @@
+"""A coarse model of a Laplacian, found algebraically: smoothed aggregation.
+
+Reference: P. Vanek, J. Mandel, M. Brezina, "Algebraic multigrid by smoothed aggregation for second and fourth
+order elliptic problems", Computing 56, 1996.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags, identity
+
+from .._arrays import FloatArray, IntArray
+
+# Largest factor by which one level shrinks the model: an aggregate is a vertex and its neighbours.
+LARGEST_AGGREGATE = 7.0
+# Couplings below this share of the geometric mean of the diagonals do not join vertices (across slivers).
+WEAK = 0.02
+# Damping of the Jacobi step that smooths the aggregates: 4/3 over the largest eigenvalue of D^-1 L, about 2.
+DAMPING = 2 / 3
+# Values that differ by less, relatively, are equal, and the first in the order of vertices is taken.
+TIE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseBasis:
+    """Basis functions and what they make of the operators of the mesh.
+
+    Attributes:
+        functions: (n, m).
+        laplacian, mass: (m, m) the same between basis functions.
+    """
+
+    functions: csr_matrix
+    laplacian: csr_matrix
+    mass: csr_matrix
+
+
+def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseBasis:
+    """Return basis functions, about `size`, that reproduce smooth functions on the mesh.
+
+    Args:
+        laplacian: (n, n) positive (semi)definite; vertices are taken as centres of aggregates in its order.
+        areas: (n,) vertex areas.
+        size: the number of basis functions wanted.
+    """
+    functions = identity(laplacian.shape[0], format="csr")
+    level, mass = laplacian, csr_matrix(diags(areas))
+    order = np.arange(laplacian.shape[0])
+    while level.shape[0] > 1.2 * size:
+        ratio = level.shape[0] / size
+        steps = max(1, round(np.log(ratio) / np.log(LARGEST_AGGREGATE)))
+        part = _smoothed_aggregates(level, order, ratio ** (1 / steps))
+        if part.shape[1] > 0.9 * level.shape[0]:
+            break
+        functions = csr_matrix(functions @ part)
+        transposed = csr_matrix(part.T)
+        level = csr_matrix(transposed @ (level @ part))
+        mass = csr_matrix(transposed @ (mass @ part))
+        order = _order_of_aggregates(part, order)
+    return CoarseBasis(functions, level, mass)
+
+
+def _smoothed_aggregates(level: csr_matrix, order: IntArray, size: float) -> csr_matrix:
+    from .aggregate_kernel import aggregate
+
+    count = level.shape[0]
+    diagonal = np.maximum(level.diagonal(), 1e-300)
+    labels, number = aggregate(
+        level.indptr.astype(np.int64), level.indices.astype(np.int64), level.data, diagonal, order, size, WEAK
+    )
+    pieces = csr_matrix((np.ones(count), (np.arange(count), labels)), shape=(count, number))
+    return csr_matrix(pieces - diags(DAMPING / diagonal) @ (level @ pieces))
+
+
+def _order_of_aggregates(part: csr_matrix, order: IntArray) -> IntArray:
+    """Return the aggregates in the order of their first members."""
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    columns = part.tocsc()
+    first = np.minimum.reduceat(place[columns.indices], columns.indptr[:-1])
+    return np.argsort(first, kind="stable")
+
+
+def representatives(basis: csr_matrix, allowed: FloatArray) -> IntArray:
+    """Return for each coarse function the allowed vertex where it is largest, without repetitions."""
+    columns = basis.tocsc()
+    found = []
+    for j in range(basis.shape[1]):
+        rows = columns.indices[columns.indptr[j] : columns.indptr[j + 1]]
+        values = columns.data[columns.indptr[j] : columns.indptr[j + 1]] * allowed[rows]
+        if len(rows) and values.max() > 0:
+            found.append(rows[np.argmax(values >= values.max() * (1 - TIE))])
+    return np.unique(np.array(found, dtype=np.int64))

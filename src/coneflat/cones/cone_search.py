@@ -1,0 +1,222 @@
+"""A search for cones on one mesh: coarse first, then exact, for any number of questions."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csc_matrix
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from .coarse_model import candidates, coarse_model
+from .dense_model import Limits
+from .dense_search import DenseSearch
+from .green import GreenOperator
+from .pool import Pool
+from .solution import ConeSolution, target_from_log_scale
+
+# Unknowns of the coarse model: one for so many vertices, within bounds that keep its dense inverse cheaper than the
+# factorization of the mesh's own Laplacian.
+VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 15, 400, 1200
+# More cones than these are not searched for: a seam through them all is no use.
+MOST_CONES = 200
+# How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself.
+COARSE_DOUBT = 1.35
+# Perturbations tried for each number of cones about the answer: one for so many vertices, within bounds, so that they
+# take a like share of the time on all meshes.
+VERTICES_PER_SHAKE, LEAST_SHAKES, MOST_SHAKES = 400, 12, 40
+# How many local optima of the coarse model are tried on the mesh when the best one misses narrowly.
+RUNNERS = 3
+
+
+class ConeSearch:
+    """The state of a search: the factorized Laplacian, the coarse model, and the vertices tried so far.
+
+    Args:
+        laplacian: (n, n) cotangent Laplacian of a connected mesh.
+        curvature: (n,) angle defect, radians.
+        areas: (n,) weights of the distortion that sum to 1.
+        is_boundary: (n,) mask.
+        order: (n,) the vertices in an order that does not depend on their numbering: ties go by it.
+        limits: of the curvatures.
+        required: (r,) vertices that are cones in any case.
+        usable: (n,) mask of the vertices that may be cones.
+    """
+
+    def __init__(
+        self,
+        laplacian: csc_matrix,
+        curvature: FloatArray,
+        areas: FloatArray,
+        is_boundary: BoolArray,
+        order: IntArray,
+        limits: Limits,
+        required: IntArray,
+        usable: BoolArray,
+    ) -> None:
+        self._laplacian, self._curvature, self._is_boundary = laplacian, curvature, is_boundary
+        self.limits = limits
+        self.operator = GreenOperator(laplacian, areas, is_boundary, order)
+        vertices = self.operator.vertices
+        unknown = np.full(len(curvature), -1, dtype=np.int64)
+        unknown[vertices] = np.arange(len(vertices))
+        free = unknown[required]
+        inner = curvature[vertices]
+        log_scale = -self.operator.solve(inner)
+        self._shakes = min(max(len(vertices) // VERTICES_PER_SHAKE, LEAST_SHAKES), MOST_SHAKES)
+        size = min(max(len(vertices) // VERTICES_PER_UNKNOWN, LEAST_SIZE), MOST_SIZE)
+        coarse = coarse_model(self.operator, inner, log_scale, size)
+        is_usable = usable[vertices].copy()
+        is_usable[free] = False
+        self.places = np.concatenate([free, candidates(coarse, is_usable)])
+        kernel, slope = coarse.at(self.places)
+        mask = np.ones(len(self.places), dtype=bool)
+        mask[: len(free)] = False
+        fixed = np.arange(len(free))
+        self.coarse = DenseSearch(np.ascontiguousarray(kernel), slope, coarse.constant, mask, fixed, limits)
+        self.pool = Pool(self.operator, coarse, inner, log_scale, is_usable, free, limits)
+
+    @property
+    def most_cones(self) -> int:
+        """The largest number of cones searched for."""
+        fixed = len(self.coarse.fixed)
+        most = min(MOST_CONES + fixed, len(self.places))
+        if self.limits.total > 0 and self.limits.least > 0:
+            most = min(most, int(self.limits.total / self.limits.least + 1e-9))
+        return most
+
+    def fewest(self, bound: float) -> tuple[float, IntArray]:
+        """Return E and members (places in the pool) of the smallest set with E <= bound that was found.
+
+        Where none is, the best set.
+        """
+        goal = bound * bound
+        self._survey(goal)
+        known = sorted(self.coarse.best)
+        count = next((c for c in known if self.coarse.best[c][0] <= goal), known[-1])
+        while not self.polished(count, goal) <= goal:
+            if count >= self.most_cones:
+                break
+            count += 1
+        while count - 1 >= len(self.coarse.fixed) and self._is_promising(count - 1, goal):
+            if not self.polished(count - 1, goal) <= goal:
+                break
+            count -= 1
+        found = self.pool.model.best
+        good = [c for c in found if found[c][0] <= goal]
+        count = min(good) if good else min(found, key=lambda c: (found[c][0], c))
+        return self._result(count)
+
+    def of_count(self, count: int) -> tuple[float, IntArray]:
+        """Return E and members (places in the pool) of the best set of at most so many cones."""
+        count = min(count, self.most_cones)
+        self.coarse.climb(0.0, count + 1)
+        self._improve(max(1, count - 2), count + 1)
+        for some in (count - 1, count):
+            if some in self.coarse.best:
+                self.polished(some, 0.0)
+        found = self.pool.model.best
+        return self._result(min((c for c in found if c <= count), key=lambda c: (found[c][0], c)))
+
+    def _result(self, count: int) -> tuple[float, IntArray]:
+        energy, members = self.pool.model.best[count]
+        return float(np.sqrt(max(energy, 0.0))), members
+
+    def _survey(self, goal: float) -> None:
+        """Find good sets of all sizes up to the one that is needed, and a little on, on the coarse model."""
+        self.coarse.climb(goal / COARSE_DOUBT, self.most_cones)
+        known = sorted(self.coarse.best)
+        reached = [c for c in known if self.coarse.best[c][0] <= goal]
+        count = reached[0] if reached else known[-1]
+        self._improve(max(known[0], count - 3), min(count + 1, known[-1]), goal)
+
+    def _improve(self, least: int, most: int, goal: float = 0.0) -> None:
+        model = self.coarse
+        least, most = max(least, min(model.best)), min(most, max(model.best))
+        for _ in range(4):
+            better = model.descend(most, least)
+            better |= model.ascend(least, most)
+            if not better:
+                break
+        for count in range(most, least - 1, -1):
+            # Only sets near the goal are worth it: it is they that decide.
+            if (
+                count in model.best
+                and goal / COARSE_DOUBT < model.best[count][0]
+                and (goal == 0 or model.best[count][0] < COARSE_DOUBT * goal)
+            ):
+                model.shaken(count, self._shakes)
+
+    def _is_promising(self, count: int, goal: float) -> bool:
+        """Whether fewer cones may do, by the coarse model or by the sets tried."""
+        if count < self.limits.fewest:
+            return False
+        coarse = self.coarse.best.get(count)
+        if coarse is not None and coarse[0] <= goal * COARSE_DOUBT:
+            return True
+        known = self.pool.model.best.get(count)
+        return known is not None and known[0] <= goal * COARSE_DOUBT
+
+    def polished(self, count: int, goal: float) -> float:
+        """Return E^2 of the best set of a size that the mesh itself shows, infinite if there is none.
+
+        Starts are the coarse model's set, and neighbours in size of what is known.
+        """
+        pool, model = self.pool, self.pool.model
+        starts = []
+        if count in self.coarse.best:
+            starts.append(pool.insert(self.places[self.coarse.best[count][1]]))
+        if count + 1 in model.best:
+            shrunk = model.shrunk(model.best[count + 1][1])
+            if shrunk is not None:
+                starts.append(shrunk)
+        if count - 1 in model.best:
+            grown = model.grown(model.best[count - 1][1])
+            if grown is not None:
+                starts.append(grown)
+        if count in model.best:
+            starts.append(model.best[count][1])
+        best = None
+        for start in starts:
+            energy, members = model.exchanged(start)
+            if np.isfinite(energy) and (best is None or energy < best[0]):
+                best = energy, members
+        if best is None:
+            return np.inf
+        energy, members = pool.polish(best[1])
+        if energy > goal and (energy <= goal * COARSE_DOUBT or goal == 0):
+            for _, runner in self.coarse.runners.get(count, [])[:RUNNERS]:
+                energy = min(energy, pool.polish(pool.insert(self.places[runner]))[0])
+                if energy <= goal:
+                    break
+            if energy > goal and model.shaken(count, self._shakes):
+                energy = min(energy, pool.polish(model.best[count][1])[0])
+        return energy
+
+    def history(self, count: int) -> tuple[tuple[int, float], ...]:
+        """Return (number, E) of the best sets of up to `count` cones: on the mesh where looked at, else coarse."""
+        found: list[tuple[int, float]] = []
+        exact = self.pool.model.best
+        for some in range(count + 1):
+            known = exact.get(some, self.coarse.best.get(some))
+            if known is None or (found and known[0] >= found[-1][1] ** 2):
+                continue
+            found.append((some, float(np.sqrt(max(known[0], 0.0)))))
+        return tuple(found)
+
+    def solution(self, members: IntArray) -> ConeSolution:
+        """Return the cones of a set, those of no curvature left out unless they are required."""
+        curvatures = self.pool.curvatures(members)
+        keep = np.abs(curvatures) > 1e-9
+        keep[: len(self.coarse.fixed)] = True
+        unknowns = self.pool.unknowns[members[keep]]
+        return self.solution_of(unknowns, curvatures[keep])
+
+    def solution_of(self, unknowns: IntArray, curvatures: FloatArray) -> ConeSolution:
+        """Return the solution of given cones and curvatures."""
+        operator = self.operator
+        cones = operator.vertices[unknowns]
+        target = np.zeros(len(self._curvature))
+        target[cones] = curvatures
+        log_scale = np.zeros(len(target))
+        log_scale[operator.vertices] = operator.solve((target - self._curvature)[operator.vertices])
+        absorbed = target_from_log_scale(self._laplacian, self._curvature, log_scale, self._is_boundary)
+        return ConeSolution(cones, target + absorbed, log_scale)

@@ -1,0 +1,296 @@
+"""Energies of cones on a dense model, and the best exchange of one cone for another.
+
+The distortion of cones S with curvatures k is E^2 = constant + 2 slope_S k + k gram_SS k. With the other cones
+refitted freely, candidate t lowers it by (slope_t + gram_tS k + lambda)^2 / h_t, where h_t is what remains of gram_tt
+after projection (orthogonal matching pursuit: Y. Pati, R. Rezaiifar, P. Krishnaprasad 1993). All candidates are
+scored at once; the few best are fitted exactly, bounds and all.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+
+# An exchange must lower E^2 by this share, so that rounding cannot make the search go round in circles.
+GAIN = 1e-6
+# How many of the best scored candidates are fitted exactly, and how much worse than the best so far the score of such
+# a one may be: scores leave out that bounds of other cones may become active, or cease to be.
+FITTED = 5
+DOUBT = 0.03
+# Changes that differ by less, relatively, are equal, and the first in the order of candidates is taken: symmetric
+# surfaces have many that differ by rounding only.
+TIE = 1e-9
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What curvatures may be.
+
+    Attributes:
+        least, most: bounds of each cone's curvature, radians.
+        total: what they sum to, radians; NaN on a bounded mesh, whose boundary takes the rest.
+    """
+
+    least: float
+    most: float
+    total: float
+
+    @property
+    def has_sum(self) -> bool:
+        """Whether the curvatures have a sum to keep."""
+        return not math.isnan(self.total)
+
+    @property
+    def fewest(self) -> int:
+        """The least number of cones that can carry the total."""
+        if not self.has_sum or abs(self.total) < 1e-9:
+            return 0
+        bound = self.most if self.total > 0 else self.least
+        return math.ceil(self.total / bound - 1e-9) if math.isfinite(bound) else 1
+
+    def are_inside(self, curvatures: FloatArray) -> BoolArray:
+        """Return a mask of the curvatures that no bound holds."""
+        span = 1e-9 * (1.0 + np.abs(curvatures))
+        inside: BoolArray = (curvatures < self.most - span) & (curvatures > self.least + span)
+        return inside
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The best curvatures of cones.
+
+    Attributes:
+        curvatures: (s,) radians.
+        multiplier: of their sum; 0 without one.
+        feasible: whether the bounds allow the sum.
+        energy: E^2; infinite if not feasible.
+    """
+
+    curvatures: FloatArray
+    multiplier: float
+    feasible: bool
+    energy: float
+
+
+def first_least(values: FloatArray) -> int:
+    """Return the first index whose value is the least but for rounding."""
+    least = values.min()
+    limit = least + TIE * abs(least) if np.isfinite(least) else least
+    return int(np.argmax(values <= limit))
+
+
+def is_less(value: float, than: float) -> bool:
+    """Whether a value is less by more than rounding."""
+    return value < than - (TIE * abs(than) if math.isfinite(than) else 0.0)
+
+
+@dataclass(eq=False)
+class DenseModel:
+    """Energies of cones on m candidates.
+
+    Attributes:
+        gram, slope, constant: (m, m), (m,) and a number.
+        usable: (m,) whether a candidate may be chosen; False for required ones, which are in every set.
+        fixed: the required candidates, which come first in every set.
+        limits: of the curvatures.
+    """
+
+    gram: FloatArray
+    slope: FloatArray
+    constant: float
+    usable: BoolArray
+    fixed: IntArray
+    limits: Limits
+
+    def fit(self, members: IntArray) -> Fit:
+        """Return the best curvatures of a set."""
+        from .fit_kernel import fit_curvatures
+
+        limits = self.limits
+        gram, slope = self.gram[members[:, None], members], self.slope[members]
+        curvatures, multiplier, feasible = fit_curvatures(
+            gram, slope, limits.least, limits.most, limits.total
+        )
+        energy = self.constant + (2 * slope + gram @ curvatures) @ curvatures
+        return Fit(curvatures, multiplier, feasible, float(energy) if feasible else math.inf)
+
+    def energy(self, members: IntArray) -> float:
+        """Return E^2 of a set, infinite where bounds leave no curvatures."""
+        return self.fit(members).energy
+
+    def additions(self, members: IntArray, fitted: Fit) -> FloatArray:
+        """Return (m,) by how much E^2 changes if a candidate joins the members (0 or less), bounds of others aside."""
+        limits, diagonal = self.limits, np.diag(self.gram)
+        # Where no curvatures are feasible, none is bounded.
+        least, most = (limits.least, limits.most) if fitted.feasible else (-math.inf, math.inf)
+        if limits.has_sum and not len(members):
+            change: FloatArray = (2 * self.slope + diagonal * limits.total) * limits.total
+            return change
+        free = members[limits.are_inside(fitted.curvatures)] if fitted.feasible else members
+        if limits.has_sum and not len(free):
+            free = members[:1]
+        gradient = self.slope + fitted.multiplier + fitted.curvatures @ self.gram[members]
+        remain, _, _, _ = self._projected(free)
+        is_open = remain > 1e-9 * diagonal
+        curvatures = np.clip(-gradient / np.where(is_open, remain, np.inf), least, most)
+        change = np.where(is_open, (2 * gradient + remain * curvatures) * curvatures, 0.0)
+        change[members] = 0.0
+        return change
+
+    def _projected(self, free: IntArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Project candidates off the free members, and off the sum.
+
+        Returns:
+            (m,) what remains of the diagonal of the gram matrix, (f, m) the coefficients of the projection, and
+            (f,) the diagonal of the inverse of the members' gram matrix, with the sum kept and without.
+        """
+        columns = self.gram[free]
+        small = columns[:, free]
+        small.flat[:: len(free) + 1] *= 1 + 1e-13
+        inverse = np.linalg.inv(small)
+        rows = inverse @ columns
+        remain = np.diag(self.gram) - np.einsum("ij,ij->j", columns, rows)
+        diagonal = np.diag(inverse)
+        kept = diagonal
+        if self.limits.has_sum and len(free):
+            ones = inverse.sum(axis=1)
+            missing = 1.0 - rows.sum(axis=0)
+            whole = ones.sum()
+            remain += missing**2 / whole
+            rows += np.outer(ones / whole, missing)
+            kept = diagonal - ones**2 / whole
+        return remain, rows, kept, diagonal
+
+    def best_addition(
+        self, members: IntArray, usable: BoolArray, limit: float = math.inf
+    ) -> tuple[int, float]:
+        """Return the candidate that lowers E^2 most, and E^2 with it; -1 if none brings it under the limit.
+
+        Args:
+            members: the set.
+            usable: (m,) the candidates that may join.
+            limit: of E^2.
+        """
+        fitted = self.fit(members)
+        change = np.where(usable, self.additions(members, fitted), 0.0)
+        change[members] = 0.0
+        chosen, best = -1, limit
+        for _ in range(FITTED if fitted.feasible else 3 * FITTED):
+            t = first_least(change) if len(change) else -1
+            if t < 0 or change[t] >= 0:
+                break
+            if fitted.feasible and fitted.energy + change[t] > limit + DOUBT * abs(limit):
+                break
+            change[t] = 0.0
+            found = self.energy(np.append(members, t))
+            if is_less(found, best):
+                chosen, best = t, found
+        return chosen, best
+
+    def grown(self, members: IntArray) -> IntArray | None:
+        """Return the members and the best further one, if there is any."""
+        chosen, _ = self.best_addition(members, self.usable)
+        if chosen < 0:
+            # No further one makes curvatures feasible yet, or lowers E: any will do.
+            left = np.setdiff1d(np.flatnonzero(self.usable), members)
+            if not len(left):
+                return None
+            chosen = int(left[first_least(self.slope[left])])
+        return np.append(members, chosen)
+
+    def shrunk(self, members: IntArray) -> IntArray | None:
+        """Return the members without the one that is missed least."""
+        chosen, best = None, math.inf
+        for place in range(len(self.fixed), len(members)):
+            rest = np.delete(members, place)
+            energy = self.energy(rest)
+            if is_less(energy, best):
+                chosen, best = rest, energy
+        return chosen
+
+    def best_swaps(self, members: IntArray, fitted: Fit) -> tuple[FloatArray, IntArray]:
+        """Return for each member the change of E^2 by its best replacement, and which that is; infinite if not known.
+
+        Removing a member is a rank one change of the inverse, so all members against all candidates cost little more
+        than scoring the candidates once. Members held at a bound, and the required, are left out.
+        """
+        limits, diagonal = self.limits, np.diag(self.gram)
+        change, which = np.full(len(members), np.inf), np.full(len(members), -1)
+        places = np.flatnonzero(limits.are_inside(fitted.curvatures))
+        if not len(places):
+            return change, which
+        gradient = self.slope + fitted.multiplier + fitted.curvatures @ self.gram[members]
+        remain, rows, kept, bare = self._projected(members[places])
+        movable = np.flatnonzero((places >= len(self.fixed)) & (kept > 1e-10 * bare))
+        places, rows, kept = places[movable], rows[movable], kept[movable, None]
+        k = fitted.curvatures[places, None]
+        h = remain + rows**2 / kept
+        is_open = (h > 1e-9 * diagonal) & self.usable
+        is_open[:, members] = False
+        g = gradient - rows * (k / kept)
+        x = np.clip(-g / np.where(is_open, h, np.inf), limits.least, limits.most)
+        value = np.where(is_open, k**2 / kept + (2 * g + h * x) * x, np.inf)
+        for place, row in zip(places, value, strict=True):
+            t = first_least(row)
+            change[place], which[place] = row[t], t
+        return change, which
+
+    def exchanged(self, members: IntArray) -> tuple[float, IntArray]:
+        """Replace members, one at a time, as long as E^2 falls; return it and the members. The required ones stay."""
+        members = members.copy()
+        fitted = self.fit(members)
+        while len(members) > len(self.fixed):
+            better = self._swapped(members, fitted) if fitted.feasible else None
+            if better is None:
+                better = self._swapped_one_by_one(members, fitted)
+            if better is None:
+                break
+            fitted = better
+        return fitted.energy, members
+
+    def _swapped(self, members: IntArray, fitted: Fit) -> Fit | None:
+        """Make the best swap that the table shows, in place."""
+        change, which = self.best_swaps(members, fitted)
+        for _ in range(FITTED):
+            place = first_least(change)
+            if not change[place] <= -GAIN * fitted.energy:
+                break
+            change[place] = np.inf
+            previous, members[place] = members[place], which[place]
+            found = self.fit(members)
+            if found.energy < fitted.energy * (1 - GAIN):
+                return found
+            members[place] = previous
+        return None
+
+    def _swapped_one_by_one(self, members: IntArray, fitted: Fit) -> Fit | None:
+        """Swap, in place, what the table leaves out: members held at a bound, or any where none are feasible."""
+        limit = fitted.energy * (1 - GAIN) if fitted.feasible else math.inf
+        inside = self.limits.are_inside(fitted.curvatures) & fitted.feasible
+        for place in range(len(self.fixed), len(members)):
+            if not inside[place]:
+                chosen, _ = self.best_addition(np.delete(members, place), self.usable, limit)
+                if chosen >= 0 and chosen != members[place]:
+                    members[place] = chosen
+                    return self.fit(members)
+        return None
+
+    def refilled(self, members: IntArray, out: IntArray) -> tuple[float, IntArray]:
+        """Take the members at the places `out` away, put the best others in, exchange; return E^2 and the members."""
+        open_to = self.usable.copy()
+        open_to[members[out]] = False
+        rest = np.delete(members, out)
+        while len(rest) < len(members):
+            chosen, _ = self.best_addition(rest, open_to)
+            if chosen < 0:
+                # No feasible curvatures yet: any candidate that is not in will do, the exchange sorts it out.
+                left = np.setdiff1d(np.flatnonzero(open_to), rest)
+                if not len(left):
+                    return math.inf, members
+                chosen = int(left[0])
+            rest = np.append(rest, chosen)
+        return self.exchanged(rest)

@@ -1,0 +1,153 @@
+"""Curvatures of given cones by a convex quadratic program in a few variables: an exact active set method.
+
+Plain loops, without slices and array expressions: those would take ten times as long to compile.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import FloatArray, IntArray
+from ..geometry.compiled import compiled
+
+# Pivots below this share of the largest diagonal count as it: cones on neighbouring vertices are nearly dependent.
+SMALLEST_PIVOT = 1e-13
+# What a multiplier may be off by, relative to the largest gradient, before its bound is released.
+RELEASE = 1e-11
+
+
+@compiled
+def factor_lower(gram: FloatArray, free: IntArray, count: int, lower: FloatArray) -> None:
+    """Write the Cholesky factor of gram[free, free] to `lower`."""
+    largest = 0.0
+    for i in range(count):
+        largest = max(largest, gram[free[i], free[i]])
+    for i in range(count):
+        for j in range(i + 1):
+            value = gram[free[i], free[j]]
+            for m in range(j):
+                value -= lower[i, m] * lower[j, m]
+            if i == j:
+                lower[i, i] = np.sqrt(max(value, SMALLEST_PIVOT * largest))
+            else:
+                lower[i, j] = value / lower[j, j]
+
+
+@compiled
+def solve_factored(lower: FloatArray, count: int, right: FloatArray) -> None:
+    """Overwrite `right` by the solution of lower lower^T x = right."""
+    for i in range(count):
+        for j in range(i):
+            right[i] -= lower[i, j] * right[j]
+        right[i] /= lower[i, i]
+    for i in range(count - 1, -1, -1):
+        for j in range(i + 1, count):
+            right[i] -= lower[j, i] * right[j]
+        right[i] /= lower[i, i]
+
+
+@compiled
+def fit_curvatures(
+    gram: FloatArray, slope: FloatArray, least: float, most: float, total: float
+) -> tuple[FloatArray, float, bool]:
+    """Minimise k gram k / 2 + slope k over least <= k <= most, and sum k = total unless that is NaN.
+
+    A primal active set method: it ends at the exact optimum, since the program is strictly convex.
+
+    Returns:
+        The curvatures, the multiplier of the sum, and whether the bounds allow the sum. Where they do not, the
+        bounds are left out.
+    """
+    size = len(slope)
+    has_sum = total == total
+    curvatures = np.zeros(size)
+    if size == 0:
+        return curvatures, 0.0, not has_sum or abs(total) < 1e-9
+    start = total / size if has_sum else 0.0
+    slack = 1e-12 * (1.0 + abs(start))
+    feasible = not has_sum or least - slack <= start <= most + slack
+    if not feasible:
+        least, most = -np.inf, np.inf
+    start = min(max(start, least), most)
+    state = np.zeros(size, np.int64)  # -1 held at the least, 1 at the most, 0 free
+    free = np.empty(size, np.int64)
+    best, ones, gradient = np.empty(size), np.empty(size), np.empty(size)
+    lower = np.empty((size, size))
+    for i in range(size):
+        curvatures[i] = start
+    multiplier = 0.0
+    for _ in range(20 * size + 20):
+        count = 0
+        for i in range(size):
+            if state[i] == 0:
+                free[count] = i
+                count += 1
+        # The best values of the free ones, the others held.
+        factor_lower(gram, free, count, lower)
+        left = total
+        for i in range(count):
+            best[i], ones[i] = -slope[free[i]], 1.0
+        for j in range(size):
+            if state[j] != 0:
+                left -= curvatures[j]
+                for i in range(count):
+                    best[i] -= gram[free[i], j] * curvatures[j]
+        solve_factored(lower, count, best)
+        multiplier = 0.0
+        if has_sum and count > 0:
+            solve_factored(lower, count, ones)
+            sum_best, sum_ones = 0.0, 0.0
+            for i in range(count):
+                sum_best += best[i]
+                sum_ones += ones[i]
+            multiplier = (sum_best - left) / sum_ones
+            for i in range(count):
+                best[i] -= multiplier * ones[i]
+        # As far there as the bounds allow.
+        step, blocking, side = 1.0, -1, 0
+        for i in range(count):
+            value, aim = curvatures[free[i]], best[i]
+            if aim > most or aim < least:
+                bound = most if aim > most else least
+                part = max((bound - value) / (aim - value), 0.0)
+                if part < step:
+                    step, blocking, side = part, free[i], 1 if aim > most else -1
+        for i in range(count):
+            curvatures[free[i]] += step * (best[i] - curvatures[free[i]])
+        if blocking >= 0:
+            state[blocking] = side
+            curvatures[blocking] = most if side == 1 else least
+            continue
+        # Whether one held at a bound would rather leave it.
+        largest = 1e-300
+        high, low = -1, -1
+        for i in range(size):
+            value = slope[i]
+            for j in range(size):
+                value += gram[i, j] * curvatures[j]
+            gradient[i] = value
+            largest = max(largest, abs(value))
+            if state[i] == 1 and (high < 0 or value > gradient[high]):
+                high = i
+            if state[i] == -1 and (low < 0 or value < gradient[low]):
+                low = i
+        if count == 0 and has_sum:
+            # One alone cannot move under the sum: the two that pull most, one from each bound.
+            if high < 0 or low < 0:
+                multiplier = -gradient[max(high, low)]
+                break
+            multiplier = -(gradient[high] + gradient[low]) / 2
+            if gradient[high] - gradient[low] <= RELEASE * largest:
+                break
+            state[high] = 0
+            state[low] = 0
+            continue
+        pull_high = gradient[high] + multiplier if high >= 0 else 0.0
+        pull_low = -gradient[low] - multiplier if low >= 0 else 0.0
+        if max(pull_high, pull_low) <= RELEASE * largest:
+            break
+        if pull_high >= pull_low:
+            state[high] = 0
+        else:
+            state[low] = 0
+    return curvatures, multiplier, feasible

@@ -1,0 +1,121 @@
+"""Exact energies of cones at the vertices tried so far, and moves that improve them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from .aggregate_kernel import ball
+from .coarse_model import CoarseModel
+from .dense_model import Limits, first_least
+from .dense_search import DenseSearch
+from .green import GreenOperator
+
+# A move is tried if it promises to lower E^2 by this share.
+WORTHWHILE = 2e-4
+# Rounds of moves for a set of cones; most come to rest after three or four.
+ROUNDS = 12
+
+
+class Pool:
+    """A dense model on a growing set of vertices, with exact entries."""
+
+    def __init__(
+        self,
+        operator: GreenOperator,
+        coarse: CoarseModel,
+        curvature: FloatArray,
+        log_scale: FloatArray,
+        usable: BoolArray,
+        required: IntArray,
+        limits: Limits,
+    ) -> None:
+        self._operator = operator
+        self._coarse = coarse
+        self._curvature = curvature
+        self._usable = usable
+        self._indptr = operator.laplacian.indptr.astype(np.int64)
+        self._indices = operator.laplacian.indices.astype(np.int64)
+        self._slope = operator.solve(operator.weighted(log_scale))
+        self.unknowns: IntArray = np.empty(0, dtype=np.int64)
+        none = np.empty(0)
+        self.model = DenseSearch(
+            np.empty((0, 0)), none, coarse.constant, none.astype(bool), np.arange(len(required)), limits
+        )
+        self.insert(required)
+
+    def insert(self, unknowns: IntArray) -> IntArray:
+        """Add vertices, if they are not in, and return the places of all."""
+        new = np.setdiff1d(unknowns, self.unknowns)
+        if len(new):
+            # Required ones come first and stay in the order given.
+            new = unknowns if not len(self.unknowns) else new
+            model = self.model
+            self.unknowns = np.concatenate([self.unknowns, new])
+            rows = self._operator.kernel_rows(new, self.unknowns)
+            old = len(self.unknowns) - len(new)
+            gram = np.empty((len(self.unknowns), len(self.unknowns)))
+            gram[:old, :old] = model.gram
+            gram[old:] = rows
+            gram[:old, old:] = rows[:, :old].T
+            gram[old:, old:] = (rows[:, old:] + rows[:, old:].T) / 2
+            model.gram = gram
+            model.slope = self._slope[self.unknowns]
+            model.usable = np.ones(len(self.unknowns), dtype=bool)
+            model.usable[model.fixed] = False
+        order = np.argsort(self.unknowns, kind="stable")
+        return order[np.searchsorted(self.unknowns, unknowns, sorter=order)]
+
+    def curvatures(self, members: IntArray) -> FloatArray:
+        """Return the best curvatures of members."""
+        return self.model.fit(members).curvatures
+
+    def score(self, members: IntArray, curvatures: FloatArray) -> FloatArray:
+        """Return (f,) half the derivative of E^2 by the curvature of a cone at each vertex."""
+        source = -self._curvature
+        source[self.unknowns[members]] += curvatures
+        operator = self._operator
+        return operator.solve(operator.weighted(operator.solve(source)))
+
+    def polish(self, members: IntArray) -> tuple[float, IntArray]:
+        """Move cones over the mesh until E comes to rest; return E^2 and the members."""
+        energy, members = self.model.exchanged(members)
+        self.model.offer(energy, members)
+        for _ in range(ROUNDS):
+            targets = self.targets(members, self.curvatures(members), energy)
+            if not len(targets):
+                break
+            known = len(self.unknowns)
+            self.insert(targets)
+            moved, members = self.model.exchanged(members)
+            self.model.offer(moved, members)
+            if len(self.unknowns) == known or not moved < energy * (1 - WORTHWHILE):
+                break
+            energy = moved
+        best = self.model.best[len(members)]
+        return best[0], best[1]
+
+    def targets(self, members: IntArray, curvatures: FloatArray, energy: float) -> IntArray:
+        """Return where cones should move by the score and the coarse model's distances.
+
+        Moving curvature k from s to t changes E^2 by 2 k (q_t - q_s) + k^2 ||g_s - g_t||^2, q the score.
+        """
+        score = self.score(members, curvatures)
+        size = max(40, 4 * len(self._usable) // self._coarse.basis.shape[1])
+        taken = self.unknowns[members]
+        targets = []
+        for place in range(len(self.model.fixed), len(members)):
+            s, k = int(taken[place]), curvatures[place]
+            near = ball(self._indptr, self._indices, s, size)
+            near = near[self._usable[near] & ~np.isin(near, taken)]
+            if not len(near) or k == 0:
+                continue
+            linear = 2 * k * (score[near] - score[s])
+            bending = k * k * self._coarse.squared_distances(s, near)
+            # A longer and a more cautious step: the distances are those of a coarse model.
+            for caution in (1.0, 4.0):
+                change = linear + caution * bending
+                best = first_least(change)
+                if change[best] < -WORTHWHILE * energy:
+                    targets.append(int(near[best]))
+        return np.unique(np.array(targets, dtype=np.int64))

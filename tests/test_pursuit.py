@@ -1,0 +1,243 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+from coneflat import check_mesh, edge_lengths, read_mesh
+from coneflat.cones import pursuit
+from coneflat.cones.fit_kernel import fit_curvatures
+from coneflat.cones.pursuit import open_search
+from coneflat.errors import CurvatureError, OptionError
+from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, double_areas
+from coneflat.geometry.areas import area_distortion
+
+HANDLE = shapes.genus(3)
+CLOSED = {"sphere": shapes.sphere(4), "torus": shapes.torus(), "genus 3": HANDLE}
+BOUNDED = {"hill": shapes.hill(), "annulus": shapes.annulus()}
+SHAPES = CLOSED | BOUNDED
+
+
+def surface(vertices, faces):
+    """Return what the search takes, and what it takes by name."""
+    mesh = check_mesh(vertices, faces).mesh
+    lengths = edge_lengths(mesh.vertices, mesh.faces)
+    curvature = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
+    laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths), len(mesh.vertices))
+    areas = np.bincount(mesh.faces.ravel(), np.repeat(double_areas(lengths) / 6, 3), len(mesh.vertices))
+    return laplacian, curvature, areas, mesh.is_boundary_vertex, mesh.euler_characteristic
+
+
+def pursue_cones(*given, distortion=0.2, count=None, **options):
+    return pursuit.pursue(open_search(*given, **options), distortion=distortion, count=count)
+
+
+def pursue(vertices, faces, **options):
+    return pursue_cones(*surface(vertices, faces), positions=vertices, **options)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_reported_distortion_is_that_of_the_log_scale(name):
+    laplacian, curvature, areas, is_boundary, chi = surface(*SHAPES[name])
+    found = pursue_cones(laplacian, curvature, areas, is_boundary, chi, distortion=0.1)
+    solution = found.solution
+    assert found.reached
+    assert found.distortion <= 0.1
+    assert found.distortion == pytest.approx(area_distortion(solution.log_scale, areas), rel=1e-9)
+    residual = laplacian @ solution.log_scale - solution.target + curvature
+    assert np.abs(residual).max() < 1e-9
+    outside = np.setdiff1d(np.arange(len(areas)), solution.cones)
+    assert not solution.target[outside][~is_boundary[outside]].any()
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_curvatures_sum_to_gauss_bonnet(name):
+    given = surface(*SHAPES[name])
+    chi = given[-1]
+    solution = pursue_cones(*given, distortion=0.1).solution
+    assert solution.target.sum() == pytest.approx(2 * np.pi * chi, abs=1e-9)
+    if name in CLOSED:
+        assert solution.curvatures.sum() == pytest.approx(2 * np.pi * chi, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("angles", [(np.pi, None), (0.5 * np.pi, 2.5 * np.pi), (1.5 * np.pi, 3 * np.pi)])
+def test_cone_angles_keep_to_their_bounds(name, angles):
+    low, high = angles
+    found = pursue(*SHAPES[name], distortion=0.15, min_cone_angle=low, max_cone_angle=high)
+    cone_angles = 2 * np.pi - found.solution.curvatures
+    assert (cone_angles >= low - 1e-9).all()
+    assert high is None or (cone_angles <= high + 1e-9).all()
+
+
+def test_positive_only():
+    found = pursue(*shapes.sphere(4), distortion=0.1, positive_only=True)
+    assert (found.solution.curvatures >= 0).all()
+    with pytest.raises(CurvatureError, match="-8 pi"):
+        pursue(*HANDLE, positive_only=True)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_history_falls_and_ends_at_the_answer(name):
+    found = pursue(*SHAPES[name], distortion=0.05)
+    counts, energies = np.array(found.history).T
+    assert (np.diff(counts) > 0).all()
+    assert (np.diff(energies) < 0).all()
+    assert counts[-1] == len(found.solution.cones)
+    assert energies[-1] == pytest.approx(found.distortion, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_no_cone_can_be_left_out(name):
+    search = open_search(*surface(*SHAPES[name]), positions=SHAPES[name][0])
+    energy, members = search.fewest(0.1)
+    assert energy <= 0.1
+    for place in range(len(members)):
+        assert search.pool.model.energy(np.delete(members, place)) > 0.01
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_renumbering_changes_nothing(name):
+    vertices, faces = SHAPES[name]
+    shuffled, turned, _ = shapes.renumber(vertices, faces)
+    one = pursue(vertices, faces, distortion=0.1)
+    two = pursue(shuffled, turned, distortion=0.1)
+    assert len(one.solution.cones) == len(two.solution.cones)
+    assert one.distortion == pytest.approx(two.distortion, rel=1e-6)
+
+
+def test_size_does_not_matter():
+    vertices, faces = shapes.hill()
+    one, two = pursue(vertices, faces, distortion=0.1), pursue(1e-3 * vertices, faces, distortion=0.1)
+    assert one.distortion == pytest.approx(two.distortion, rel=1e-6)
+    assert len(one.solution.cones) == len(two.solution.cones)
+
+
+def test_a_torus_has_no_cones_or_two_and_more():
+    vertices, faces = shapes.torus()
+    loose = pursue(vertices, faces, distortion=10)
+    assert len(loose.solution.cones) == 0
+    tight = pursue(vertices, faces, distortion=0.9 * loose.distortion)
+    assert len(tight.solution.cones) >= 2
+    assert len(pursue(vertices, faces, count=1).solution.cones) == 0
+
+
+def test_a_sphere_needs_enough_cones():
+    vertices, faces = shapes.sphere(3)
+    with pytest.raises(CurvatureError, match=r"2 cones of at most 1\.5 pi each .* 4 pi: 3 or more"):
+        pursue(vertices, faces, count=2)
+    assert len(pursue(vertices, faces, count=3).solution.cones) == 3
+    needles = pursue(vertices, faces, distortion=5, min_cone_angle=1e-3)
+    assert len(needles.solution.cones) == 3
+
+
+def test_more_cones_are_no_worse():
+    given = surface(*shapes.sphere(4))
+    energies = [pursue_cones(*given, count=count).distortion for count in range(3, 9)]
+    assert (np.diff(energies) < 0).all()
+
+
+def test_required_cones_are_kept_and_forbidden_ones_avoided():
+    vertices, faces = shapes.hill(30, 30)
+    search = surface(vertices, faces)
+    free = pursue_cones(*search, distortion=0.05)
+    x = vertices[:, 0]
+    forbidden = x > 0.4
+    found = pursue_cones(*search, distortion=0.05, allowed=~forbidden)
+    assert not forbidden[found.solution.cones].any()
+    inner = np.flatnonzero(~search[3])
+    required = [int(inner[7]), int(inner[300])]
+    found = pursue_cones(*search, distortion=0.05, required=required)
+    assert found.solution.cones[:2].tolist() == required
+    allowed = np.zeros(len(x), dtype=bool)
+    allowed[free.solution.cones] = True
+    found = pursue_cones(*search, distortion=0.05, allowed=allowed)
+    assert set(found.solution.cones) <= set(free.solution.cones)
+    assert found.distortion == pytest.approx(free.distortion, rel=0.05)
+
+
+def test_weights_shift_distortion_away():
+    vertices, faces = shapes.sphere(4)
+    given = surface(vertices, faces)
+    face = vertices[:, 2] > 0.5
+    plain = pursue_cones(*given, count=5)
+    careful = pursue_cones(*given, count=5, weights=np.where(face, 50.0, 1.0))
+
+    def inside(found):
+        return area_distortion(found.solution.log_scale[face], given[2][face])
+
+    assert inside(careful) < 0.7 * inside(plain)
+
+
+def test_what_cannot_be_reached_is_flagged():
+    vertices, faces = shapes.sphere(3)
+    allowed = np.zeros(len(vertices), dtype=bool)
+    allowed[[0, 5, 9, 11]] = True
+    found = pursue(vertices, faces, distortion=1e-3, allowed=allowed)
+    assert not found.reached
+    assert found.distortion > 1e-3
+    assert set(found.solution.cones) <= {0, 5, 9, 11}
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"distortion": 0}, OptionError),
+        ({"distortion": -1}, OptionError),
+        ({"distortion": np.nan}, OptionError),
+        ({"count": -1}, OptionError),
+        ({"count": 2.5}, OptionError),
+        ({"min_cone_angle": 0}, OptionError),
+        ({"max_cone_angle": 1}, OptionError),
+        ({"required": [10**6]}, OptionError),
+        ({"required": [3, 3]}, OptionError),
+        ({"weights": np.ones(3)}, OptionError),
+        ({"required": [1, 2, 3, 4], "count": 3}, CurvatureError),
+        ({"min_cone_angle": 2.5 * np.pi}, CurvatureError),
+        ({"allowed": np.zeros(162, dtype=bool)}, CurvatureError),
+    ],
+)
+def test_options_that_make_no_sense(options, error):
+    with pytest.raises(error):
+        pursue(*shapes.sphere(2), **options)
+
+
+def test_fit_agrees_with_the_optimality_conditions():
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        size = int(rng.integers(1, 9))
+        root = rng.normal(size=(size, size + 2))
+        gram, slope = root @ root.T, 3 * rng.normal(size=size)
+        least, most = -rng.uniform(0, 2), rng.uniform(0, 2)
+        total = rng.uniform(size * least, size * most) if rng.random() < 0.5 else np.nan
+        k, multiplier, feasible = fit_curvatures(gram, slope, least, most, total)
+        gradient = gram @ k + slope + (0 if np.isnan(total) else multiplier)
+        assert feasible
+        assert (k >= least - 1e-12).all()
+        assert (k <= most + 1e-12).all()
+        assert np.isnan(total) or k.sum() == pytest.approx(total, abs=1e-9)
+        assert (gradient[k < most - 1e-9] > -1e-7).all()
+        assert (gradient[k > least + 1e-9] < 1e-7).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("fandisk.obj", 5),
+        ("rocker-arm.obj", 6),
+        ("hand.obj", 10),
+        ("bunny.obj", 8),
+        ("camelhead.off", 6),
+        ("face.obj", 8),
+        ("horse.ply", 16),
+        ("3holes.off", 9),
+    ],
+)
+def test_fewer_cones_than_published(shared, name, count):
+    """Li et al. 2023 report 5, 8, 10, 11, 7, 10, 16 and 10 cones for E <= 0.2."""
+    model = read_mesh(shared(name))
+    vertices, faces = model.vertices, model.corners.reshape(-1, 3)
+    found = pursue(vertices, faces, distortion=0.2, min_cone_angle=0.1 * np.pi)
+    assert found.reached
+    assert found.distortion <= 0.2
+    assert len(found.solution.cones) <= count
