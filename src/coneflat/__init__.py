@@ -21,6 +21,10 @@ _HOMES = {
     "read_mesh": "io",
     "MeshFile": "io",
     "sample_path": "sample",
+    "cone_curve": "curve",
+    "ConeCurve": "curve",
+    "find_cones": "curve",
+    "FoundCones": "curve",
     "TriangleMesh": "mesh",
     "check_mesh": "validation",
     "CheckedMesh": "validation",
@@ -46,17 +50,20 @@ _HOMES = {
 
 __all__ = [
     "CheckedMesh",
+    "ConeCurve",
     "ConeSolution",
     "ConeflatError",
     "CutMesh",
     "Distortion",
     "Flattening",
+    "FoundCones",
     "MeshFile",
     "PAPER",
     "TriangleMesh",
     "__version__",
     "angle_defect",
     "check_mesh",
+    "cone_curve",
     "cones_at",
     "cones_with_curvature",
     "corner_angles",
@@ -65,6 +72,7 @@ __all__ = [
     "cut_open",
     "edge_lengths",
     "errors",
+    "find_cones",
     "find_seams",
     "flatten",
     "greedy_cones",
@@ -80,6 +88,7 @@ if TYPE_CHECKING:
     from . import errors
     from .cones import ConeSolution, cones_at, cones_with_curvature, greedy_cones
     from .conformal.linear import scaled_lengths
+    from .curve import ConeCurve, FoundCones, cone_curve, find_cones
     from .distortion import Distortion, measure
     from .errors import ConeflatError
     from .geometry import (

@@ -10,41 +10,33 @@ import numpy as np
 from ._arrays import FloatArray, IntArray
 from .distortion import curvature_errors, measure
 from .figures import SolveFigures
-from .inputs import InputMesh
 from .layout import arrange
 from .mesh import TriangleMesh
 from .numbering import result_numbering, turn_corners
 from .options import Options
 from .result import Flattening
+from .rotations import Rotations
 from .stages import Stages
-from .validation import CheckedMesh
 
 if TYPE_CHECKING:
     from .methods import LaidOut
+    from .prepare import Component, Prepared
 
 
-def assemble(
-    given: InputMesh,
-    checked: CheckedMesh,
-    parts: Sequence[tuple[TriangleMesh, IntArray, IntArray]],
-    laid_out: Sequence[LaidOut],
-    options: Options,
-    stages: Stages,
-    notes: tuple[str, ...],
-) -> Flattening:
+def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, stages: Stages) -> Flattening:
     """Arrange the pieces in the unit square, number everything as in the input, and measure.
 
     Args:
-        given, checked: the input, and what the check made of it.
-        parts: for each component its mesh, and its vertices and faces in the checked mesh.
-        laid_out: the flattened components.
-        options, stages, notes: what the result tells about itself.
+        prepared: the input.
+        laid_out: its flattened components.
+        options, stages: what the result tells about itself.
     """
+    given, checked, parts = prepared.given, prepared.checked, prepared.components
     points = np.asarray(given.vertices, dtype=np.float64)
     number, vertex_origin = result_numbering(checked, len(points))
     numbers, positions = _number_vertices(number, points[vertex_origin], parts, laid_out, checked.exponent)
     face_origin = np.concatenate(
-        [faces[one.face_origin] for (_, _, faces), one in zip(parts, laid_out, strict=True)]
+        [part.faces[one.face_origin] for part, one in zip(parts, laid_out, strict=True)]
     )
     order = np.argsort(face_origin, kind="stable")
     faces = np.concatenate([ids[one.mesh.faces] for ids, one in zip(numbers, laid_out, strict=True)])[order]
@@ -92,9 +84,10 @@ def assemble(
         seams=np.concatenate([ids[one.seams] for ids, one in zip(numbers, laid_out, strict=True)]),
         distortion=distortion,
         seconds=dict(stages.seconds),
-        notes=(*checked.notes, *notes, *(note for one in laid_out for note in one.notes), *lost),
+        notes=(*checked.notes, *prepared.notes, *(note for one in laid_out for note in one.notes), *lost),
         settings=options.as_dict(),
         solve=SolveFigures.of_all([one.figures for one in laid_out], [one.area for one in laid_out]),
+        rotations=Rotations.of_all(one.rotations for one in laid_out),
         vertex_origin=np.concatenate([vertex_origin, np.full(len(positions) - len(vertex_origin), -1)]),
         face_origin=checked.face_origin[face_origin[order]],
         face_corners=face_corners,
@@ -105,7 +98,7 @@ def assemble(
 def _number_vertices(
     number: IntArray,
     positions: FloatArray,
-    parts: Sequence[tuple[TriangleMesh, IntArray, IntArray]],
+    parts: Sequence[Component],
     laid_out: Sequence[LaidOut],
     exponent: int,
 ) -> tuple[list[IntArray], FloatArray]:
@@ -114,9 +107,9 @@ def _number_vertices(
     Vertices that a refinement added come last.
     """
     numbers, blocks, count = [], [positions], len(positions)
-    for (_, vertices, _), one in zip(parts, laid_out, strict=True):
-        added = one.mesh.vertices[len(vertices) :]
-        numbers.append(np.concatenate([number[vertices], np.arange(count, count + len(added))]))
+    for part, one in zip(parts, laid_out, strict=True):
+        added = one.mesh.vertices[len(part.vertices) :]
+        numbers.append(np.concatenate([number[part.vertices], np.arange(count, count + len(added))]))
         blocks.append(np.ldexp(added, -exponent))
         count += len(added)
     return numbers, np.concatenate(blocks)

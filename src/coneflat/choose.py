@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from scipy.sparse import csc_matrix
 
 from ._arrays import FloatArray
 from .cones import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
+from .geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
+from .geometry.areas import vertex_areas
 from .geometry.ties import tie_key
 from .mesh import TriangleMesh
 from .options import Options
 from .stages import Stages
 from .wishes import Wishes
+
+if TYPE_CHECKING:
+    from .cones.cone_search import ConeSearch
+
+#: Returns what loops across the handles turn by in the metric that a solution leads to, radians.
+Turned: TypeAlias = Callable[[ConeSolution], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +44,13 @@ class Surface:
     curvature: FloatArray
     areas: FloatArray
 
+    @classmethod
+    def of(cls, mesh: TriangleMesh, lengths: FloatArray) -> Surface:
+        """Return a mesh with what follows from its lengths."""
+        curvature = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
+        laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths), len(mesh.vertices))
+        return cls(mesh, lengths, laplacian, curvature, vertex_areas(mesh.faces, lengths, len(mesh.vertices)))
+
 
 def pursues(mesh: TriangleMesh, options: Options) -> bool:
     """Whether the pursuit finds the cones of a mesh."""
@@ -41,11 +58,13 @@ def pursues(mesh: TriangleMesh, options: Options) -> bool:
     return options.method == "pursuit" or (options.method == "auto" and not is_prescribed)
 
 
-def choose_cones(surface: Surface, wishes: Wishes, options: Options, stages: Stages) -> ConeSolution:
-    """Return cones with their curvatures and linear log scale."""
+def choose_cones(
+    surface: Surface, wishes: Wishes, options: Options, stages: Stages, turned: Turned | None = None
+) -> ConeSolution:
+    """Return cones with their curvatures and linear log scale; `turned` is asked where these are quantised."""
     mesh = surface.mesh
     if pursues(mesh, options):
-        return _pursued(surface, wishes, options)
+        return _pursued(surface, wishes, options, turned)
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     if options.method == "greedy":
         solution = greedy_cones(
@@ -69,39 +88,54 @@ def choose_cones(surface: Surface, wishes: Wishes, options: Options, stages: Sta
     return solution
 
 
-def _pursued(surface: Surface, wishes: Wishes, options: Options) -> ConeSolution:
+def _pursued(surface: Surface, wishes: Wishes, options: Options, turned: Turned | None) -> ConeSolution:
     """Return the fewest cones for the distortion allowed, or the best of the number asked for."""
-    from .cones.pursuit import open_search, pursue
+    from .cones.align import align_handles
+    from .cones.pursuit import pursue
     from .cones.quantise import quantise_cones
+    from .conformal.turning import open_turning
 
     mesh = surface.mesh
-    is_straight = options.boundary_kind == "straight"
-    # Corners of a straightened boundary are part of the trade, like the cones inside.
-    takes_rest = mesh.is_boundary_vertex & (not is_straight)
-    given = surface.laplacian, surface.curvature, takes_rest, mesh.euler_characteristic
+    takes_rest = mesh.is_boundary_vertex & (options.boundary_kind != "straight")
     if not (wishes.is_allowed & ~takes_rest).any() and (takes_rest.any() or mesh.euler_characteristic == 0):
+        given = surface.laplacian, surface.curvature, takes_rest, mesh.euler_characteristic
         return cones_at(*given, wishes.required.vertices)
-    has_corners = is_straight and mesh.is_boundary_vertex.any()
-    search = open_search(
-        *given[:2],
+    search = search_on(surface, wishes, options)
+
+    def ask(count: int | None) -> ConeSolution:
+        if options.quantum is None:
+            return pursue(search, distortion=options.distortion, count=count).solution
+        found = quantise_cones(search, options.quantum, distortion=options.distortion, count=count)
+        if turned is not None and mesh.genus():
+            by_scale = open_turning(mesh).by_log_scale(surface.lengths)
+            found = align_handles(search, found, by_scale, turned, options.distortion)
+        return found.solution
+
+    found = ask(options.cone_count)
+    if options.max_cones is not None and len(found.cones) > options.max_cones:
+        found = ask(options.max_cones)
+    return replace(found, cones=found.cones[~mesh.is_boundary_vertex[found.cones]])
+
+
+def search_on(surface: Surface, wishes: Wishes, options: Options) -> ConeSearch:
+    """Return a search for cones as the options and the user's wishes have it."""
+    from .cones.pursuit import open_search
+
+    mesh = surface.mesh
+    is_straight = options.boundary_kind == "straight" and mesh.is_boundary_vertex.any()
+    return open_search(
+        surface.laplacian,
+        surface.curvature,
         surface.areas,
-        *given[2:],
+        # Corners of a straightened boundary are part of the trade, like the cones inside.
+        mesh.is_boundary_vertex & (not is_straight),
+        mesh.euler_characteristic,
         tie_key=tie_key(mesh.vertices),
         # A corner of angle a has a curvature of pi - a: cones inside keep to the same bound.
-        min_cone_angle=options.min_cone_angle + (np.pi if has_corners else 0.0),
+        min_cone_angle=options.min_cone_angle + (np.pi if is_straight else 0.0),
         max_cone_angle=options.max_cone_angle,
         positive_only=options.positive_only,
         weights=wishes.weights,
         required=wishes.required.vertices,
         allowed=wishes.is_allowed,
     )
-
-    def ask(count: int | None) -> ConeSolution:
-        if options.quantum is None:
-            return pursue(search, distortion=options.distortion, count=count).solution
-        return quantise_cones(search, options.quantum, distortion=options.distortion, count=count).solution
-
-    found = ask(options.cone_count)
-    if options.max_cones is not None and len(found.cones) > options.max_cones:
-        found = ask(options.max_cones)
-    return replace(found, cones=found.cones[~mesh.is_boundary_vertex[found.cones]])

@@ -10,32 +10,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import BoolArray, FloatArray, IntArray
+from ._arrays import FloatArray, IntArray
 from .assemble import assemble
-from .choose import Surface, choose_cones, pursues
+from .choose import Surface, Turned, choose_cones, pursues
 from .cones import ConeSolution
 from .conformal.boundary import prescribed_boundary, straight_boundary
+from .conformal.turning import open_turning
+from .distortion import measure
 from .errors import ConvergenceError, CurvatureError
-from .geometry import (
-    angle_defect,
-    corner_angles,
-    cotangent_laplacian,
-    cotangents,
-    edge_lengths,
-    mollify,
-)
-from .geometry.areas import area_distortion, vertex_areas
-from .inputs import as_input
-from .mesh import TriangleMesh
+from .geometry.areas import area_distortion
 from .methods import ExactChoices, FlatMetric, LaidOut, exact_flattening, linear_flattening
-from .numbering import at_unit_size, turn_corners
+from .methods.exact import ExactFlatMetric
+from .methods.handles import corrected_flattening, flat_triangles
 from .options import Boundary, Cones, Options
+from .prepare import Component, prepare
 from .result import Flattening
+from .rotations import measure_rotations
 from .seams import cut_open, find_seams
 from .stages import Progress, Stages
 from .text import plural
-from .validation import check_mesh
-from .wishes import Wishes, locate_wishes
+from .wishes import Wishes
 
 # Searches for cones at most: each forbids those where the triangles of the one before had no room for the angle.
 SEARCHES = 4
@@ -147,54 +141,30 @@ def flatten(
     )
     stages = Stages(progress)
     with stages("check"):
-        given = as_input(mesh, faces)
-        checked = at_unit_size(check_mesh(given.vertices, given.faces, repair=repair))
-        lengths, note = mollify(
-            edge_lengths(checked.mesh.vertices, checked.mesh.faces), strict=strict, names=checked.face_origin
-        )
-        is_diagonal = turn_corners(checked, ~given.is_side())
-        wishes = locate_wishes(checked, options, given)
-        parts = checked.mesh.split_components()
+        prepared = prepare(mesh, faces, options)
     pieces = []
-    for part, vertices, part_faces in parts:
-        stages.share = len(part_faces) / len(checked.mesh.faces)
-        shape = lengths[part_faces], is_diagonal[part_faces], wishes.within(vertices)
+    for part in prepared.components:
+        stages.share = len(part.faces) / len(prepared.checked.mesh.faces)
         try:
-            pieces.append(flatten_component(part, *shape, options, stages))
+            pieces.append(flatten_component(part, options, stages))
         except (CurvatureError, ConvergenceError) as error:
-            if len(parts) == 1:
+            if len(prepared.components) == 1:
                 raise
-            where = f"in the component of vertex {checked.vertex_origin[vertices[0]]} ({len(part_faces):,} triangles)"
+            where = f"in the component of vertex {part.wishes.names[0]} ({len(part.faces):,} triangles)"
             raise type(error)(f"{where}: {error}") from error
         stages.done += stages.share
-    return assemble(given, checked, parts, pieces, options, stages, () if note is None else (note,))
+    return assemble(prepared, pieces, options, stages)
 
 
-def flatten_component(
-    mesh: TriangleMesh,
-    lengths: FloatArray,
-    is_diagonal: BoolArray,
-    wishes: Wishes,
-    options: Options,
-    stages: Stages,
-) -> LaidOut:
-    """Flatten a connected mesh to one disk.
-
-    Args:
-        mesh: the mesh.
-        lengths: (m, 3) side lengths, with which every triangle has area.
-        is_diagonal: (m, 3) sides inside a polygon of the input, which should not be cut.
-        wishes: what the user says of its vertices.
-        options: all others.
-        stages: told how far it is.
-    """
+def flatten_component(part: Component, options: Options, stages: Stages) -> LaidOut:
+    """Flatten a connected mesh to one disk."""
     for _ in range(SEARCHES):
-        laid_out = _flatten_once(mesh, lengths, is_diagonal, wishes, options, stages)
+        laid_out = _flatten_once(part, options, stages)
         unheld = unheld_cones(laid_out)
-        if not len(unheld) or not pursues(mesh, options):
+        if not len(unheld) or not pursues(part.mesh, options):
             break
-        wishes = wishes.without(unheld)
-    return replace(laid_out, notes=laid_out.notes + shortfalls(laid_out, wishes.names))
+        part = replace(part, wishes=part.wishes.without(unheld))
+    return replace(laid_out, notes=laid_out.notes + shortfalls(laid_out, part.wishes.names))
 
 
 def shortfalls(laid_out: LaidOut, names: IntArray) -> tuple[str, ...]:
@@ -207,8 +177,8 @@ def shortfalls(laid_out: LaidOut, names: IntArray) -> tuple[str, ...]:
             f"{plural(len(unheld), 'cone')} too wide for the triangles around: that at vertex {names[unheld[0]]} has "
             f"an angle of {angle:.3g} pi. Choose others, or refine (--refine)."
         )
-    sides = laid_out.points[laid_out.corners]
-    one, two = sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]
+    corners = laid_out.points[laid_out.corners]
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     flipped = int(np.count_nonzero(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0] <= 0))
     if flipped and laid_out.figures.ptolemy_flips + laid_out.figures.euclidean_flips:
         notes.append(
@@ -224,37 +194,66 @@ def unheld_cones(laid_out: LaidOut) -> IntArray:
     return laid_out.cones[np.abs(error[laid_out.cones]) > UNHELD]
 
 
-def _flatten_once(
-    mesh: TriangleMesh,
-    lengths: FloatArray,
-    is_diagonal: BoolArray,
-    wishes: Wishes,
-    options: Options,
-    stages: Stages,
-) -> LaidOut:
+def _flatten_once(part: Component, options: Options, stages: Stages) -> LaidOut:
     with stages("cones", 0.4):
-        curvature = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
-        laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths), len(mesh.vertices))
-        areas = vertex_areas(mesh.faces, lengths, len(mesh.vertices))
-        surface = Surface(mesh, lengths, laplacian, curvature, areas)
-        solution = choose_cones(surface, wishes, options, stages)
+        surface = Surface.of(part.mesh, part.lengths)
+        solution = choose_cones(
+            surface, part.wishes, options, stages, _turning_meter(surface, part.wishes, options)
+        )
+    laid_out = _lay_out(surface, part, solution, replace(options, correct_handles=False), stages)
+    if not options.correct_handles or not part.mesh.genus():
+        return laid_out
+    corrected = _lay_out(surface, part, solution, options, stages)
+    return replace(corrected, notes=(*corrected.notes, _cost_of_correction(laid_out, corrected)))
 
+
+def _turning_meter(surface: Surface, wishes: Wishes, options: Options) -> Turned | None:
+    """Return what tells by how much loops across handles turn with given cones; None where nobody asks."""
+    if options.quantum is None or options.metric != "exact" or not surface.mesh.genus():
+        return None
+    turning, plain = open_turning(surface.mesh), replace(options, correct_handles=False, best_effort=True)
+
+    def turned(solution: ConeSolution) -> FloatArray:
+        metric = find_metric(surface, solution, wishes, plain)
+        return turning.of_flat(flat_triangles(metric)) if isinstance(metric, ExactFlatMetric) else np.empty(0)
+
+    return turned
+
+
+def _cost_of_correction(before: LaidOut, after: LaidOut) -> str:
+    qc = [measure(one.mesh, one.points[one.corners]).qc_mean for one in (before, after)]
+    off = 0.0 if before.rotations is None else np.abs(before.rotations.handles).max()
+    return (
+        f"Rotations along handles were off by up to {off:.2g} rad; making them whole changed the mean QC distortion "
+        f"from {qc[0]:.5f} to {qc[1]:.5f}."
+    )
+
+
+def _lay_out(
+    surface: Surface, part: Component, solution: ConeSolution, options: Options, stages: Stages
+) -> LaidOut:
+    """Scale, cut and lay out a connected mesh with given cones."""
+    mesh = part.mesh
     with stages("metric", 0.75):
-        metric = find_metric(surface, solution, wishes, options)
+        metric = find_metric(surface, solution, part.wishes, options)
 
     with stages("cut", 0.85):
         forbidden = np.zeros(len(mesh.edges), dtype=bool)
-        forbidden[mesh.halfedge_edges[is_diagonal.ravel()]] = True
-        seams = find_seams(mesh, solution.cones, lengths.ravel()[mesh.edge_halfedges[:, 0]], forbidden)
+        forbidden[mesh.halfedge_edges[part.is_diagonal.ravel()]] = True
+        seams = find_seams(mesh, solution.cones, part.lengths.ravel()[mesh.edge_halfedges[:, 0]], forbidden)
         disk = cut_open(mesh, seams).mesh
 
     with stages("layout", 1.0):
         laid_out = metric.lay_out(disk, seams)
         linear, reached = (
-            area_distortion(phi, areas) for phi in (solution.log_scale, laid_out.log_scale[: len(areas)])
+            area_distortion(phi, surface.areas)
+            for phi in (solution.log_scale, laid_out.log_scale[: len(mesh.vertices)])
         )
         figures = replace(laid_out.figures, area_distortion_linear=linear, area_distortion=reached)
-        return replace(laid_out, figures=figures)
+        rotations = None
+        if options.quantum is not None:
+            rotations = measure_rotations(laid_out.mesh, laid_out.points[laid_out.corners], options.quantum)
+        return replace(laid_out, figures=figures, rotations=rotations)
 
 
 def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, options: Options) -> FlatMetric:
@@ -283,4 +282,6 @@ def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, option
         refine=options.refine,
         names=wishes.names,
     )
+    if options.correct_handles and options.quantum is not None and mesh.genus():
+        return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantum)
     return exact_flattening(mesh, lengths, solution, choices)

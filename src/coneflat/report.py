@@ -43,6 +43,8 @@ def as_dict(result: Flattening) -> dict[str, Any]:
         "cones": len(result.cones),
         **{name: getattr(result.distortion, name) for name in MEASURES},
         **asdict(result.solve),
+        "rotation_deviation": None if result.rotations is None else result.rotations.worst,
+        "handle_deviations": None if result.rotations is None else result.rotations.handles,
         "uv_scale": result.uv_scale,
         "cone_vertices": result.cones.tolist(),
         "cone_curvatures": result.curvatures.tolist(),
@@ -76,6 +78,19 @@ def _allowed(result: Flattening) -> str:
     if settings.get("cone_count") is not None:
         return "the least for so many cones"
     return f"{settings['distortion']:g} allowed"
+
+
+def _rotation_rows(result: Flattening) -> list[tuple[str, str, str]]:
+    rotations = result.rotations
+    if rotations is None:
+        return []
+    quantum = f"from multiples of {rotations.quantum / np.pi:.4g} pi, radians"
+    rows = [("seam rotations", f"{rotations.worst:.1e}", f"largest deviation of a seam's rotation {quantum}")]
+    if rotations.handles:
+        handles = " ".join(f"{angle:+.1e}" for angle in rotations.handles[:6])
+        more = f"; and {len(rotations.handles) - 6} more" if len(rotations.handles) > 6 else ""
+        rows.append(("around handles", handles, f"the same along each generator{more}"))
+    return rows
 
 
 def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
@@ -130,4 +145,5 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
             f"{d.seam_mismatch:.1e}",
             f"of the two sides' lengths; worst {d.seam_mismatch_max:.1e}",
         ),
+        *_rotation_rows(result),
     ]

@@ -12,6 +12,7 @@ from ._arrays import FloatArray, IntArray
 from .distortion import Distortion
 from .figures import SolveFigures
 from .io.model import MeshFile
+from .rotations import Rotations
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,7 @@ class Flattening:
         notes: what was done to the input, one sentence each.
         settings: the options it was made with.
         solve: how the metric and the layout were found: Newton steps, flips, untangled triangles.
+        rotations: of seams, against multiples of the quantum of the cones; None without one.
         vertex_origin: (n,) the input vertex that each vertex came from, -1 for those that a refinement added.
         face_origin: (m,) the input face that each face came from.
         face_corners: (m, 3) for a mesh read from a file: the polygon corner of `source` at each
@@ -58,6 +60,7 @@ class Flattening:
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
     solve: SolveFigures = field(default_factory=SolveFigures)
+    rotations: Rotations | None = None
     vertex_origin: IntArray | None = None
     face_origin: IntArray | None = None
     face_corners: IntArray | None = None

@@ -10,6 +10,7 @@ import click
 
 from .. import __version__
 from ..errors import ConeflatError
+from .cones import cones
 from .demo import demo
 from .flatten import flatten
 
@@ -25,6 +26,7 @@ def cli() -> None:
 
 
 cli.add_command(flatten)
+cli.add_command(cones)
 cli.add_command(demo)
 
 

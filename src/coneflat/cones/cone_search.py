@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy.sparse import csc_matrix
 
@@ -52,7 +54,7 @@ class ConeSearch:
         required: IntArray,
         usable: BoolArray,
     ) -> None:
-        self._laplacian, self._curvature, self._is_boundary = laplacian, curvature, is_boundary
+        self._laplacian, self.curvature, self._is_boundary = laplacian, curvature, is_boundary
         self.limits = limits
         self.operator = GreenOperator(laplacian, areas, is_boundary, order)
         vertices = self.operator.vertices
@@ -115,6 +117,24 @@ class ConeSearch:
                 self.polished(some, 0.0)
         found = self.pool.model.best
         return self._result(min((c for c in found if c <= count), key=lambda c: (found[c][0], c)))
+
+    def best_of_sizes(self, most: int) -> list[tuple[float, IntArray]]:
+        """Return E and members of the best set of each size up to `most`, where it has a lower E than smaller ones."""
+        most = min(most, self.most_cones)
+        self.coarse.climb(0.0, most)
+        if self.coarse.best:
+            self._improve(1, most, math.inf)
+        found: list[tuple[float, IntArray]] = []
+        for count in range(most + 1):
+            self.polished(count, math.inf)
+        # Once more, downwards: a set may be best without one of the cones of the next larger.
+        for count in range(most, -1, -1):
+            self.polished(count, math.inf)
+        for count in sorted(self.pool.model.best):
+            energy, members = self._result(count)
+            if count <= most and (not found or energy < found[-1][0]):
+                found.append((energy, members))
+        return found
 
     def _result(self, count: int) -> tuple[float, IntArray]:
         energy, members = self.pool.model.best[count]
@@ -214,9 +234,9 @@ class ConeSearch:
         """Return the solution of given cones and curvatures."""
         operator = self.operator
         cones = operator.vertices[unknowns]
-        target = np.zeros(len(self._curvature))
+        target = np.zeros(len(self.curvature))
         target[cones] = curvatures
         log_scale = np.zeros(len(target))
-        log_scale[operator.vertices] = operator.solve((target - self._curvature)[operator.vertices])
-        absorbed = target_from_log_scale(self._laplacian, self._curvature, log_scale, self._is_boundary)
+        log_scale[operator.vertices] = operator.solve((target - self.curvature)[operator.vertices])
+        absorbed = target_from_log_scale(self._laplacian, self.curvature, log_scale, self._is_boundary)
         return ConeSolution(cones, target + absorbed, log_scale)

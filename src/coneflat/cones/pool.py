@@ -95,6 +95,15 @@ class Pool:
         best = self.model.best[len(members)]
         return best[0], best[1]
 
+    def near(self, unknown: int, size: int) -> IntArray:
+        """Return the usable vertices among the `size` nearest to one."""
+        found = ball(self._indptr, self._indices, unknown, size)
+        return found[self._usable[found]]
+
+    def squared_distances(self, one: int, others: IntArray) -> FloatArray:
+        """Return (p,) about the squared norm of the difference of two Green's functions, for each of the others."""
+        return self._coarse.squared_distances(one, others)
+
     def targets(self, members: IntArray, curvatures: FloatArray, energy: float) -> IntArray:
         """Return where cones should move by the score and the coarse model's distances.
 
@@ -106,12 +115,12 @@ class Pool:
         targets = []
         for place in range(len(self.model.fixed), len(members)):
             s, k = int(taken[place]), curvatures[place]
-            near = ball(self._indptr, self._indices, s, size)
-            near = near[self._usable[near] & ~np.isin(near, taken)]
+            near = self.near(s, size)
+            near = near[~np.isin(near, taken)]
             if not len(near) or k == 0:
                 continue
             linear = 2 * k * (score[near] - score[s])
-            bending = k * k * self._coarse.squared_distances(s, near)
+            bending = k * k * self.squared_distances(s, near)
             # A longer and a more cautious step: the distances are those of a coarse model.
             for caution in (1.0, 4.0):
                 change = linear + caution * bending

@@ -11,6 +11,7 @@ from .._arrays import FloatArray, IntArray
 from ..figures import SolveFigures
 from ..geometry import double_areas, edge_lengths
 from ..mesh import TriangleMesh
+from ..rotations import Rotations
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,7 @@ class LaidOut:
         target, curvature: (n,) curvature wanted and reached, radians.
         figures: how it was found.
         notes: what falls short, one sentence each.
+        rotations: those of its seams, where they matter.
     """
 
     mesh: TriangleMesh
@@ -42,6 +44,7 @@ class LaidOut:
     curvature: FloatArray
     figures: SolveFigures
     notes: tuple[str, ...] = ()
+    rotations: Rotations | None = None
 
     @property
     def area(self) -> float:

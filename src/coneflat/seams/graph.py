@@ -40,7 +40,7 @@ def find_seams(
     edge_costs = edge_costs * (1 + TIE_BREAK * key[mesh.edges].sum(axis=1))
     if is_forbidden is not None and is_forbidden.any():
         edge_costs = np.where(is_forbidden, edge_costs + edge_costs.sum(), edge_costs)
-    node_of, node_count, loop_nodes = _contract_loops(mesh)
+    node_of, node_count, loop_nodes = contract_loops(mesh)
     inside = np.flatnonzero(~mesh.is_boundary_edge)
     ends = node_of[mesh.edges[inside]]
     graph = MultiGraph(node_count, ends[:, 0], ends[:, 1], edge_costs[inside])
@@ -51,7 +51,7 @@ def find_seams(
     return inside[_prune(graph, np.union1d(tree.edges, handles), terminals)]
 
 
-def _contract_loops(mesh: TriangleMesh) -> tuple[IntArray, int, IntArray]:
+def contract_loops(mesh: TriangleMesh) -> tuple[IntArray, int, IntArray]:
     """Return the node of each vertex (n,), the number of nodes, and the nodes of the boundary loops.
 
     Nodes are numbered as the vertices are, a loop as its first vertex.

@@ -1,0 +1,174 @@
+"""Area distortion against the number of cones, so that the knee can be chosen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._arrays import FloatArray, IntArray
+from .choose import Surface, search_on
+from .cones import ConeSolution
+from .errors import OptionError
+from .options import Options
+from .prepare import Component, prepare
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .cones.cone_search import ConeSearch
+
+
+@dataclass(frozen=True, eq=False)
+class FoundCones:
+    """Cones of a mesh.
+
+    Attributes:
+        vertices: (s,) in the input's numbering.
+        curvatures: (s,) radians.
+        distortion: E of the linear model with them.
+    """
+
+    vertices: IntArray
+    curvatures: FloatArray
+    distortion: float
+
+
+@dataclass(frozen=True, eq=False)
+class ConeCurve:
+    """The best cones found for each number of them.
+
+    Attributes:
+        sets: the cones, fewer first; the distortion falls.
+    """
+
+    sets: tuple[FoundCones, ...]
+
+    @property
+    def counts(self) -> IntArray:
+        """(k,) numbers of cones."""
+        return np.array([len(each.vertices) for each in self.sets])
+
+    @property
+    def distortions(self) -> FloatArray:
+        """(k,) E of the linear model with so many."""
+        return np.array([each.distortion for each in self.sets])
+
+    @property
+    def knee(self) -> int:
+        """The number of cones beyond which more of them gain least: farthest below the chord of the curve."""
+        counts, distortions = self.counts, self.distortions
+        across, down = np.ptp(counts), np.ptp(distortions)
+        return int(counts[np.argmin(counts / (across or 1) + distortions / (down or 1.0))])
+
+
+def find_cones(
+    mesh: Any,
+    faces: ArrayLike | None = None,
+    *,
+    distortion: float = 0.2,
+    cone_count: int | None = None,
+    min_cone_angle: float = math.pi / 2,
+    max_cone_angle: float | None = 4 * math.pi,
+    positive_only: bool = False,
+    weights: ArrayLike | str | None = None,
+    required_cones: Iterable[int] = (),
+    forbidden_cones: Iterable[int] = (),
+    allowed_cones: Iterable[int] | None = None,
+    repair: bool = False,
+) -> FoundCones:
+    """Find the cones of the largest component of a mesh, without flattening it.
+
+    Arguments are those of `coneflat.flatten`, and so are the errors.
+    """
+    from .cones.pursuit import pursue
+
+    options = Options(
+        distortion=distortion,
+        cone_count=cone_count,
+        min_cone_angle=min_cone_angle,
+        max_cone_angle=max_cone_angle,
+        positive_only=positive_only,
+        weights=weights,
+        required_cones=required_cones,
+        forbidden_cones=forbidden_cones,
+        allowed_cones=allowed_cones,
+        repair=repair,
+    )
+    search, part = _open(mesh, faces, options)
+    found = pursue(search, distortion=distortion, count=cone_count)
+    return _named(found.solution, found.distortion, part)
+
+
+def cone_curve(
+    mesh: Any,
+    faces: ArrayLike | None = None,
+    *,
+    most: int = 30,
+    min_cone_angle: float = math.pi / 2,
+    max_cone_angle: float | None = 4 * math.pi,
+    positive_only: bool = False,
+    weights: ArrayLike | str | None = None,
+    required_cones: Iterable[int] = (),
+    forbidden_cones: Iterable[int] = (),
+    allowed_cones: Iterable[int] | None = None,
+    repair: bool = False,
+) -> ConeCurve:
+    """Search for the best cones of every number up to `most`, on the largest component of a mesh.
+
+    Arguments are those of `coneflat.flatten`, and so are the errors.
+    """
+    if isinstance(most, bool) or most != int(most) or most < 1:
+        raise OptionError(f"the largest number of cones must be a whole number from 1, not {most!r}")
+    options = Options(
+        min_cone_angle=min_cone_angle,
+        max_cone_angle=max_cone_angle,
+        positive_only=positive_only,
+        weights=weights,
+        required_cones=required_cones,
+        forbidden_cones=forbidden_cones,
+        allowed_cones=allowed_cones,
+        repair=repair,
+    )
+    search, part = _open(mesh, faces, options)
+    found = search.best_of_sizes(int(most))
+    if not found:
+        raise OptionError(f"no set of up to {most} cones carries this surface's curvature; allow more")
+    return ConeCurve(tuple(_named(search.solution(members), energy, part) for energy, members in found))
+
+
+def _open(mesh: Any, faces: ArrayLike | None, options: Options) -> tuple[ConeSearch, Component]:
+    part = max(prepare(mesh, faces, options).components, key=lambda each: len(each.faces))
+    return search_on(Surface.of(part.mesh, part.lengths), part.wishes, options), part
+
+
+def _named(solution: ConeSolution, distortion: float, part: Component) -> FoundCones:
+    return FoundCones(part.wishes.names[solution.cones], solution.curvatures, distortion)
+
+
+def curve_figure(curve: ConeCurve, distortion: float = 0.2, title: str = "") -> Figure:
+    """Return a figure of the curve, with the distortion wanted and the knee."""
+    from .view import new_figure
+
+    figure = new_figure(7.0, 4.2)
+    axes = figure.add_axes((0.11, 0.14, 0.85, 0.76))
+    axes.plot(curve.counts, curve.distortions, color="#35618f", marker="o", markersize=4, linewidth=1.5)
+    axes.axhline(distortion, color="#b0413e", linewidth=1.0, linestyle="--")
+    axes.annotate(
+        f"E = {distortion:g}", (curve.counts[-1], distortion), color="#b0413e", ha="right", va="bottom"
+    )
+    axes.axvline(curve.knee, color="#888888", linewidth=0.8, linestyle=":")
+    axes.annotate(
+        f"knee: {curve.knee}", (curve.knee, axes.get_ylim()[1]), color="#666666", ha="left", va="top"
+    )
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("number of cones")
+    axes.set_ylabel("area distortion E (standard deviation of the log scale)")
+    axes.set_title(title, fontsize=11)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    return figure

@@ -1,0 +1,51 @@
+"""By how much the sides of seams are turned against each other, beside whole multiples of an angle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._arrays import FloatArray
+from .conformal.turning import off_multiple
+from .mesh import TriangleMesh
+from .seams.handles import handle_loops
+
+
+@dataclass(frozen=True)
+class Rotations:
+    """How far rotations are from multiples of a quantum, radians.
+
+    Attributes:
+        quantum: the angle.
+        worst: the largest deviation of a seam edge's rotation.
+        handles: the deviation of the rotation along each generator of the handles, two for each.
+    """
+
+    quantum: float
+    worst: float
+    handles: tuple[float, ...]
+
+    @classmethod
+    def of_all(cls, parts: Iterable[Rotations | None]) -> Rotations | None:
+        """Return those of components together; None if there are none."""
+        known = [part for part in parts if part is not None]
+        if not known:
+            return None
+        handles = tuple(angle for part in known for angle in part.handles)
+        return cls(known[0].quantum, max(part.worst for part in known), handles)
+
+
+def measure_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> Rotations:
+    """Return the rotations of a layout of a connected mesh; `corner_uv` is (m, 3, 2)."""
+    points = corner_uv[..., 0] + 1j * corner_uv[..., 1]
+    sides = (points[:, [2, 0, 1]] - points[:, [1, 2, 0]]).ravel()
+    pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turns = np.angle(-sides[pairs[:, 1]] / sides[pairs[:, 0]])
+    across = np.zeros(len(sides))
+    across[pairs[:, 0]], across[pairs[:, 1]] = turns, -turns
+    off = np.abs(off_multiple(turns, quantum))
+    handles = off_multiple(np.array([across[loop].sum() for loop in handle_loops(mesh)]), quantum)
+    return Rotations(quantum, float(off.max(initial=0.0)), tuple(handles.tolist()))

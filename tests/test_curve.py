@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+from click.testing import CliRunner
+
+import coneflat
+from coneflat.cli.main import cli
+from coneflat.errors import OptionError
+
+
+def test_the_curve_falls_and_holds_what_it_says():
+    vertices, faces = shapes.genus(1)
+    curve = coneflat.cone_curve(vertices, faces, most=10)
+    assert (np.diff(curve.counts) > 0).all()
+    assert (np.diff(curve.distortions) < 0).all()
+    assert curve.counts[-1] <= 10
+    assert curve.counts[0] <= curve.knee <= curve.counts[-1]
+    chosen = curve.sets[-1]
+    result = coneflat.flatten(
+        vertices, faces, cones=dict(zip(chosen.vertices, chosen.curvatures, strict=True))
+    )
+    assert result.solve.area_distortion_linear == pytest.approx(chosen.distortion, rel=1e-3)
+
+
+def test_no_search_for_one_number_is_much_better():
+    vertices, faces = shapes.sphere(3)
+    curve = coneflat.cone_curve(vertices, faces, most=8)
+    for each in curve.sets:
+        alone = coneflat.find_cones(vertices, faces, cone_count=len(each.vertices))
+        assert each.distortion <= alone.distortion * 1.1
+
+
+def test_found_cones_are_those_of_flatten():
+    vertices, faces = shapes.sphere(3)
+    found = coneflat.find_cones(vertices, faces, distortion=0.1)
+    np.testing.assert_array_equal(coneflat.flatten(vertices, faces, distortion=0.1).cones, found.vertices)
+    assert found.distortion <= 0.1
+
+
+@pytest.mark.parametrize("most", [0, -3, 2.5, True])
+def test_numbers_that_make_no_sense(most):
+    with pytest.raises(OptionError):
+        coneflat.cone_curve(*shapes.sphere(2), most=most)
+
+
+def test_too_few_for_the_surface():
+    with pytest.raises(OptionError, match="up to 2 cones"):
+        coneflat.cone_curve(*shapes.sphere(2), most=2)
+
+
+@pytest.fixture
+def model(tmp_path):
+    vertices, faces = shapes.sphere(3)
+    path = tmp_path / "ball.obj"
+    lines = [f"v {x} {y} {z * 1.5}" for x, y, z in vertices] + [
+        f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces
+    ]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_the_command_writes_cones_that_flatten_reads(model, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(cli, ["cones", str(model), "--distortion", "0.1", "-o", "ball.cones"])
+    assert done.exit_code == 0, done.output
+    assert "area distortion 0.0" in done.output
+    again = CliRunner().invoke(cli, ["flatten", str(model), "--cones-file", "ball.cones", "-q"])
+    assert again.exit_code == 0, again.output
+
+
+def test_the_command_draws_the_curve(model, tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(cli, ["cones", str(model), "--curve", "--most", "6"])
+    assert done.exit_code == 0, done.output
+    assert "knee" in done.output
+    assert (tmp_path / "ball_cones.png").read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,165 @@
+"""What the user may say about cones: weights, places, bounds, boundaries."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+from click.testing import CliRunner
+
+from coneflat import MeshFile, TriangleMesh, errors, flatten, read_mesh
+from coneflat.cli.main import cli
+
+
+def painted_ply(path, vertices, faces, red):
+    """Write an ASCII PLY with vertex colours and a quality."""
+    head = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}"]
+    head += [f"property float {axis}" for axis in "xyz"] + [
+        f"property uchar {c}" for c in ("red", "green", "blue")
+    ]
+    head += ["property float quality", f"element face {len(faces)}", "property list uchar int vertex_indices"]
+    rows = [f"{x} {y} {z} {255 if r else 128} {0 if r else 128} {0 if r else 128} {9 if r else 1}"
+            for (x, y, z), r in zip(vertices, red, strict=True)]  # fmt: skip
+    rows += [f"3 {a} {b} {c}" for a, b, c in faces]
+    path.write_text("\n".join([*head, "end_header", *rows]) + "\n")
+    return path
+
+
+def spread(result, where):
+    """Return the standard deviation of the log scale over some vertices."""
+    return np.std(result.log_scale[where])
+
+
+@pytest.fixture(scope="module")
+def ball():
+    vertices, faces = shapes.sphere(3)
+    vertices = vertices * [1, 1, 1.6]
+    return vertices, faces, vertices[:, 2] > 0.8
+
+
+@pytest.mark.parametrize("weights", ["quality", "color"])
+def test_weights_of_a_file(tmp_path, ball, weights):
+    vertices, faces, important = ball
+    model = read_mesh(painted_ply(tmp_path / "ball.ply", vertices, faces, important))
+    assert isinstance(model, MeshFile)
+    assert model.properties["red"].max() == 1
+    plain = flatten(model, cone_count=5)
+    careful = flatten(model, cone_count=5, weights=weights)
+    assert spread(careful, important) < spread(plain, important)
+
+
+def test_colours_of_an_obj(tmp_path, ball):
+    vertices, faces, important = ball
+    path = tmp_path / "ball.obj"
+    lines = [f"v {x} {y} {z} {int(r)} 0 0" for (x, y, z), r in zip(vertices, important, strict=True)]
+    path.write_text("\n".join([*lines, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces)]) + "\n")
+    model = read_mesh(path)
+    np.testing.assert_array_equal(model.properties["red"], important)
+    np.testing.assert_allclose(model.vertices, vertices)
+    by_array = flatten(vertices, faces, cone_count=5, weights=np.where(important, 100.0, 1.0))
+    np.testing.assert_array_equal(flatten(model, cone_count=5, weights="color").cones, by_array.cones)
+
+
+def test_places(ball):
+    vertices, faces, important = ball
+    required = flatten(vertices, faces, required_cones=[5, 77])
+    assert {5, 77} <= set(required.cones.tolist())
+    forbidden = np.flatnonzero(important)
+    assert not np.isin(flatten(vertices, faces, forbidden_cones=forbidden).cones, forbidden).any()
+    allowed = np.arange(0, len(vertices), 7)
+    assert np.isin(flatten(vertices, faces, allowed_cones=allowed).cones, allowed).all()
+
+
+def test_bounds(ball):
+    vertices, faces, _ = ball
+    result = flatten(*shapes.genus(2), min_cone_angle=np.pi, max_cone_angle=3 * np.pi)
+    assert result.curvatures.max() <= np.pi + 1e-9
+    assert result.curvatures.min() >= -np.pi - 1e-9
+    assert (flatten(vertices, faces, positive_only=True).curvatures > 0).all()
+    assert len(flatten(vertices, faces, cone_count=7).cones) <= 7
+    assert len(flatten(vertices, faces, distortion=0.02, max_cones=5).cones) <= 5
+
+
+def test_a_straight_boundary():
+    vertices, faces = shapes.hill()
+    result = flatten(vertices, faces, boundary="straight")
+    mesh = TriangleMesh(result.vertices, result.faces)
+    corners = result.uv[result.uv_faces] @ [1, 1j]
+    angles = np.angle((corners[:, [2, 0, 1]] - corners) / (corners[:, [1, 2, 0]] - corners))
+    around = np.bincount(result.faces.ravel(), angles.ravel())
+    turns = np.pi - around[mesh.is_boundary_vertex]
+    is_corner = np.abs(turns) > 1e-6
+    assert 0 < is_corner.sum() <= 12
+    assert (turns <= np.pi / 2 + 1e-9).all()
+    assert not mesh.is_boundary_vertex[result.cones].any()
+
+
+def test_cones_that_triangles_cannot_hold_are_avoided():
+    """A vertex of three triangles has no room for an angle of 3 pi and more."""
+    vertices, faces = shapes.genus(3)
+    result = flatten(vertices, faces, cone_count=4, max_cone_angle=None)
+    target = np.nan_to_num(result.curvature_residual)
+    assert np.abs(target).max() < 1e-9 or any("too wide" in note for note in result.notes)
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "message"),
+    [
+        ({"weights": "quality"}, errors.OptionError, "no property 'quality'"),
+        ({"weights": np.ones(5)}, errors.OptionError, "162 numbers"),
+        ({"weights": -np.ones(162)}, errors.OptionError, "0 and up"),
+        ({"weights": ["a"] * 162}, errors.OptionError, "must be numbers"),
+        ({"required_cones": [3], "forbidden_cones": [3]}, errors.OptionError, "both"),
+        ({"required_cones": [999]}, errors.OptionError, "0 to 161"),
+        ({"forbidden_cones": [-1]}, errors.OptionError, "0 to 161"),
+        ({"allowed_cones": []}, errors.CurvatureError, "allowed at 0"),
+        ({"allowed_cones": [1, 2]}, errors.CurvatureError, "allowed at 2"),
+        ({"cone_count": 2}, errors.CurvatureError, "3 or more"),
+        ({"cone_count": 2.5}, errors.OptionError, "whole number"),
+        ({"distortion": 0}, errors.OptionError, "positive"),
+        ({"min_cone_angle": -1}, errors.OptionError, "positive"),
+        ({"min_cone_angle": 7, "max_cone_angle": 6}, errors.OptionError, "exceed"),
+        ({"boundary": "straight", "cones": "greedy"}, errors.OptionError, "pursuit"),
+    ],
+)
+def test_wishes_that_make_no_sense(options, kind, message):
+    with pytest.raises(kind, match=message):
+        flatten(*shapes.sphere(2), **options)
+
+
+@pytest.fixture
+def files(tmp_path, ball):
+    vertices, faces, important = ball
+    painted_ply(tmp_path / "ball.ply", vertices, faces, important)
+    np.savetxt(tmp_path / "weights.txt", np.where(important, 5.0, 1.0))
+    (tmp_path / "face.txt").write_text("# not here\n" + "\n".join(map(str, np.flatnonzero(important))) + "\n")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--weights", "quality", "--min-cone-angle", "90deg"], None),
+        (["--weights", "weights.txt", "--forbid", "face.txt", "--require", "3"], None),
+        (["--cone-count", "6", "--positive-only", "--only", "1,5,9,33,81,160,200,333,401"], None),
+        (["--quantise", "pi/2", "--distortion", "0.3"], None),
+        (["--weights", "nothing"], "it has red, green, blue, quality"),
+        (["--forbid", "a,b"], "'a' is no vertex"),
+        (["--min-cone-angle", "wide"], "is no angle"),
+        (["--cone-count", "5", "--distortion", "0.1"], "leave out --distortion"),
+        (["--cones", "greedy", "--quantise", "pi/2"], "leave out --quantise"),
+        (["--paper", "--distortion", "0.1"], "leave out --distortion"),
+        (["--cone", "3", "--weights", "quality"], "leave out --weights"),
+    ],
+)
+def test_on_the_command_line(files, monkeypatch, arguments, told):
+    monkeypatch.chdir(files)
+    done = CliRunner().invoke(
+        cli, ["flatten", "ball.ply", "-o", "out.obj", *arguments], standalone_mode=False
+    )
+    if told is None:
+        assert done.exception is None, done.exception
+        assert (files / "out.obj").exists()
+    else:
+        message = getattr(done.exception, "message", None) or str(done.exception)
+        assert told in message
