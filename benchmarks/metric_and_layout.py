@@ -8,45 +8,15 @@ up to --largest triangles, and a bumpy sphere in any case. Wall time, the best o
 from __future__ import annotations
 
 import argparse
-import sys
-import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-MODELS = ROOT.parent / "shared" / "meshes"
-sys.path.insert(0, str(ROOT / "tests"))
+from common import best_time, meshes
 
-import shapes  # noqa: E402
-
-from coneflat import check_mesh, cut_open, edge_lengths, find_seams, read_mesh  # noqa: E402
-from coneflat.cones import greedy_cones  # noqa: E402
-from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents  # noqa: E402
-from coneflat.mesh import TriangleMesh  # noqa: E402
-from coneflat.methods import ExactChoices, LaidOut, exact_flattening, linear_flattening  # noqa: E402
+from coneflat import cut_open, edge_lengths, find_seams
+from coneflat.cones import greedy_cones
+from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
+from coneflat.methods import ExactChoices, LaidOut, exact_flattening, linear_flattening
 
 CONES = 20
-
-
-def meshes(names: list[str], largest: int) -> Iterator[tuple[str, TriangleMesh]]:
-    sources = [("sphere", shapes.sphere(5))]
-    for name in names:
-        for path in sorted(MODELS.glob(f"{name}.*")):
-            model = read_mesh(path)
-            sources.append((name, (model.vertices, model.corners.reshape(-1, 3))))
-    for name, (vertices, faces) in sources:
-        while len(faces) <= largest:
-            yield name, check_mesh(vertices, faces).mesh
-            vertices, faces = shapes.subdivide(vertices, faces)
-
-
-def best_time(run: Callable[[], object], runs: int) -> float:
-    times = []
-    for _ in range(runs):
-        start = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - start)
-    return min(times)
 
 
 def main() -> None:

@@ -218,6 +218,8 @@ class DenseModel:
         Removing a member is a rank one change of the inverse, so all members against all candidates cost little more
         than scoring the candidates once. Members held at a bound, and the required, are left out.
         """
+        from .swap_kernel import swap_table
+
         limits, diagonal = self.limits, np.diag(self.gram)
         change, which = np.full(len(members), np.inf), np.full(len(members), -1)
         places = np.flatnonzero(limits.are_inside(fitted.curvatures))
@@ -226,17 +228,21 @@ class DenseModel:
         gradient = self.slope + fitted.multiplier + fitted.curvatures @ self.gram[members]
         remain, rows, kept, bare = self._projected(members[places])
         movable = np.flatnonzero((places >= len(self.fixed)) & (kept > 1e-10 * bare))
-        places, rows, kept = places[movable], rows[movable], kept[movable, None]
-        k = fitted.curvatures[places, None]
-        h = remain + rows**2 / kept
-        is_open = (h > 1e-9 * diagonal) & self.usable
-        is_open[:, members] = False
-        g = gradient - rows * (k / kept)
-        x = np.clip(-g / np.where(is_open, h, np.inf), limits.least, limits.most)
-        value = np.where(is_open, k**2 / kept + (2 * g + h * x) * x, np.inf)
-        for place, row in zip(places, value, strict=True):
-            t = first_least(row)
-            change[place], which[place] = row[t], t
+        places = places[movable]
+        is_open = self.usable.copy()
+        is_open[members] = False
+        change[places], which[places] = swap_table(
+            np.ascontiguousarray(rows[movable]),
+            kept[movable],
+            fitted.curvatures[places],
+            gradient,
+            remain,
+            1e-9 * diagonal,
+            is_open,
+            limits.least,
+            limits.most,
+            TIE,
+        )
         return change, which
 
     def exchanged(self, members: IntArray) -> tuple[float, IntArray]:
