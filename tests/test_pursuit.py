@@ -11,6 +11,7 @@ from coneflat.cones.pursuit import open_search
 from coneflat.errors import CurvatureError, OptionError
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, double_areas
 from coneflat.geometry.areas import area_distortion
+from coneflat.geometry.ties import tie_key
 
 HANDLE = shapes.genus(3)
 CLOSED = {"sphere": shapes.sphere(4), "torus": shapes.torus(), "genus 3": HANDLE}
@@ -33,7 +34,7 @@ def pursue_cones(*given, distortion=0.2, count=None, **options):
 
 
 def pursue(vertices, faces, **options):
-    return pursue_cones(*surface(vertices, faces), positions=vertices, **options)
+    return pursue_cones(*surface(vertices, faces), tie_key=tie_key(vertices), **options)
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -89,7 +90,7 @@ def test_history_falls_and_ends_at_the_answer(name):
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_no_cone_can_be_left_out(name):
-    search = open_search(*surface(*SHAPES[name]), positions=SHAPES[name][0])
+    search = open_search(*surface(*SHAPES[name]), tie_key=tie_key(SHAPES[name][0]))
     energy, members = search.fewest(0.1)
     assert energy <= 0.1
     for place in range(len(members)):
@@ -210,7 +211,9 @@ def test_fit_agrees_with_the_optimality_conditions():
         gram, slope = root @ root.T, 3 * rng.normal(size=size)
         least, most = -rng.uniform(0, 2), rng.uniform(0, 2)
         total = rng.uniform(size * least, size * most) if rng.random() < 0.5 else np.nan
-        k, multiplier, feasible = fit_curvatures(gram, slope, least, most, total)
+        k, multiplier, feasible = fit_curvatures(
+            gram, slope, np.full(size, least), np.full(size, most), total
+        )
         gradient = gram @ k + slope + (0 if np.isnan(total) else multiplier)
         assert feasible
         assert (k >= least - 1e-12).all()

@@ -10,10 +10,11 @@ from coneflat.cones.pursuit import open_search
 from coneflat.cones.quantise import quantise_cones
 from coneflat.errors import CurvatureError, OptionError
 from coneflat.geometry.areas import area_distortion
+from coneflat.geometry.ties import tie_key
 
 
 def search(vertices, faces, **options):
-    return open_search(*surface(vertices, faces), positions=vertices, **options)
+    return open_search(*surface(vertices, faces), tie_key=tie_key(vertices), **options)
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -1,7 +1,7 @@
 """Draw the pictures of the documentation: `python tools/make_images.py [MODEL]`.
 
 The sample's picture is that of `coneflat demo`. The picture of the curvature left after flattening takes a model
-file, the sample if none is given.
+file, the sample if none is given, and so does that of cones of whole quarter turns.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 import coneflat
 from coneflat.view import demo_figure, new_figure, render_mesh, save_figure
+from coneflat.view.panels import draw_textured
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 LOWEST, HIGHEST = -16, -1  # decades of curvature error that the colours span
@@ -52,13 +53,32 @@ def curvature_figure(path: Path) -> Any:
     return figure
 
 
+def quarters_figure(path: Path) -> Any:
+    """Return a figure of a model with a checkerboard: with any cones, and with cones of whole quarter turns."""
+    figure = new_figure(13.0, 6.6)
+    quarters = {"quantum": np.pi / 2, "correct_handles": True}
+    for k, (label, options) in enumerate((("Any curvatures", {}), ("Multiples of a quarter turn", quarters))):
+        result = coneflat.flatten(path, **options)
+        axes = figure.add_axes((0.01 + 0.5 * k, 0.01, 0.48, 0.88))
+        axes.set_axis_off()
+        draw_textured(axes, result, "y")
+        figure.text(0.015 + 0.5 * k, 0.945, label, size=13)
+        off = (
+            ""
+            if result.rotations is None
+            else f"; seams are off quarter turns by {result.rotations.worst:.0e} rad"
+        )
+        figure.text(0.015 + 0.5 * k, 0.905, f"{len(result.cones)} cones{off}", size=11, color="#444444")
+    return figure
+
+
 def main() -> None:
     """Draw everything."""
     sample = coneflat.sample_path()
     save_figure(demo_figure(coneflat.flatten(sample)), IMAGES / "sample.png")
-    save_figure(
-        curvature_figure(Path(sys.argv[1]) if len(sys.argv) > 1 else sample), IMAGES / "curvature.png"
-    )
+    model = Path(sys.argv[1]) if len(sys.argv) > 1 else sample
+    save_figure(curvature_figure(model), IMAGES / "curvature.png")
+    save_figure(quarters_figure(model), IMAGES / "quarters.png")
 
 
 if __name__ == "__main__":

@@ -22,6 +22,10 @@ from .wishes import Wishes
 if TYPE_CHECKING:
     from .cones.cone_search import ConeSearch
 
+# The angle of a cone for which each triangle around it has room on its straight sides: less than half a turn, as not
+# all of them can be spread alike.
+ROOM = 0.6 * np.pi
+
 #: Returns what loops across the handles turn by in the metric that a solution leads to, radians.
 Turned: TypeAlias = Callable[[ConeSolution], FloatArray]
 
@@ -102,18 +106,17 @@ def _pursued(surface: Surface, wishes: Wishes, options: Options, turned: Turned 
         return cones_at(*given, wishes.required.vertices)
     search = search_on(surface, wishes, options)
 
-    def ask(count: int | None) -> ConeSolution:
-        if options.quantum is None:
-            return pursue(search, distortion=options.distortion, count=count).solution
-        found = quantise_cones(search, options.quantum, distortion=options.distortion, count=count)
+    distortion, count = options.distortion, options.cone_count
+    if options.quantum is None:
+        found = pursue(search, distortion=distortion, count=count, most=options.max_cones).solution
+    else:
+        quantised = quantise_cones(
+            search, options.quantum, distortion=distortion, count=count, most=options.max_cones
+        )
         if turned is not None and mesh.genus():
             by_scale = open_turning(mesh).by_log_scale(surface.lengths)
-            found = align_handles(search, found, by_scale, turned, options.distortion)
-        return found.solution
-
-    found = ask(options.cone_count)
-    if options.max_cones is not None and len(found.cones) > options.max_cones:
-        found = ask(options.max_cones)
+            quantised = align_handles(search, quantised, by_scale, turned, distortion)
+        found = quantised.solution
     return replace(found, cones=found.cones[~mesh.is_boundary_vertex[found.cones]])
 
 
@@ -123,6 +126,9 @@ def search_on(surface: Surface, wishes: Wishes, options: Options) -> ConeSearch:
 
     mesh = surface.mesh
     is_straight = options.boundary_kind == "straight" and mesh.is_boundary_vertex.any()
+    room = (
+        ROOM * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)) + np.pi * mesh.is_boundary_vertex
+    )
     return open_search(
         surface.laplacian,
         surface.curvature,
@@ -138,4 +144,5 @@ def search_on(surface: Surface, wishes: Wishes, options: Options) -> ConeSearch:
         weights=wishes.weights,
         required=wishes.required.vertices,
         allowed=wishes.is_allowed,
+        room=None if options.refine else room.astype(np.float64),
     )

@@ -1,4 +1,4 @@
-"""Small loops over the neighbours of vertices: aggregates, balls."""
+"""Small loops over the neighbours of vertices and the rows of sparse matrices."""
 
 from __future__ import annotations
 
@@ -94,3 +94,34 @@ def ball(indptr: IntArray, indices: IntArray, centre: int, size: int) -> IntArra
                     found.append(other)
         start = end
     return np.array(found)
+
+
+@compiled
+def squared_distances(
+    indptr: IntArray, indices: IntArray, data: FloatArray, kernel: FloatArray, one: int, others: IntArray
+) -> FloatArray:
+    """Return (p,) the squared norm of the difference of row `one` and each other row of a sparse matrix.
+
+    Args:
+        indptr, indices, data: the matrix (n, m).
+        kernel: (m, m) the inner product.
+        one, others: a row, and (p,) rows.
+    """
+    found = np.zeros(len(others))
+    start, stop = indptr[one], indptr[one + 1]
+    own = 0.0
+    image = np.zeros(len(kernel))
+    for e in range(start, stop):
+        for j in range(len(kernel)):
+            image[j] += data[e] * kernel[indices[e], j]
+    for e in range(start, stop):
+        own += data[e] * image[indices[e]]
+    for i in range(len(others)):
+        start, stop = indptr[others[i]], indptr[others[i] + 1]
+        value = own
+        for e in range(start, stop):
+            value -= 2.0 * data[e] * image[indices[e]]
+            for d in range(start, stop):
+                value += data[e] * data[d] * kernel[indices[e], indices[d]]
+        found[i] = max(value, 0.0)
+    return found

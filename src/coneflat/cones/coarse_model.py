@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import lapack
 from scipy.sparse import csr_matrix
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import FloatArray, IntArray
 from ..errors import MetricError
 from .coarsen import coarse_basis, representatives
 from .green import GreenOperator
@@ -37,13 +37,10 @@ class CoarseModel:
 
     def squared_distances(self, one: int, others: IntArray) -> FloatArray:
         """Return (p,) the squared norm of the difference of two Green's functions, for each of the others."""
-        rows = self.basis[np.append(others, one)]
-        columns, local = np.unique(rows.indices, return_inverse=True)
-        dense = np.zeros((len(others) + 1, len(columns)))
-        dense[np.repeat(np.arange(len(dense)), np.diff(rows.indptr)), local.ravel()] = rows.data
-        dense = dense[:-1] - dense[-1]
-        result: FloatArray = ((dense @ self.kernel[np.ix_(columns, columns)]) * dense).sum(axis=1)
-        return np.maximum(result, 0.0)
+        from .aggregate_kernel import squared_distances
+
+        basis = self.basis
+        return squared_distances(basis.indptr, basis.indices, basis.data, self.kernel, one, others)
 
 
 def coarse_model(
@@ -80,11 +77,14 @@ def coarse_model(
     return CoarseModel(basis, kernel * scale, slope * scale, exact)
 
 
-def candidates(model: CoarseModel, usable: BoolArray) -> IntArray:
-    """Return the unknowns among which cones are searched: one for each basis function, if any is usable."""
-    if np.count_nonzero(usable) <= model.basis.shape[1]:
-        return np.flatnonzero(usable)
-    return representatives(model.basis, usable.astype(np.float64))
+def candidates(model: CoarseModel, fitness: FloatArray) -> IntArray:
+    """Return the unknowns among which cones are searched: one for each basis function, if any is fit to be one.
+
+    `fitness` (f,) is 0 for those that may not be cones; where it is larger they are preferred to their neighbours.
+    """
+    if np.count_nonzero(fitness) <= model.basis.shape[1]:
+        return np.flatnonzero(fitness)
+    return representatives(model.basis, fitness)
 
 
 def inverse_of_definite(matrix: FloatArray) -> FloatArray:

@@ -83,13 +83,13 @@ def _order_of_aggregates(part: csr_matrix, order: IntArray) -> IntArray:
     return np.argsort(first, kind="stable")
 
 
-def representatives(basis: csr_matrix, allowed: FloatArray) -> IntArray:
-    """Return for each coarse function the allowed vertex where it is largest, without repetitions."""
+def representatives(basis: csr_matrix, fitness: FloatArray) -> IntArray:
+    """Return for each coarse function the vertex where it is largest, times the fitness, without repetitions."""
     columns = basis.tocsc()
     found = []
     for j in range(basis.shape[1]):
         rows = columns.indices[columns.indptr[j] : columns.indptr[j + 1]]
-        values = columns.data[columns.indptr[j] : columns.indptr[j + 1]] * allowed[rows]
+        values = columns.data[columns.indptr[j] : columns.indptr[j + 1]] * fitness[rows]
         if len(rows) and values.max() > 0:
             found.append(rows[np.argmax(values >= values.max() * (1 - TIE))])
     return np.unique(np.array(found, dtype=np.int64))

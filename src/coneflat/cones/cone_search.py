@@ -13,7 +13,7 @@ from .dense_model import Limits
 from .dense_search import DenseSearch
 from .green import GreenOperator
 from .pool import Pool
-from .solution import ConeSolution, target_from_log_scale
+from .solution import FULL_TURN, ConeSolution, target_from_log_scale
 
 # Unknowns of the coarse model: one for so many vertices, within bounds that keep its dense inverse cheaper than the
 # factorization of the mesh's own Laplacian.
@@ -25,6 +25,10 @@ COARSE_DOUBT = 1.35
 # Perturbations tried for each number of cones about the answer: one for so many vertices, within bounds, so that they
 # take a like share of the time on all meshes.
 VERTICES_PER_SHAKE, LEAST_SHAKES, MOST_SHAKES = 400, 12, 40
+# Sets of more cones than this are perturbed less often.
+MANY = 30
+# Of vertices side by side, those with room for such an angle represent the others on the coarse model.
+ROOMY = 4 * np.pi
 # How many local optima of the coarse model are tried on the mesh when the best one misses narrowly.
 RUNNERS = 3
 
@@ -41,6 +45,7 @@ class ConeSearch:
         limits: of the curvatures.
         required: (r,) vertices that are cones in any case.
         usable: (n,) mask of the vertices that may be cones.
+        room: (n,) the widest angle of a cone at each vertex, radians; None: any that the limits allow.
     """
 
     def __init__(
@@ -53,6 +58,7 @@ class ConeSearch:
         limits: Limits,
         required: IntArray,
         usable: BoolArray,
+        room: FloatArray | None = None,
     ) -> None:
         self._laplacian, self.curvature, self._is_boundary = laplacian, curvature, is_boundary
         self.limits = limits
@@ -68,13 +74,20 @@ class ConeSearch:
         coarse = coarse_model(self.operator, inner, log_scale, size)
         is_usable = usable[vertices].copy()
         is_usable[free] = False
-        self.places = np.concatenate([free, candidates(coarse, is_usable)])
+        least = np.full(len(vertices), limits.least)
+        fitness = is_usable.astype(np.float64)
+        if room is not None:
+            least = np.maximum(least, np.minimum(FULL_TURN - room[vertices], 0.0))
+            fitness *= np.minimum(room[vertices], ROOMY) / ROOMY
+        self.places = np.concatenate([free, candidates(coarse, fitness)])
         kernel, slope = coarse.at(self.places)
         mask = np.ones(len(self.places), dtype=bool)
         mask[: len(free)] = False
         fixed = np.arange(len(free))
-        self.coarse = DenseSearch(np.ascontiguousarray(kernel), slope, coarse.constant, mask, fixed, limits)
-        self.pool = Pool(self.operator, coarse, inner, log_scale, is_usable, free, limits)
+        self.coarse = DenseSearch(
+            np.ascontiguousarray(kernel), slope, coarse.constant, mask, fixed, limits, least[self.places]
+        )
+        self.pool = Pool(self.operator, coarse, inner, log_scale, is_usable, free, limits, least)
 
     @property
     def most_cones(self) -> int:
@@ -85,24 +98,37 @@ class ConeSearch:
             most = min(most, int(self.limits.total / self.limits.least + 1e-9))
         return most
 
-    def fewest(self, bound: float) -> tuple[float, IntArray]:
+    def fewest(self, bound: float, most: int | None = None) -> tuple[float, IntArray]:
         """Return E and members (places in the pool) of the smallest set with E <= bound that was found.
 
-        Where none is, the best set.
+        Where none is among those of at most `most` cones, the best set.
         """
         goal = bound * bound
-        self._survey(goal)
+        most = self.most_cones if most is None else min(most, self.most_cones)
+        self._survey(goal, most)
         known = sorted(self.coarse.best)
         count = next((c for c in known if self.coarse.best[c][0] <= goal), known[-1])
-        while not self.polished(count, goal) <= goal:
-            if count >= self.most_cones:
-                break
-            count += 1
+        # The coarse model may be off by some cones: up in growing steps, and halving what lies between.
+        failed = -1
+        while not self.polished(count, goal, rough=True) <= goal and count < most:
+            failed = count
+            count = min(count + max(1, count // 8), most)
+            self.coarse.climb(0.0, count)
+        while failed >= 0 and count - failed > 1:
+            middle = (count + failed) // 2
+            if self.polished(middle, goal, rough=True) <= goal:
+                count = middle
+            else:
+                failed = middle
+        # Then down one by one, with all means.
+        if not self.polished(count, goal) <= goal and count < most:
+            count = min(count + 1, most)
+            self.polished(count, goal)
         while count - 1 >= len(self.coarse.fixed) and self._is_promising(count - 1, goal):
             if not self.polished(count - 1, goal) <= goal:
                 break
             count -= 1
-        found = self.pool.model.best
+        found = {c: best for c, best in self.pool.model.best.items() if c <= most}
         good = [c for c in found if found[c][0] <= goal]
         count = min(good) if good else min(found, key=lambda c: (found[c][0], c))
         return self._result(count)
@@ -140,9 +166,9 @@ class ConeSearch:
         energy, members = self.pool.model.best[count]
         return float(np.sqrt(max(energy, 0.0))), members
 
-    def _survey(self, goal: float) -> None:
+    def _survey(self, goal: float, most: int) -> None:
         """Find good sets of all sizes up to the one that is needed, and a little on, on the coarse model."""
-        self.coarse.climb(goal / COARSE_DOUBT, self.most_cones)
+        self.coarse.climb(goal / COARSE_DOUBT, most)
         known = sorted(self.coarse.best)
         reached = [c for c in known if self.coarse.best[c][0] <= goal]
         count = reached[0] if reached else known[-1]
@@ -163,7 +189,11 @@ class ConeSearch:
                 and goal / COARSE_DOUBT < model.best[count][0]
                 and (goal == 0 or model.best[count][0] < COARSE_DOUBT * goal)
             ):
-                model.shaken(count, self._shakes)
+                model.shaken(count, self._tries(count))
+
+    def _tries(self, count: int) -> int:
+        """Return how many perturbations of sets of a size are tried: large ones take long."""
+        return max(4, self._shakes * MANY // max(count, MANY))
 
     def _is_promising(self, count: int, goal: float) -> bool:
         """Whether fewer cones may do, by the coarse model or by the sets tried."""
@@ -175,10 +205,11 @@ class ConeSearch:
         known = self.pool.model.best.get(count)
         return known is not None and known[0] <= goal * COARSE_DOUBT
 
-    def polished(self, count: int, goal: float) -> float:
+    def polished(self, count: int, goal: float, rough: bool = False) -> float:
         """Return E^2 of the best set of a size that the mesh itself shows, infinite if there is none.
 
-        Starts are the coarse model's set, and neighbours in size of what is known.
+        Starts are the coarse model's set, and neighbours in size of what is known. Unless it is rough, more is tried
+        where the goal is missed narrowly.
         """
         pool, model = self.pool, self.pool.model
         starts = []
@@ -202,12 +233,12 @@ class ConeSearch:
         if best is None:
             return np.inf
         energy, members = pool.polish(best[1])
-        if energy > goal and (energy <= goal * COARSE_DOUBT or goal == 0):
+        if not rough and energy > goal and (energy <= goal * COARSE_DOUBT or goal == 0):
             for _, runner in self.coarse.runners.get(count, [])[:RUNNERS]:
                 energy = min(energy, pool.polish(pool.insert(self.places[runner]))[0])
                 if energy <= goal:
                     break
-            if energy > goal and model.shaken(count, self._shakes):
+            if energy > goal and model.shaken(count, self._tries(count)):
                 energy = min(energy, pool.polish(model.best[count][1])[0])
         return energy
 

@@ -52,12 +52,6 @@ class Limits:
         bound = self.most if self.total > 0 else self.least
         return math.ceil(self.total / bound - 1e-9) if math.isfinite(bound) else 1
 
-    def are_inside(self, curvatures: FloatArray) -> BoolArray:
-        """Return a mask of the curvatures that no bound holds."""
-        span = 1e-9 * (1.0 + np.abs(curvatures))
-        inside: BoolArray = (curvatures < self.most - span) & (curvatures > self.least + span)
-        return inside
-
 
 @dataclass(frozen=True)
 class Fit:
@@ -97,6 +91,7 @@ class DenseModel:
         usable: (m,) whether a candidate may be chosen; False for required ones, which are in every set.
         fixed: the required candidates, which come first in every set.
         limits: of the curvatures.
+        least: (m,) bound of the curvature at each candidate, the limit or above.
     """
 
     gram: FloatArray
@@ -105,6 +100,13 @@ class DenseModel:
     usable: BoolArray
     fixed: IntArray
     limits: Limits
+    least: FloatArray
+
+    def are_inside(self, members: IntArray, curvatures: FloatArray) -> BoolArray:
+        """Return a mask of the members whose curvature no bound holds."""
+        span = 1e-9 * (1.0 + np.abs(curvatures))
+        inside: BoolArray = (curvatures < self.limits.most - span) & (curvatures > self.least[members] + span)
+        return inside
 
     def fit(self, members: IntArray) -> Fit:
         """Return the best curvatures of a set."""
@@ -112,9 +114,8 @@ class DenseModel:
 
         limits = self.limits
         gram, slope = self.gram[members[:, None], members], self.slope[members]
-        curvatures, multiplier, feasible = fit_curvatures(
-            gram, slope, limits.least, limits.most, limits.total
-        )
+        least, most = self.least[members], np.full(len(members), limits.most)
+        curvatures, multiplier, feasible = fit_curvatures(gram, slope, least, most, limits.total)
         energy = self.constant + (2 * slope + gram @ curvatures) @ curvatures
         return Fit(curvatures, multiplier, feasible, float(energy) if feasible else math.inf)
 
@@ -126,11 +127,11 @@ class DenseModel:
         """Return (m,) by how much E^2 changes if a candidate joins the members (0 or less), bounds of others aside."""
         limits, diagonal = self.limits, np.diag(self.gram)
         # Where no curvatures are feasible, none is bounded.
-        least, most = (limits.least, limits.most) if fitted.feasible else (-math.inf, math.inf)
+        least, most = (self.least, limits.most) if fitted.feasible else (-math.inf, math.inf)
         if limits.has_sum and not len(members):
             change: FloatArray = (2 * self.slope + diagonal * limits.total) * limits.total
             return change
-        free = members[limits.are_inside(fitted.curvatures)] if fitted.feasible else members
+        free = members[self.are_inside(members, fitted.curvatures)] if fitted.feasible else members
         if limits.has_sum and not len(free):
             free = members[:1]
         gradient = self.slope + fitted.multiplier + fitted.curvatures @ self.gram[members]
@@ -222,7 +223,7 @@ class DenseModel:
 
         limits, diagonal = self.limits, np.diag(self.gram)
         change, which = np.full(len(members), np.inf), np.full(len(members), -1)
-        places = np.flatnonzero(limits.are_inside(fitted.curvatures))
+        places = np.flatnonzero(self.are_inside(members, fitted.curvatures))
         if not len(places):
             return change, which
         gradient = self.slope + fitted.multiplier + fitted.curvatures @ self.gram[members]
@@ -239,7 +240,7 @@ class DenseModel:
             remain,
             1e-9 * diagonal,
             is_open,
-            limits.least,
+            self.least,
             limits.most,
             TIE,
         )
@@ -276,7 +277,7 @@ class DenseModel:
     def _swapped_one_by_one(self, members: IntArray, fitted: Fit) -> Fit | None:
         """Swap, in place, what the table leaves out: members held at a bound, or any where none are feasible."""
         limit = fitted.energy * (1 - GAIN) if fitted.feasible else math.inf
-        inside = self.limits.are_inside(fitted.curvatures) & fitted.feasible
+        inside = self.are_inside(members, fitted.curvatures) & fitted.feasible
         for place in range(len(self.fixed), len(members)):
             if not inside[place]:
                 chosen, _ = self.best_addition(np.delete(members, place), self.usable, limit)

@@ -47,10 +47,31 @@ def solve_factored(lower: FloatArray, count: int, right: FloatArray) -> None:
 
 
 @compiled
+def start_feasibly(least: FloatArray, most: FloatArray, total: float, curvatures: FloatArray) -> None:
+    """Write curvatures within the bounds that sum to the total, as even as can be; NaN means any sum."""
+    size = len(curvatures)
+    has_sum = total == total
+    for i in range(size):
+        curvatures[i] = min(max(total / size if has_sum else 0.0, least[i]), most[i])
+    for _ in range(size if has_sum else 0):
+        missing, room = total, 0
+        for i in range(size):
+            missing -= curvatures[i]
+        if missing == 0.0:
+            break
+        for i in range(size):
+            room += curvatures[i] < most[i] if missing > 0 else curvatures[i] > least[i]
+        if room == 0:
+            break
+        for i in range(size):
+            curvatures[i] = min(max(curvatures[i] + missing / room, least[i]), most[i])
+
+
+@compiled
 def fit_curvatures(
-    gram: FloatArray, slope: FloatArray, least: float, most: float, total: float
+    gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float
 ) -> tuple[FloatArray, float, bool]:
-    """Minimise k gram k / 2 + slope k over least <= k <= most, and sum k = total unless that is NaN.
+    """Minimise k gram k / 2 + slope k over least <= k <= most (s,), and sum k = total unless that is NaN.
 
     A primal active set method: it ends at the exact optimum, since the program is strictly convex.
 
@@ -63,18 +84,19 @@ def fit_curvatures(
     curvatures = np.zeros(size)
     if size == 0:
         return curvatures, 0.0, not has_sum or abs(total) < 1e-9
-    start = total / size if has_sum else 0.0
-    slack = 1e-12 * (1.0 + abs(start))
-    feasible = not has_sum or least - slack <= start <= most + slack
+    low_sum, high_sum = 0.0, 0.0
+    for i in range(size):
+        low_sum += least[i]
+        high_sum += most[i]
+    slack = 1e-12 * (1.0 + abs(total))
+    feasible = not has_sum or low_sum - slack <= total <= high_sum + slack
     if not feasible:
-        least, most = -np.inf, np.inf
-    start = min(max(start, least), most)
+        least, most = np.full(size, -np.inf), np.full(size, np.inf)
+    start_feasibly(least, most, total, curvatures)
     state = np.zeros(size, np.int64)  # -1 held at the least, 1 at the most, 0 free
     free = np.empty(size, np.int64)
     best, ones, gradient = np.empty(size), np.empty(size), np.empty(size)
     lower = np.empty((size, size))
-    for i in range(size):
-        curvatures[i] = start
     multiplier = 0.0
     for _ in range(20 * size + 20):
         count = 0
@@ -106,17 +128,18 @@ def fit_curvatures(
         # As far there as the bounds allow.
         step, blocking, side = 1.0, -1, 0
         for i in range(count):
-            value, aim = curvatures[free[i]], best[i]
-            if aim > most or aim < least:
-                bound = most if aim > most else least
+            j = free[i]
+            value, aim = curvatures[j], best[i]
+            if aim > most[j] or aim < least[j]:
+                bound = most[j] if aim > most[j] else least[j]
                 part = max((bound - value) / (aim - value), 0.0)
                 if part < step:
-                    step, blocking, side = part, free[i], 1 if aim > most else -1
+                    step, blocking, side = part, j, 1 if aim > most[j] else -1
         for i in range(count):
             curvatures[free[i]] += step * (best[i] - curvatures[free[i]])
         if blocking >= 0:
             state[blocking] = side
-            curvatures[blocking] = most if side == 1 else least
+            curvatures[blocking] = most[blocking] if side == 1 else least[blocking]
             continue
         # Whether one held at a bound would rather leave it.
         largest = 1e-300

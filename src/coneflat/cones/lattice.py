@@ -180,7 +180,11 @@ class Lattice:
             left = np.nan if self.total is None else quantum * (self.total - units[done].sum())
             small = gram[np.ix_(open_places, open_places)]
             curvatures, _, feasible = fit_curvatures(
-                small, part, float(self.least * quantum), float(self.most * quantum), float(left)
+                small,
+                part,
+                np.full(len(part), float(self.least * quantum)),
+                np.full(len(part), float(self.most * quantum)),
+                float(left),
             )
             if not feasible:
                 return None

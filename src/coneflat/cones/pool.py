@@ -29,6 +29,7 @@ class Pool:
         usable: BoolArray,
         required: IntArray,
         limits: Limits,
+        least: FloatArray,
     ) -> None:
         self._operator = operator
         self._coarse = coarse
@@ -40,8 +41,9 @@ class Pool:
         self.unknowns: IntArray = np.empty(0, dtype=np.int64)
         none = np.empty(0)
         self.model = DenseSearch(
-            np.empty((0, 0)), none, coarse.constant, none.astype(bool), np.arange(len(required)), limits
+            np.empty((0, 0)), none, coarse.constant, none.astype(bool), np.arange(len(required)), limits, none
         )
+        self._least = least
         self.insert(required)
 
     def insert(self, unknowns: IntArray) -> IntArray:
@@ -63,6 +65,7 @@ class Pool:
             model.slope = self._slope[self.unknowns]
             model.usable = np.ones(len(self.unknowns), dtype=bool)
             model.usable[model.fixed] = False
+            model.least = self._least[self.unknowns]
         order = np.argsort(self.unknowns, kind="stable")
         return order[np.searchsorted(self.unknowns, unknowns, sorter=order)]
 
@@ -112,11 +115,13 @@ class Pool:
         score = self.score(members, curvatures)
         size = max(40, 4 * len(self._usable) // self._coarse.basis.shape[1])
         taken = self.unknowns[members]
+        is_free = self._usable.copy()
+        is_free[taken] = False
         targets = []
         for place in range(len(self.model.fixed), len(members)):
             s, k = int(taken[place]), curvatures[place]
-            near = self.near(s, size)
-            near = near[~np.isin(near, taken)]
+            near = ball(self._indptr, self._indices, s, size)
+            near = near[is_free[near]]
             if not len(near) or k == 0:
                 continue
             linear = 2 * k * (score[near] - score[s])

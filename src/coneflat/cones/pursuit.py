@@ -56,6 +56,7 @@ def open_search(
     weights: FloatArray | None = None,
     required: Iterable[int] = (),
     allowed: BoolArray | None = None,
+    room: FloatArray | None = None,
 ) -> ConeSearch:
     """Return a search for the cones of a connected mesh, which answers several questions with one factorization.
 
@@ -75,6 +76,7 @@ def open_search(
         weights: (n,) importance of each vertex, 1 where nothing is said.
         required: vertices that are cones in any case.
         allowed: (n,) mask of the other vertices that may be cones; None: all.
+        room: (n,) the widest angle of a cone at each vertex, radians; None: as far as `max_cone_angle` goes.
 
     Raises:
         OptionError: an option makes no sense.
@@ -93,11 +95,15 @@ def open_search(
         )
     order = np.lexsort((curvature, areas)) if tie_key is None else np.argsort(tie_key, kind="stable")
     share = weighted_areas(areas, weights)
-    return ConeSearch(laplacian, curvature, share, is_boundary, order, limits, cones, usable)
+    return ConeSearch(laplacian, curvature, share, is_boundary, order, limits, cones, usable, room)
 
 
-def pursue(search: ConeSearch, *, distortion: float = 0.2, count: int | None = None) -> PursuedCones:
+def pursue(
+    search: ConeSearch, *, distortion: float = 0.2, count: int | None = None, most: int | None = None
+) -> PursuedCones:
     """Find the fewest cones with an area distortion of at most `distortion`, or the best `count` of them.
+
+    Where the fewest are more than `most`, the best of so many or fewer.
 
     Raises:
         OptionError: the distortion or the number makes no sense.
@@ -106,7 +112,9 @@ def pursue(search: ConeSearch, *, distortion: float = 0.2, count: int | None = N
     if count is None:
         if not 0 < distortion < math.inf:
             raise OptionError(f"the distortion allowed must be a positive number, not {distortion:g}")
-        energy, members = search.fewest(distortion)
+        if most is not None:
+            check_count(most, search)
+        energy, members = search.fewest(distortion, most)
     else:
         check_count(count, search)
         energy, members = search.of_count(count)

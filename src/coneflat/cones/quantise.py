@@ -47,7 +47,12 @@ class QuantisedCones:
 
 
 def quantise_cones(
-    search: ConeSearch, quantum: float = math.pi / 2, *, distortion: float = 0.2, count: int | None = None
+    search: ConeSearch,
+    quantum: float = math.pi / 2,
+    *,
+    distortion: float = 0.2,
+    count: int | None = None,
+    most: int | None = None,
 ) -> QuantisedCones:
     """Find the fewest cones with curvatures that are multiples of a quantum and E <= distortion.
 
@@ -56,6 +61,7 @@ def quantise_cones(
         quantum: radians.
         distortion: the E allowed.
         count: a number of cones instead: the least distortion with at most so many.
+        most: of the fewest, the limit.
 
     Raises:
         OptionError: the quantum makes no sense.
@@ -65,7 +71,7 @@ def quantise_cones(
     goal = 0.0 if count is not None else distortion * distortion
     if not goal >= 0 or (count is None and not 0 < distortion < math.inf):
         raise OptionError(f"the distortion allowed must be a positive number, not {distortion:g}")
-    most = search.most_cones if count is None else min(count, search.most_cones)
+    most = min(search.most_cones, *(limit for limit in (count, most) if limit is not None), search.most_cones)
     survey(search, lattice, goal, most)
     exact = Lattice(search.pool.model, lattice.quantum, lattice.least, lattice.most, lattice.total)
     sizes = sorted(size for size in lattice.best if size <= most)

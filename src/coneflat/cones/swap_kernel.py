@@ -17,7 +17,7 @@ def swap_table(
     remain: FloatArray,
     floor: FloatArray,
     is_open: BoolArray,
-    least: float,
+    least: FloatArray,
     most: float,
     tie: float,
 ) -> tuple[FloatArray, IntArray]:
@@ -31,7 +31,8 @@ def swap_table(
         remain: (m,) what the projection leaves of the candidates' gram entries.
         floor: (m,) what must be left of them once a member is gone.
         is_open: (m,) the candidates that may come in.
-        least, most: bounds of curvatures.
+        least: (m,) bound of the candidates' curvatures.
+        most: the upper bound.
         tie: changes that differ by less, relatively, are equal; the first candidate counts.
     """
     size, count = rows.shape
@@ -49,7 +50,7 @@ def swap_table(
                 h = remain[t] + w * w * share
                 if h > floor[t]:
                     g = gradient[t] - w * k * share
-                    x = min(max(-g / h, least), most)
+                    x = min(max(-g / h, least[t]), most)
                     values[t] = lost + (2.0 * g + h * x) * x
                     lowest = min(lowest, values[t])
         if lowest < np.inf:
