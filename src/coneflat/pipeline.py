@@ -35,6 +35,8 @@ from .wishes import Wishes
 SEARCHES = 4
 # Radians by which a cone is off then: a full turn, less what rounding and untangled neighbours make.
 UNHELD = 1.0
+# The distortion asked for may be missed by so much, relatively, without a word.
+NARROWLY = 1e-3
 
 
 def flatten(
@@ -164,7 +166,22 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
         if not len(unheld) or not pursues(part.mesh, options):
             break
         part = replace(part, wishes=part.wishes.without(unheld))
-    return replace(laid_out, notes=laid_out.notes + shortfalls(laid_out, part.wishes.names))
+    missed = _missed_distortion(laid_out, part, options)
+    return replace(laid_out, notes=laid_out.notes + missed + shortfalls(laid_out, part.wishes.names))
+
+
+def _missed_distortion(laid_out: LaidOut, part: Component, options: Options) -> tuple[str, ...]:
+    """Return that the distortion asked for was not reached, if so."""
+    reached = laid_out.figures.area_distortion_linear
+    # With weights it is another deviation that is bounded, not the one in the figures.
+    if not pursues(part.mesh, options) or options.cone_count is not None or part.wishes.weights is not None:
+        return ()
+    if reached <= options.distortion * (1 + NARROWLY):
+        return ()
+    return (
+        f"The area distortion is {reached:.3g} with {plural(len(laid_out.cones), 'cone')}, above the "
+        f"{options.distortion:g} allowed: no better was found within the bounds given.",
+    )
 
 
 def shortfalls(laid_out: LaidOut, names: IntArray) -> tuple[str, ...]:

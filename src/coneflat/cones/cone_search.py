@@ -9,7 +9,7 @@ from scipy.sparse import csc_matrix
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from .coarse_model import candidates, coarse_model
-from .dense_model import Limits
+from .dense_model import MANY, Limits
 from .dense_search import DenseSearch
 from .green import GreenOperator
 from .pool import Pool
@@ -25,8 +25,6 @@ COARSE_DOUBT = 1.35
 # Perturbations tried for each number of cones about the answer: one for so many vertices, within bounds, so that they
 # take a like share of the time on all meshes.
 VERTICES_PER_SHAKE, LEAST_SHAKES, MOST_SHAKES = 400, 12, 40
-# Sets of more cones than this are perturbed less often.
-MANY = 30
 # Of vertices side by side, those with room for such an angle represent the others on the coarse model.
 ROOMY = 4 * np.pi
 # How many local optima of the coarse model are tried on the mesh when the best one misses narrowly.
@@ -225,6 +223,8 @@ class ConeSearch:
                 starts.append(grown)
         if count in model.best:
             starts.append(model.best[count][1])
+        if count > MANY:
+            starts = sorted(starts, key=model.energy)[:1]
         best = None
         for start in starts:
             energy, members = model.exchanged(start)

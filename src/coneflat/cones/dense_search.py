@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .._arrays import IntArray
-from .dense_model import DenseModel
+from .dense_model import MANY, DenseModel
 
+# Large sets are improved every so many cones, as they grow.
+EVERY = 8
 # Local optima with E^2 up to this factor above the best are remembered, so many of them.
 NEAR, KEPT = 1.2, 4
 
@@ -43,7 +45,10 @@ class DenseSearch(DenseModel):
             grown = self.grown(members)
             if grown is None:
                 return
-            energy, members = self.exchanged(grown)
+            if len(grown) > MANY and len(grown) % EVERY and len(grown) < most:
+                energy, members = self.energy(grown), grown
+            else:
+                energy, members = self.exchanged(grown)
             if np.isfinite(energy):
                 self.offer(energy, members)
             known = self.best.get(len(members))
