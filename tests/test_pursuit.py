@@ -42,7 +42,6 @@ def test_reported_distortion_is_that_of_the_log_scale(name):
     laplacian, curvature, areas, is_boundary, chi = surface(*SHAPES[name])
     found = pursue_cones(laplacian, curvature, areas, is_boundary, chi, distortion=0.1)
     solution = found.solution
-    assert found.reached
     assert found.distortion <= 0.1
     assert found.distortion == pytest.approx(area_distortion(solution.log_scale, areas), rel=1e-9)
     residual = laplacian @ solution.log_scale - solution.target + curvature
@@ -78,14 +77,14 @@ def test_positive_only():
         pursue(*HANDLE, positive_only=True)
 
 
-@pytest.mark.parametrize("name", SHAPES)
-def test_history_falls_and_ends_at_the_answer(name):
-    found = pursue(*SHAPES[name], distortion=0.05)
-    counts, energies = np.array(found.history).T
-    assert (np.diff(counts) > 0).all()
-    assert (np.diff(energies) < 0).all()
-    assert counts[-1] == len(found.solution.cones)
-    assert energies[-1] == pytest.approx(found.distortion, rel=1e-6)
+def test_bounds_that_leave_nothing_to_gain_end_the_search():
+    """On a torus curvatures sum to 0: without negative ones there are none."""
+    vertices, faces = shapes.genus(1)
+    search = open_search(*surface(vertices, faces), positive_only=True)
+    energy, members = search.fewest(0.01)
+    assert energy > 0.01
+    assert max(search.coarse.best) < 30
+    assert not search.solution(members).cones.size
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -170,12 +169,11 @@ def test_weights_shift_distortion_away():
     assert inside(careful) < 0.7 * inside(plain)
 
 
-def test_what_cannot_be_reached_is_flagged():
+def test_what_cannot_be_reached_is_the_best_there_is():
     vertices, faces = shapes.sphere(3)
     allowed = np.zeros(len(vertices), dtype=bool)
     allowed[[0, 5, 9, 11]] = True
     found = pursue(vertices, faces, distortion=1e-3, allowed=allowed)
-    assert not found.reached
     assert found.distortion > 1e-3
     assert set(found.solution.cones) <= {0, 5, 9, 11}
 
@@ -241,6 +239,5 @@ def test_fewer_cones_than_published(shared, name, count):
     model = read_mesh(shared(name))
     vertices, faces = model.vertices, model.corners.reshape(-1, 3)
     found = pursue(vertices, faces, distortion=0.2, min_cone_angle=0.1 * np.pi)
-    assert found.reached
     assert found.distortion <= 0.2
     assert len(found.solution.cones) <= count

@@ -7,7 +7,7 @@ import pytest
 import shapes
 from click.testing import CliRunner
 
-from coneflat import MeshFile, TriangleMesh, errors, flatten, read_mesh
+from coneflat import MeshFile, TriangleMesh, errors, find_cones, flatten, read_mesh
 from coneflat.cli.main import cli
 
 
@@ -98,8 +98,9 @@ def test_cones_that_triangles_cannot_hold_are_avoided():
     """A vertex of three triangles has no room for an angle of 3 pi and more."""
     vertices, faces = shapes.genus(3)
     result = flatten(vertices, faces, cone_count=4, max_cone_angle=None)
-    target = np.nan_to_num(result.curvature_residual)
-    assert np.abs(target).max() < 1e-9 or any("too wide" in note for note in result.notes)
+    valence = np.bincount(faces.ravel(), minlength=len(vertices))
+    assert (2 * np.pi - result.curvatures < valence[result.cones] * np.pi).all()
+    assert np.abs(np.nan_to_num(result.curvature_residual)).max() < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -163,3 +164,50 @@ def test_on_the_command_line(files, monkeypatch, arguments, told):
     else:
         message = getattr(done.exception, "message", None) or str(done.exception)
         assert told in message
+
+
+def test_a_wish_brings_cones_where_the_boundary_is_prescribed():
+    vertices, faces = shapes.hill()
+    assert len(flatten(vertices, faces, boundary="disk").cones) == 0
+    assert len(flatten(vertices, faces, boundary="disk", cone_count=3).cones) == 3
+
+
+def test_distortion_that_is_missed_is_noted():
+    vertices, faces = shapes.sphere(3)
+    missed = flatten(vertices, faces, distortion=0.01, max_cones=4)
+    assert any("above the 0.01 allowed" in note for note in missed.notes)
+    weighted = flatten(vertices, faces, distortion=0.01, max_cones=4, weights=1 + vertices[:, 0] ** 2)
+    assert any("above the 0.01 allowed" in note for note in weighted.notes)
+    assert not flatten(vertices, faces, distortion=0.5).notes
+
+
+def test_the_linear_metric_takes_the_cones_of_the_search():
+    vertices, faces = shapes.sphere(3)
+    found = find_cones(vertices, faces, distortion=0.1)
+    linear = flatten(vertices, faces, distortion=0.1, metric="linear")
+    assert set(linear.cones) == set(found.vertices)
+    assert not linear.notes
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"cones": "greedy", "weights": np.ones(162)}, "weights is an option of cones 'pursuit'"),
+        ({"cones": [1, 2, 3], "required_cones": [5]}, "required_cones is an option"),
+        ({"required_cones": {1: 0.5}}, "without curvatures"),
+        ({"min_cone_angle": "pi/2"}, "min_cone_angle must be a number"),
+        ({"quantum": True}, "quantum must be a number"),
+        ({"positive_only": "no"}, "True or False"),
+        ({"weights": np.full(162, np.nan)}, "finite"),
+        ({"solver": "gauss"}, "unknown solver"),
+    ],
+)
+def test_options_of_the_wrong_kind(options, message):
+    with pytest.raises(errors.OptionError, match=message):
+        flatten(*shapes.sphere(2), **options)
+
+
+def test_no_vertex_is_allowed():
+    vertices, faces = shapes.hill()
+    assert len(find_cones(vertices, faces, allowed_cones=[]).vertices) == 0
+    assert len(find_cones(vertices, faces, cone_count=2.0).vertices) == 2

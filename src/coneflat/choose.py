@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 # The angle of a cone for which each triangle around it has room on its straight sides: less than half a turn, as not
 # all of them can be spread alike.
 ROOM = 0.6 * np.pi
+# How much larger E may get for the sake of rotations along handles.
+DEARER = 1.15
 
 #: Returns what loops across the handles turn by in the metric that a solution leads to, radians.
 Turned: TypeAlias = Callable[[ConeSolution], FloatArray]
@@ -59,7 +61,9 @@ class Surface:
 def pursues(mesh: TriangleMesh, options: Options) -> bool:
     """Whether the pursuit finds the cones of a mesh."""
     is_prescribed = options.boundary_kind in ("disk", "polygon") and mesh.is_boundary_vertex.any()
-    return options.method == "pursuit" or (options.method == "auto" and not is_prescribed)
+    return options.method == "pursuit" or (
+        options.method == "auto" and (options.wishes_cones or not is_prescribed)
+    )
 
 
 def choose_cones(
@@ -100,10 +104,9 @@ def _pursued(surface: Surface, wishes: Wishes, options: Options, turned: Turned 
     from .conformal.turning import open_turning
 
     mesh = surface.mesh
-    takes_rest = mesh.is_boundary_vertex & (options.boundary_kind != "straight")
-    if not (wishes.is_allowed & ~takes_rest).any() and (takes_rest.any() or mesh.euler_characteristic == 0):
-        given = surface.laplacian, surface.curvature, takes_rest, mesh.euler_characteristic
-        return cones_at(*given, wishes.required.vertices)
+    only = only_choice(surface, wishes, options)
+    if only is not None:
+        return only
     search = search_on(surface, wishes, options)
 
     distortion, count = options.distortion, options.cone_count
@@ -115,9 +118,21 @@ def _pursued(surface: Surface, wishes: Wishes, options: Options, turned: Turned 
         )
         if turned is not None and mesh.genus():
             by_scale = open_turning(mesh).by_log_scale(surface.lengths)
-            quantised = align_handles(search, quantised, by_scale, turned, distortion)
+            bound = quantised.distortion * DEARER
+            bound = bound if count is not None else max(distortion, bound)
+            quantised = align_handles(search, quantised, by_scale, turned, bound)
         found = quantised.solution
     return replace(found, cones=found.cones[~mesh.is_boundary_vertex[found.cones]])
+
+
+def only_choice(surface: Surface, wishes: Wishes, options: Options) -> ConeSolution | None:
+    """Return the solution without cones where no vertex may be one, and none need be; else None."""
+    mesh = surface.mesh
+    takes_rest = mesh.is_boundary_vertex & (options.boundary_kind != "straight")
+    if (wishes.is_allowed & ~takes_rest).any() or not (takes_rest.any() or mesh.euler_characteristic == 0):
+        return None
+    given = surface.laplacian, surface.curvature, takes_rest, mesh.euler_characteristic
+    return cones_at(*given, np.empty(0, dtype=np.int64))
 
 
 def search_on(surface: Surface, wishes: Wishes, options: Options) -> ConeSearch:

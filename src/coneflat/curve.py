@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._arrays import FloatArray, IntArray
-from .choose import Surface, search_on
+from .choose import Surface, only_choice, search_on
 from .cones import ConeSolution
 from .errors import OptionError
+from .geometry.areas import area_distortion, weighted_areas
 from .options import Options
 from .prepare import Component, prepare
 
@@ -99,8 +100,11 @@ def find_cones(
         allowed_cones=allowed_cones,
         repair=repair,
     )
-    search, part = _open(mesh, faces, options)
-    found = pursue(search, distortion=distortion, count=cone_count)
+    opened = _open(mesh, faces, options)
+    if isinstance(opened, FoundCones):
+        return opened
+    search, part = opened
+    found = pursue(search, distortion=options.distortion, count=options.cone_count)
     return _named(found.solution, found.distortion, part)
 
 
@@ -134,16 +138,25 @@ def cone_curve(
         allowed_cones=allowed_cones,
         repair=repair,
     )
-    search, part = _open(mesh, faces, options)
+    opened = _open(mesh, faces, options)
+    if isinstance(opened, FoundCones):
+        return ConeCurve((opened,))
+    search, part = opened
     found = search.best_of_sizes(int(most))
     if not found:
         raise OptionError(f"no set of up to {most} cones carries this surface's curvature; allow more")
     return ConeCurve(tuple(_named(search.solution(members), energy, part) for energy, members in found))
 
 
-def _open(mesh: Any, faces: ArrayLike | None, options: Options) -> tuple[ConeSearch, Component]:
+def _open(mesh: Any, faces: ArrayLike | None, options: Options) -> tuple[ConeSearch, Component] | FoundCones:
+    """Return a search on the largest component, or what there is where no vertex of it may be a cone."""
     part = max(prepare(mesh, faces, options).components, key=lambda each: len(each.faces))
-    return search_on(Surface.of(part.mesh, part.lengths), part.wishes, options), part
+    surface = Surface.of(part.mesh, part.lengths)
+    only = only_choice(surface, part.wishes, options)
+    if only is not None:
+        share = weighted_areas(surface.areas, part.wishes.weights)
+        return _named(only, area_distortion(only.log_scale, share), part)
+    return search_on(surface, part.wishes, options), part
 
 
 def _named(solution: ConeSolution, distortion: float, part: Component) -> FoundCones:

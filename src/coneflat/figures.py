@@ -23,7 +23,7 @@ class SolveFigures:
         untangled_move: their longest way, relative to the mean edge around them.
         refined_triangles: triangles that were added by the common subdivision.
         area_distortion_linear: E of the linear model that the cones were chosen in: the standard deviation of
-            the log scale, by area.
+            the log scale, by area (and importance, where weights were given).
         area_distortion: E of the metric that was laid out.
     """
 

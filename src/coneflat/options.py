@@ -16,7 +16,19 @@ CONES = ("auto", "pursuit", "greedy", "none")
 METRICS = ("exact", "linear")
 LENGTH_RULES = ("integral", "mean")
 AT_CONES = ("auto", "scale", "curvature")
+SOLVERS = ("auto", "pardiso", "scikit-sparse", "cholespy", "scipy", "amg")
 BOUNDARIES = ("free", "lengths", "disk", "straight")
+
+# What asks for cones by the pursuit, and it alone.
+PURSUIT_FIELDS = (
+    "cone_count",
+    "positive_only",
+    "weights",
+    "required_cones",
+    "forbidden_cones",
+    "allowed_cones",
+    "quantum",
+)
 
 Cones = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
 Boundary = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
@@ -61,6 +73,7 @@ class Options:
     refine: bool = False
     repair: bool = False
     strict: bool = False
+    solver: str = "auto"
     given_cones: Mapping[int, float | None] = field(init=False, default_factory=dict)
     corners: Mapping[int, float | None] = field(init=False, default_factory=dict)
 
@@ -90,23 +103,40 @@ class Options:
             )
         _choice("metric", self.metric, METRICS)
         _choice("length_rule", self.length_rule, LENGTH_RULES)
+        _choice("solver", self.solver, SOLVERS)
         epsilon = _number("epsilon", self.epsilon)
         if not 0 < epsilon < math.inf:
             raise OptionError(f"epsilon must be a positive number, not {epsilon:g}")
         for name in ("cone_count", "max_cones"):
             value = getattr(self, name)
-            if value is not None and _whole(name, value) < 0:
+            if value is None:
+                continue
+            if _whole(name, value) < 0:
                 raise OptionError(f"{name} cannot be negative ({value})")
+            object.__setattr__(self, name, int(value))
+        for name in ("distortion", "min_cone_angle", "max_cone_angle", "epsilon", "quantum"):
+            if getattr(self, name) is not None or name == "min_cone_angle":
+                object.__setattr__(self, name, _number(name, getattr(self, name)))
+        for name in ("positive_only", "correct_handles", "best_effort", "refine", "repair", "strict"):
+            if not isinstance(getattr(self, name), (bool, np.bool_)):
+                raise OptionError(f"{name} is True or False, not {getattr(self, name)!r}")
         if not 0 < _number("distortion", self.distortion) < math.inf:
             raise OptionError(f"distortion must be a positive number, not {self.distortion:g}")
         for name in ("required_cones", "forbidden_cones", "allowed_cones"):
-            if getattr(self, name) is not None:
+            if getattr(self, name) is None and name != "allowed_cones":
+                object.__setattr__(self, name, ())
+            elif getattr(self, name) is not None:
                 noun = name.replace("_", " ").removesuffix("s")
+                if isinstance(getattr(self, name), Mapping):
+                    raise OptionError(f"{noun}s are vertices alone, without curvatures: give a list of them")
                 object.__setattr__(self, name, tuple(_given_vertices(noun, getattr(self, name))))
         self._check_pursuit()
 
     def _check_pursuit(self) -> None:
         """Check the options that only a pursuit takes, and those of whole quanta."""
+        if self.wishes_cones and not self.searches_cones:
+            given = next(name for name in PURSUIT_FIELDS if self._is_set(name))
+            raise OptionError(f"{given} is an option of cones 'pursuit', not of cones {self.method!r}")
         if self.boundary_kind == "straight" and not self.searches_cones:
             raise OptionError("a straight boundary gets its corners from the search: use cones 'pursuit'")
         if self.quantum is None:
@@ -117,10 +147,6 @@ class Options:
             return
         if not 0 < _number("quantum", self.quantum) <= 2 * math.pi * (1 + 1e-6):
             raise OptionError(f"the quantum must be positive and at most 2 pi, not {self.quantum:g} radians")
-        if not self.searches_cones:
-            raise OptionError(
-                f"cones of whole quanta are found by the pursuit, not with cones {self.method!r}"
-            )
         if self.correct_handles and self.metric != "exact":
             raise OptionError("rotations along handles are corrected in the exact metric only")
 
@@ -128,6 +154,17 @@ class Options:
     def method(self) -> str:
         """The way cones are found: "auto", "pursuit", "greedy", "none" or "given"."""
         return self.cones if isinstance(self.cones, str) else "given"
+
+    @property
+    def wishes_cones(self) -> bool:
+        """Whether something is said of the cones that a pursuit should find."""
+        return any(self._is_set(name) for name in PURSUIT_FIELDS)
+
+    def _is_set(self, name: str) -> bool:
+        value = getattr(self, name)
+        return value is not None and (
+            isinstance(value, (np.ndarray, str)) or bool(value) or name == "cone_count"
+        )
 
     @property
     def boundary_kind(self) -> str:
@@ -164,6 +201,8 @@ def _choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
 
 
 def _number(name: str, value: object) -> float:
+    if isinstance(value, (bool, np.bool_, str)):
+        raise OptionError(f"{name} must be a number, not {value!r}")
     try:
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError) as error:

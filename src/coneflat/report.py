@@ -43,6 +43,7 @@ def as_dict(result: Flattening) -> dict[str, Any]:
         "cones": len(result.cones),
         **{name: getattr(result.distortion, name) for name in MEASURES},
         **asdict(result.solve),
+        "solvers": list(result.solvers),
         "rotation_deviation": None if result.rotations is None else result.rotations.worst,
         "handle_deviations": None if result.rotations is None else result.rotations.handles,
         "uv_scale": result.uv_scale,

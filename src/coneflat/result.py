@@ -37,6 +37,7 @@ class Flattening:
         notes: what was done to the input, one sentence each.
         settings: the options it was made with.
         solve: how the metric and the layout were found: Newton steps, flips, untangled triangles.
+        solvers: the linear solvers that were used.
         rotations: of seams, against multiples of the quantum of the cones; None without one.
         vertex_origin: (n,) the input vertex that each vertex came from, -1 for those that a refinement added.
         face_origin: (m,) the input face that each face came from.
@@ -60,6 +61,7 @@ class Flattening:
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
     solve: SolveFigures = field(default_factory=SolveFigures)
+    solvers: tuple[str, ...] = ()
     rotations: Rotations | None = None
     vertex_origin: IntArray | None = None
     face_origin: IntArray | None = None

@@ -151,7 +151,10 @@ def _weights(weights: object, given: InputMesh) -> FloatArray:
         raise OptionError(
             f"weights must be {count:,} numbers, one for each vertex, not of shape {values.shape}"
         )
-    if not (np.isfinite(values).all() and values.min() >= 0 and values.max() > 0):
+    if not np.isfinite(values).all():
+        at = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise OptionError(f"weights must be finite; that of vertex {at} is {values[at]:g}")
+    if not (values.min() >= 0 and values.max() > 0):
         raise OptionError(
             f"weights must be 0 and up, not all 0; they are {values.min():g} to {values.max():g}"
         )

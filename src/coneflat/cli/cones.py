@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from .search import as_keywords, search_options
 
@@ -61,8 +62,13 @@ def cones(
     if curve:
         new_figure(1, 1)  # says what is missing before the work
         picture = picture or Path(f"{mesh.stem}_cones.png")
-    elif picture is not None:
-        raise click.UsageError("only --curve has a picture: add it, or leave out --picture", context)
+    else:
+        for name, is_given in (
+            ("--picture", picture is not None),
+            ("--most", context.get_parameter_source("most") is not ParameterSource.DEFAULT),
+        ):
+            if is_given:
+                raise click.UsageError(f"only --curve takes {name}: add it, or leave out {name}", context)
     for target in (output, picture):
         if target is not None:
             check_target(target)
@@ -84,6 +90,10 @@ def cones(
             for vertex, curvature in zip(chosen.vertices, chosen.curvatures, strict=True)
         ]
         lines.append(f"{len(chosen.vertices)} cones, area distortion {chosen.distortion:.4f}")
+        if keywords["cone_count"] is None and chosen.distortion > keywords["distortion"] * (1 + 1e-9):
+            lines.append(
+                f"note: above the {keywords['distortion']:g} allowed: no better was found within the bounds given"
+            )
     if not quiet:
         click.echo("\n".join(lines))
     if picture is not None:

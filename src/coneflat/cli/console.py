@@ -78,7 +78,8 @@ class Console:
         out.print(table)
         total = sum(result.seconds.values())
         spent = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in result.seconds.items())
-        out.print(f"time             {total:.2f} s: {spent}", markup=False, soft_wrap=True)
+        by = f" (solved by {', '.join(result.solvers)})" if result.solvers else ""
+        out.print(f"time             {total:.2f} s: {spent}{by}", markup=False, soft_wrap=True)
         for path in written:
             out.print(f"wrote {path}", markup=False)
         self._warn(out, result)

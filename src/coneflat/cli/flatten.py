@@ -109,6 +109,13 @@ METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "metric", "lengths", *E
 @click.option("--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces.")
 @click.option("--strict", is_flag=True, help="Refuse triangles without area instead of opening them.")
 @click.option(
+    "--solver",
+    type=click.Choice(["auto", "pardiso", "scikit-sparse", "cholespy", "scipy", "amg"]),
+    default="auto",
+    show_default=True,
+    help="What solves the linear systems; auto is the fastest installed.  amg iterates, for what fits no other.",
+)
+@click.option(
     "--weld/--no-weld",
     default=None,
     help="Merge vertices at the same position.  [default: for STL and glTF only]",
@@ -138,6 +145,7 @@ def flatten(
     lengths: str,
     repair: bool,
     strict: bool,
+    solver: str,
     weld: bool | None,
     report: Path | None,
     quiet: bool,
@@ -178,7 +186,8 @@ def flatten(
             "best_effort": best_effort,
             "refine": refine,
         }
-    run(mesh, output, {**options, "repair": repair, "strict": strict}, weld=weld, report=report, quiet=quiet)
+    options = {**options, "repair": repair, "strict": strict, "solver": solver}
+    run(mesh, output, options, weld=weld, report=report, quiet=quiet)
 
 
 def _check_combinations(context: click.Context) -> None:

@@ -75,9 +75,11 @@ def read_weights(text: str) -> str | FloatArray:
     Raises:
         MeshFileError: the file cannot be read.
     """
-    if not is_file(text):
-        return text
     path = Path(text)
+    if not is_file(text):
+        if path.suffix:
+            raise MeshFileError(f"cannot read weights from {path}: there is no such file")
+        return text
     try:
         values = np.load(path, allow_pickle=False) if path.suffix == ".npy" else np.loadtxt(path, ndmin=1)
         return np.asarray(values, dtype=np.float64)

@@ -32,7 +32,7 @@ class Angle(click.ParamType):  # type: ignore[type-arg]
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return radians."""
-        if isinstance(value, (int, float)):
+        if isinstance(value, (int, float)) or value.strip().lower() == "inf":
             return float(value)
         from ..errors import OptionError
         from .given import parse_angle
@@ -60,7 +60,11 @@ _OPTIONS = (
         help="The sharpest cone: its angle, such as pi/2 or 90deg.",
     ),
     click.option(
-        "--max-cone-angle", type=Angle(), help="The widest saddle: its angle, above 2 pi.  [default: any]"
+        "--max-cone-angle",
+        type=Angle(),
+        default=4 * math.pi,
+        show_default="4pi",
+        help="The widest saddle: its angle, above 2 pi; inf for any.",
     ),
     click.option("--positive-only", is_flag=True, help="No cones of negative curvature (saddles)."),
     click.option(

@@ -20,8 +20,6 @@ from .solution import ConeSolution
 
 # Vertices around each cone among which it may move, and moves of one or two cones at most.
 NEIGHBOURS, MOVES = 60, 30
-# How much larger E may get.
-DEARER = 1.05
 # Rounds of comparing the linear model with the metric that it stands for.
 ROUNDS = 4
 # Radians below which nothing is gained.
@@ -33,7 +31,7 @@ def align_handles(
     quantised: QuantisedCones,
     by_scale: FloatArray,
     turned: Callable[[ConeSolution], FloatArray],
-    distortion: float,
+    bound: float,
 ) -> QuantisedCones:
     """Return quantised cones moved so that loops turn by near multiples of the quantum.
 
@@ -42,7 +40,7 @@ def align_handles(
         quantised: the cones.
         by_scale: (2 genus, n) derivative of the loops' turning by the log scale.
         turned: returns (2 genus,) what the loops turn by in the metric with given cones, radians.
-        distortion: the E allowed.
+        bound: the E allowed.
     """
     operator = search.operator
     by_curvature = operator.solve(np.ascontiguousarray(by_scale[:, operator.vertices].T))
@@ -51,7 +49,7 @@ def align_handles(
     for _ in range(ROUNDS):
         if np.abs(best_off).max() <= ENOUGH:
             break
-        moved = moved_cones(search, trial, by_curvature, off, max(distortion, quantised.distortion * DEARER))
+        moved = moved_cones(search, trial, by_curvature, off, bound)
         if np.array_equal(moved.solution.cones, trial.solution.cones):
             break
         trial, off = moved, off_multiple(turned(moved.solution), quantised.quantum)
@@ -77,17 +75,24 @@ def moved_cones(
     unknown[operator.vertices] = np.arange(len(operator.vertices))
     places = unknown[quantised.solution.cones]
     curvatures = quantised.quantum * quantised.units.astype(np.float64)
+    before, caution = (places, off), 1.0
     for _ in range(MOVES):
         here = search.solution_of(places, curvatures).log_scale[operator.vertices]
         slack = bound**2 - float(here @ operator.weighted(here))
+        if slack < 0 and places is not before[0]:
+            # The coarse model promised more than there was.
+            (places, off), caution = before, 2 * caution
+            continue
         score = operator.solve(operator.weighted(here))
         cones, targets = _moves(search, places)
+        if not len(cones):
+            break
         k, old = curvatures[cones], places[cones]
         turned = k[:, None] * (by_curvature[targets] - by_curvature[old])
         bending = np.concatenate(
             [search.pool.squared_distances(places[c], targets[cones == c]) for c in np.unique(cones)]
         )
-        dearer = 2 * k * (score[targets] - score[old]) + k**2 * bending
+        dearer = 2 * k * (score[targets] - score[old]) + caution * k**2 * bending
         # The last stands for no move.
         cones, turned, dearer = np.append(cones, -1), np.vstack([turned, 0 * off]), np.append(dearer, 0.0)
         missing = ((off + turned) ** 2).sum(axis=1)
@@ -96,6 +101,7 @@ def moved_cones(
         one, two = np.unravel_index(np.argmin(pairs), pairs.shape)
         if not pairs[one, two] < 0.9 * (off**2).sum():
             break
+        before, places = (places, off), places.copy()
         for move in (one, two):
             if cones[move] >= 0:
                 places[cones[move]] = targets[move]
@@ -103,14 +109,12 @@ def moved_cones(
     solution = search.solution_of(places, curvatures)
     inner = solution.log_scale[operator.vertices]
     energy = float(np.sqrt(inner @ operator.weighted(inner)))
-    return replace(
-        quantised, solution=solution, distortion=energy, reached=quantised.reached and energy <= bound
-    )
+    return replace(quantised, solution=solution, distortion=energy)
 
 
 def _moves(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray]:
     """Return which cone, and whereto, of all moves to usable vertices nearby; required cones stay."""
-    cones, targets = [], []
+    cones, targets = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for i in range(len(search.coarse.fixed), len(places)):
         near = search.pool.near(int(places[i]), NEIGHBOURS)
         near = near[~np.isin(near, places)]

@@ -27,6 +27,8 @@ COARSE_DOUBT = 1.35
 VERTICES_PER_SHAKE, LEAST_SHAKES, MOST_SHAKES = 400, 12, 40
 # Of vertices side by side, those with room for such an angle represent the others on the coarse model.
 ROOMY = 4 * np.pi
+# An E that is zero but for rounding.
+NOTHING = 1e-9
 # How many local optima of the coarse model are tried on the mesh when the best one misses narrowly.
 RUNNERS = 3
 
@@ -112,6 +114,9 @@ class ConeSearch:
             failed = count
             count = min(count + max(1, count // 8), most)
             self.coarse.climb(0.0, count)
+            if count not in self.coarse.best:  # more cones bring nothing
+                count = max(self.coarse.best)
+                break
         while failed >= 0 and count - failed > 1:
             middle = (count + failed) // 2
             if self.polished(middle, goal, rough=True) <= goal:
@@ -156,7 +161,7 @@ class ConeSearch:
             self.polished(count, math.inf)
         for count in sorted(self.pool.model.best):
             energy, members = self._result(count)
-            if count <= most and (not found or energy < found[-1][0]):
+            if count <= most and (not found or (energy < found[-1][0] - NOTHING)):
                 found.append((energy, members))
         return found
 
@@ -241,17 +246,6 @@ class ConeSearch:
             if energy > goal and model.shaken(count, self._tries(count)):
                 energy = min(energy, pool.polish(model.best[count][1])[0])
         return energy
-
-    def history(self, count: int) -> tuple[tuple[int, float], ...]:
-        """Return (number, E) of the best sets of up to `count` cones: on the mesh where looked at, else coarse."""
-        found: list[tuple[int, float]] = []
-        exact = self.pool.model.best
-        for some in range(count + 1):
-            known = exact.get(some, self.coarse.best.get(some))
-            if known is None or (found and known[0] >= found[-1][1] ** 2):
-                continue
-            found.append((some, float(np.sqrt(max(known[0], 0.0)))))
-        return tuple(found)
 
     def solution(self, members: IntArray) -> ConeSolution:
         """Return the cones of a set, those of no curvature left out unless they are required."""

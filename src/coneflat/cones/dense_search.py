@@ -11,6 +11,8 @@ from .dense_model import MANY, DenseModel
 
 # Large sets are improved every so many cones, as they grow.
 EVERY = 8
+# So many cones more that bring E^2 down by less than this factor are no use: bounds are in the way.
+STALL, STALLED = 10, 0.99
 # Local optima with E^2 up to this factor above the best are remembered, so many of them.
 NEAR, KEPT = 1.2, 4
 
@@ -53,6 +55,9 @@ class DenseSearch(DenseModel):
                 self.offer(energy, members)
             known = self.best.get(len(members))
             members = known[1] if known is not None else members
+            before = self.best.get(len(members) - STALL)
+            if before is not None and not energy < STALLED * before[0]:
+                return
 
     def descend(self, count: int, least: int) -> bool:
         """Take cones away one at a time, from the best set of a size; tell if a set got better."""

@@ -19,6 +19,7 @@ from scipy.sparse import csc_matrix
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import CurvatureError, OptionError
+from ..geometry.areas import weighted_areas
 from ..text import list_some, plural
 from .cone_search import ConeSearch
 from .dense_model import Limits
@@ -32,14 +33,10 @@ class PursuedCones:
     Attributes:
         solution: the cones.
         distortion: E of the linear model.
-        history: (number of cones, E) of the best sets met on the way, fewer cones first; E falls.
-        reached: whether the distortion asked for was reached.
     """
 
     solution: ConeSolution
     distortion: float
-    history: tuple[tuple[int, float], ...]
-    reached: bool
 
 
 def open_search(
@@ -118,9 +115,7 @@ def pursue(
     else:
         check_count(count, search)
         energy, members = search.of_count(count)
-    solution = search.solution(members)
-    reached = count is not None or energy <= distortion * (1 + 1e-9)
-    return PursuedCones(solution, energy, search.history(len(members)), reached)
+    return PursuedCones(search.solution(members), energy)
 
 
 def check_count(count: int, search: ConeSearch) -> None:
@@ -134,7 +129,7 @@ def check_count(count: int, search: ConeSearch) -> None:
         bound = limits.most if limits.total > 0 else limits.least
         each = f" of at most {abs(bound) / np.pi:.4g} pi each" if np.isfinite(bound) else ""
         raise CurvatureError(
-            f"{plural(count, 'cone')}{each} cannot carry this closed surface's total curvature of "
+            f"{plural(count, 'cone')}{each} cannot carry this surface's total curvature of "
             f"{limits.total / np.pi:.4g} pi: {limits.fewest} or more are needed"
         )
 
@@ -169,7 +164,7 @@ def curvature_limits(
     if (total > 0 and most <= 0) or (total < 0 and least >= 0):
         kind = "positive" if total < 0 else "negative"
         raise CurvatureError(
-            f"a closed surface of Euler characteristic {euler_characteristic} has a total curvature of "
+            f"a surface of Euler characteristic {euler_characteristic} has a total curvature of "
             f"{2 * euler_characteristic} pi, which cones of {kind} curvature alone cannot carry"
         )
     return Limits(least, most, total)
@@ -186,15 +181,3 @@ def required_vertices(required: Iterable[int], is_boundary: BoolArray) -> IntArr
     if is_boundary[cones].any():
         raise OptionError(f"required cones lie on the boundary: {list_some(cones[is_boundary[cones]])}")
     return cones
-
-
-def weighted_areas(areas: FloatArray, weights: FloatArray | None) -> FloatArray:
-    """Return (n,) areas times weights, made to sum to 1."""
-    if weights is None:
-        return areas / areas.sum()
-    if np.shape(weights) != areas.shape or not np.isfinite(weights).all() or (weights < 0).any():
-        raise OptionError(f"importance weights must be {len(areas)} numbers that are finite and not negative")
-    share = areas * weights
-    if not share.sum() > 0:
-        raise OptionError("importance weights are zero everywhere")
-    return share / share.sum()

@@ -36,14 +36,12 @@ class QuantisedCones:
         units: (s,) quanta of each.
         quantum: radians, made exact where 2 pi is a multiple of it but for rounding.
         distortion: E of the linear model.
-        reached: whether the distortion asked for was reached.
     """
 
     solution: ConeSolution
     units: IntArray
     quantum: float
     distortion: float
-    reached: bool
 
 
 def quantise_cones(
@@ -96,9 +94,7 @@ def quantise_cones(
     curvatures = (lattice.quantum * charges.units).astype(np.float64)
     solution = search.solution_of(search.pool.unknowns[charges.members], curvatures)
     energy = float(np.sqrt(max(charges.energy, 0.0)))
-    return QuantisedCones(
-        solution, charges.units, lattice.quantum, energy, count is not None or energy <= distortion
-    )
+    return QuantisedCones(solution, charges.units, lattice.quantum, energy)
 
 
 def open_lattice(search: ConeSearch, quantum: float) -> Lattice:

@@ -71,6 +71,7 @@ class ConformalProblem:
     steps: int = 0
     last: State | None = None
     _pattern: HessianPattern | None = None
+    _factor: Factor | None = None
 
     @cached_property
     def is_bounded(self) -> bool:
@@ -105,7 +106,8 @@ class ConformalProblem:
             self._pattern = HessianPattern(self.triangulation)
         held = self.fixed | self.pinned
         self.steps += 1
-        return factorize(self._pattern.matrix(state.cots, held))
+        self._factor = factorize(self._pattern.matrix(state.cots, held), self._factor)
+        return self._factor
 
     def direction(self, factor: Factor, state: State) -> FloatArray:
         """Return the Newton direction of a state; 0 at vertices that are held."""

@@ -26,3 +26,7 @@ class SuperLUFactor:
         """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
         solution: FloatArray = self._factor.solve(np.asarray(right, dtype=np.float64))
         return solution
+
+    def renewed(self, matrix: csc_matrix) -> SuperLUFactor:
+        """Return the factor of another matrix of the same size."""
+        return SuperLUFactor(matrix)

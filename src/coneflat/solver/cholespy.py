@@ -1,4 +1,4 @@
-"""CHOLMOD through cholespy."""
+"""CHOLMOD without supernodes, through cholespy: wheels everywhere, quick to load, slow on large meshes."""
 
 from __future__ import annotations
 
@@ -7,13 +7,10 @@ from cholespy import CholeskySolverD, MatrixType
 from scipy.sparse import csc_matrix
 
 from .._arrays import FloatArray
+from .types import NotPositiveDefinite
 
 
-class NotPositiveDefinite(ArithmeticError):
-    """The matrix has no Cholesky factorization in floating point."""
-
-
-class CholmodFactor:
+class CholespyFactor:
     """A sparse Cholesky factorization."""
 
     def __init__(self, matrix: csc_matrix) -> None:
@@ -34,3 +31,7 @@ class CholmodFactor:
         solution = np.zeros_like(right)
         self._solver.solve(right, solution)
         return solution
+
+    def renewed(self, matrix: csc_matrix) -> CholespyFactor:
+        """Return the factor of another matrix of the same size."""
+        return CholespyFactor(matrix)

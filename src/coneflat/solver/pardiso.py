@@ -1,0 +1,141 @@
+"""PARDISO of Intel's MKL, which pypardiso brings: the fastest on large meshes, on x86-64 only.
+
+Its own interface copies, hashes and checks matrices, which takes longer than the factorization; here the routine is
+called itself. It takes the upper triangle by rows: for a symmetric matrix the lower one by columns.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import weakref
+from functools import lru_cache
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix
+
+from .._arrays import FloatArray
+from .types import NotPositiveDefinite
+
+AnyArray: TypeAlias = NDArray[Any]
+
+POSITIVE_DEFINITE, INDEFINITE = 2, -2
+ANALYSE, FACTORIZE, SOLVE, RELEASE = 11, 22, 33, -1
+# Positions in PARDISO's table of parameters, and what they are set to.
+NO_DEFAULTS, ORDERING, PERMUTATION, FROM_ZERO = 0, 1, 4, 34
+NESTED_DISSECTION, GIVEN, WANTED = 2, 1, 2
+# PARDISO's codes.
+OUT_OF_MEMORY, ZERO_PIVOT = -2, -4
+
+
+class PardisoFactor:
+    """A sparse Cholesky factorization whose ordering serves other matrices of the same size."""
+
+    def __init__(self, matrix: csc_matrix, kind: int = POSITIVE_DEFINITE) -> None:
+        n, self._kind = matrix.shape[0], kind
+        self._handle = np.zeros(64, dtype=np.int64)
+        self._table = np.zeros(64, dtype=np.int32)
+        self._table[[NO_DEFAULTS, ORDERING, PERMUTATION, FROM_ZERO]] = 1, NESTED_DISSECTION, WANTED, 1
+        self._order = np.zeros(n, dtype=np.int32)
+        # What is released when this object goes: PARDISO keeps its memory elsewhere.
+        self._finalizer = weakref.finalize(self, _release, kind, self._handle, self._table, n)
+        self._set_pattern(matrix)
+        self._fill(matrix)
+
+    def _set_pattern(self, matrix: csc_matrix) -> None:
+        starts, rows = matrix.indptr, matrix.indices
+        columns = np.repeat(np.arange(len(starts) - 1, dtype=rows.dtype), np.diff(starts))
+        self._indices, self._is_lower = rows, rows >= columns
+        self._rows = np.ascontiguousarray(rows[self._is_lower], dtype=np.int32)
+        self._starts = np.zeros(len(starts), dtype=np.int32)
+        np.cumsum(np.bincount(columns[self._is_lower], minlength=len(starts) - 1), out=self._starts[1:])
+        self._values = matrix.data[self._is_lower]
+        self._call(ANALYSE)
+        # From now on the order is known.
+        self._table[PERMUTATION] = GIVEN
+
+    def _fill(self, matrix: csc_matrix) -> None:
+        self._values = matrix.data[self._is_lower]
+        self._call(FACTORIZE)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
+        # One after the other in memory; of (k, n) this is a view.
+        columns = np.ascontiguousarray(right.T, dtype=np.float64)
+        solution = np.empty_like(columns)
+        self._call(SOLVE, columns, solution)
+        return solution.T
+
+    def renewed(self, matrix: csc_matrix) -> PardisoFactor:
+        """Return the factor of another matrix of the same size."""
+        if matrix.indices is not self._indices:
+            self._set_pattern(matrix)
+        self._fill(matrix)
+        return self
+
+    def _call(self, phase: int, right: FloatArray | None = None, solution: FloatArray | None = None) -> None:
+        count = 1 if right is None or right.ndim == 1 else len(right)
+        code = _pardiso(
+            self._kind,
+            phase,
+            self._handle,
+            self._table,
+            (self._values, self._starts, self._rows, self._order),
+            (right, solution),
+            count,
+        )
+        if code == ZERO_PIVOT and self._kind == POSITIVE_DEFINITE:
+            raise NotPositiveDefinite("a pivot is not positive")
+        if code == OUT_OF_MEMORY:
+            raise MemoryError(f"PARDISO has not enough memory for {len(self._order):,} unknowns")
+        if code:
+            raise RuntimeError(f"PARDISO failed with code {code} in phase {phase}")
+
+
+def _release(kind: int, handle: AnyArray, table: AnyArray, n: int) -> None:
+    none = np.zeros(1)
+    order = np.zeros(1, dtype=np.int32)
+    starts = np.zeros(n + 1, dtype=np.int32)
+    _pardiso(kind, RELEASE, handle, table, (none, starts, order, order), (None, None), 1)
+
+
+def _pardiso(
+    kind: int,
+    phase: int,
+    handle: AnyArray,
+    table: AnyArray,
+    matrix: tuple[AnyArray, AnyArray, AnyArray, AnyArray],
+    sides: tuple[AnyArray | None, AnyArray | None],
+    count: int,
+) -> int:
+    values, starts, rows, order = matrix
+    code = ctypes.c_int32(0)
+    _routine()(
+        _address(handle),
+        *map(_number, (1, 1, kind, phase, len(starts) - 1)),
+        *map(_address, (values, starts, rows, order)),
+        _number(count),
+        _address(table),
+        _number(0),  # no messages
+        *map(_address, sides),
+        ctypes.byref(code),
+    )
+    return code.value
+
+
+def _number(value: int) -> Any:
+    return ctypes.byref(ctypes.c_int32(value))
+
+
+def _address(array: AnyArray | None) -> ctypes.c_void_p:
+    return ctypes.c_void_p(None if array is None else array.ctypes.data)
+
+
+@lru_cache(maxsize=1)
+def _routine() -> Any:
+    from pypardiso import PyPardisoSolver
+
+    routine = PyPardisoSolver().libmkl["pardiso"]
+    routine.restype = None
+    return routine

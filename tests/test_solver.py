@@ -1,0 +1,119 @@
+"""Every back end against dense linear algebra, and the ladder."""
+
+import numpy as np
+import pytest
+import shapes
+from scipy.sparse import csc_matrix
+
+from coneflat import errors, flatten
+from coneflat.geometry import cotangent_laplacian, cotangents, edge_lengths
+from coneflat.solver import available, factorize, solving
+from coneflat.solver.ladder import HUGE, LARGE, MODULES, best_for
+
+SOLVERS = [
+    pytest.param(name, marks=pytest.mark.skipif(not available(name), reason=f"{name} is not installed"))
+    for name in MODULES
+]
+
+
+def grounded_laplacian(faces, vertices):
+    laplacian = cotangent_laplacian(faces, cotangents(edge_lengths(vertices, faces)), len(vertices))
+    return csc_matrix(csc_matrix(laplacian)[1:][:, 1:])
+
+
+@pytest.fixture
+def matrix():
+    vertices, faces = shapes.sphere(3)
+    return grounded_laplacian(faces, vertices)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_solutions(name, matrix):
+    right = np.random.default_rng(0).normal(size=(matrix.shape[0], 3))
+    expected = np.linalg.solve(matrix.toarray(), right)
+    with solving(name) as choice:
+        factor = factorize(matrix)
+        assert factor.solve(right) == pytest.approx(expected, abs=1e-9)
+        assert factor.solve(right[:, 0]) == pytest.approx(expected[:, 0], abs=1e-9)
+        assert factor.solve(np.asfortranarray(right)[:, ::2]) == pytest.approx(expected[:, ::2], abs=1e-9)
+    assert list(choice.used) == [name]
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_the_same_pattern_and_another(name, matrix):
+    """What was analysed for one matrix serves others of its size, whichever their pattern."""
+    same = csc_matrix((matrix.data * 2, matrix.indices, matrix.indptr), shape=matrix.shape)
+    other = csc_matrix(matrix + csc_matrix(([0.5, 0.5], ([0, 500], [500, 0])), shape=matrix.shape))
+    other.setdiag(other.diagonal() + 1)
+    other.sort_indices()
+    right = np.random.default_rng(0).normal(size=matrix.shape[0])
+    with solving(name):
+        factor = factorize(matrix)
+        for each in (same, other, matrix):
+            factor = factorize(each, used_up=factor)
+            assert factor.solve(right) == pytest.approx(np.linalg.solve(each.toarray(), right), abs=1e-9)
+
+
+@pytest.mark.parametrize("name", [each for each in SOLVERS if each.values[0] != "amg"])
+def test_indefinite_matrices_are_solved_with_pivots(name, matrix):
+    changed = matrix.copy()
+    changed[100, 100] -= 100.0
+    right = np.random.default_rng(0).normal(size=matrix.shape[0])
+    with solving(name):
+        solution = factorize(csc_matrix(changed)).solve(right)
+    assert solution == pytest.approx(np.linalg.solve(changed.toarray(), right), abs=1e-8)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_flattening_is_the_same_by_every_solver(name):
+    vertices, faces = shapes.sphere(3)
+    result = flatten(vertices, faces, solver=name)
+    expected = flatten(vertices, faces, solver="scipy")
+    assert result.solvers == (name,)
+    assert result.report()["solvers"] == [name]
+    assert result.cones.tolist() == expected.cones.tolist()
+    assert result.log_scale == pytest.approx(expected.log_scale, abs=1e-8)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_solutions_are_the_same_every_time(name, matrix):
+    right = np.random.default_rng(0).normal(size=(matrix.shape[0], 4))
+    with solving(name):
+        first, second = (factorize(matrix).solve(right) for _ in range(2))
+    assert np.array_equal(first, second)
+
+
+def test_the_ladder_takes_what_is_installed(monkeypatch):
+    installed = {"cholespy", "scipy"}
+    monkeypatch.setattr("coneflat.solver.ladder.available", lambda name: name in installed)
+    assert best_for(LARGE - 1) == best_for(HUGE) == "cholespy"
+    installed |= {"pardiso", "amg"}
+    assert (best_for(LARGE - 1), best_for(LARGE), best_for(HUGE)) == ("cholespy", "pardiso", "pardiso")
+    installed -= {"pardiso"}
+    assert best_for(HUGE) == "amg"
+    installed.clear()
+    assert best_for(10) == "scipy"
+
+
+def test_a_solver_that_is_not_installed(monkeypatch):
+    monkeypatch.setattr("coneflat.solver.ladder.available", lambda name: False)
+    with pytest.raises(errors.OptionError, match=r"pip install 'coneflat\[fast\]'"):
+        flatten(*shapes.sphere(1), solver="pardiso")
+
+
+def test_too_little_memory_for_a_factorization(monkeypatch, matrix):
+    pytest.importorskip("pyamg")
+
+    def no_memory(matrix):
+        raise MemoryError
+
+    monkeypatch.setattr("coneflat.solver.cholespy.CholespyFactor", no_memory)
+    with solving("auto") as choice:
+        factorize(matrix)
+    assert list(choice.used) == ["amg"]
+    with solving("cholespy"), pytest.raises(MemoryError):
+        factorize(matrix)
+
+
+def test_no_unknowns():
+    assert factorize(csc_matrix((0, 0))).solve(np.zeros(0)).shape == (0,)
