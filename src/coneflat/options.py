@@ -210,8 +210,8 @@ def _number(name: str, value: object) -> float:
 
 
 def _whole(name: str, value: object) -> int:
-    number = _number(name, value)
-    if isinstance(value, (bool, np.bool_)) or not number.is_integer() or abs(number) >= 2**62:
+    number = math.nan if isinstance(value, (bool, np.bool_)) else _number(name, value)
+    if not number.is_integer() or abs(number) >= 2**62:
         raise OptionError(f"{name} must be a whole number, not {value!r}")
     return int(number)
 
