@@ -22,6 +22,8 @@ VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 15, 400, 1200
 MOST_CONES = 200
 # How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself.
 COARSE_DOUBT = 1.35
+# Where the best set of a size misses by less than this factor of E^2, others are tried.
+NARROW = 1.1
 # Perturbations tried for each number of cones about the answer: one for so many vertices, within bounds, so that they
 # take a like share of the time on all meshes.
 VERTICES_PER_SHAKE, LEAST_SHAKES, MOST_SHAKES = 400, 12, 40
@@ -87,7 +89,7 @@ class ConeSearch:
         self.coarse = DenseSearch(
             np.ascontiguousarray(kernel), slope, coarse.constant, mask, fixed, limits, least[self.places]
         )
-        self.pool = Pool(self.operator, coarse, inner, log_scale, is_usable, free, limits, least)
+        self.pool = Pool(self.operator, coarse, log_scale, is_usable, free, limits, least)
 
     @property
     def most_cones(self) -> int:
@@ -238,7 +240,7 @@ class ConeSearch:
         if best is None:
             return np.inf
         energy, members = pool.polish(best[1])
-        if not rough and energy > goal and (energy <= goal * COARSE_DOUBT or goal == 0):
+        if not rough and energy > goal and (energy <= goal * NARROW or goal == 0):
             for _, runner in self.coarse.runners.get(count, [])[:RUNNERS]:
                 energy = min(energy, pool.polish(pool.insert(self.places[runner]))[0])
                 if energy <= goal:
@@ -252,8 +254,11 @@ class ConeSearch:
         curvatures = self.pool.curvatures(members)
         keep = np.abs(curvatures) > 1e-9
         keep[: len(self.coarse.fixed)] = True
-        unknowns = self.pool.unknowns[members[keep]]
-        return self.solution_of(unknowns, curvatures[keep])
+        kept = curvatures[keep]
+        if self.limits.has_sum and len(kept):
+            # What rounding and those left out have taken from the sum: no metric has another one.
+            kept += (self.limits.total - kept.sum()) / len(kept)
+        return self.solution_of(self.pool.unknowns[members[keep]], kept)
 
     def solution_of(self, unknowns: IntArray, curvatures: FloatArray) -> ConeSolution:
         """Return the solution of given cones and curvatures."""

@@ -9,7 +9,8 @@ scored at once; the few best are fitted exactly, bounds and all.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -103,6 +104,14 @@ class DenseModel:
     fixed: IntArray
     limits: Limits
     least: FloatArray
+    _diagonal: tuple[FloatArray, FloatArray] | None = field(default=None, init=False, repr=False)
+
+    @property
+    def diagonal(self) -> FloatArray:
+        """(m,) the diagonal of the gram matrix."""
+        if self._diagonal is None or self._diagonal[0] is not self.gram:
+            self._diagonal = self.gram, np.ascontiguousarray(np.diag(self.gram))
+        return self._diagonal[1]
 
     def are_inside(self, members: IntArray, curvatures: FloatArray) -> BoolArray:
         """Return a mask of the members whose curvature no bound holds."""
@@ -127,46 +136,21 @@ class DenseModel:
 
     def additions(self, members: IntArray, fitted: Fit) -> FloatArray:
         """Return (m,) by how much E^2 changes if a candidate joins the members (0 or less), bounds of others aside."""
-        limits, diagonal = self.limits, np.diag(self.gram)
+        from .project_kernel import addition_scores, gradients
+
+        limits, diagonal = self.limits, self.diagonal
         # Where no curvatures are feasible, none is bounded.
-        least, most = (self.least, limits.most) if fitted.feasible else (-math.inf, math.inf)
+        least, most = (
+            (self.least, limits.most) if fitted.feasible else (np.full_like(self.least, -math.inf), math.inf)
+        )
         if limits.has_sum and not len(members):
             change: FloatArray = (2 * self.slope + diagonal * limits.total) * limits.total
             return change
         free = members[self.are_inside(members, fitted.curvatures)] if fitted.feasible else members
         if limits.has_sum and not len(free):
             free = members[:1]
-        gradient = self.slope + fitted.multiplier + fitted.curvatures @ self.gram[members]
-        remain, _, _, _ = self._projected(free)
-        is_open = remain > 1e-9 * diagonal
-        curvatures = np.clip(-gradient / np.where(is_open, remain, np.inf), least, most)
-        change = np.where(is_open, (2 * gradient + remain * curvatures) * curvatures, 0.0)
-        change[members] = 0.0
-        return change
-
-    def _projected(self, free: IntArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Project candidates off the free members, and off the sum.
-
-        Returns:
-            (m,) what remains of the diagonal of the gram matrix, (f, m) the coefficients of the projection, and
-            (f,) the diagonal of the inverse of the members' gram matrix, with the sum kept and without.
-        """
-        columns = self.gram[free]
-        small = columns[:, free]
-        small.flat[:: len(free) + 1] *= 1 + 1e-13
-        inverse = np.linalg.inv(small)
-        rows = inverse @ columns
-        remain = np.diag(self.gram) - np.einsum("ij,ij->j", columns, rows)
-        diagonal = np.diag(inverse)
-        kept = diagonal
-        if self.limits.has_sum and len(free):
-            ones = inverse.sum(axis=1)
-            missing = 1.0 - rows.sum(axis=0)
-            whole = ones.sum()
-            remain += missing**2 / whole
-            rows += np.outer(ones / whole, missing)
-            kept = diagonal - ones**2 / whole
-        return remain, rows, kept, diagonal
+        gradient = gradients(self.gram, self.slope, members, fitted.curvatures, fitted.multiplier)
+        return addition_scores(self.gram, diagonal, gradient, free, least, most, limits.has_sum)
 
     def best_addition(
         self, members: IntArray, usable: BoolArray, limit: float = math.inf
@@ -182,6 +166,18 @@ class DenseModel:
         change = np.where(usable, self.additions(members, fitted), 0.0)
         change[members] = 0.0
         chosen, best = -1, limit
+        for t, found in self._tried(members, change, fitted, limit):
+            if is_less(found, best):
+                chosen, best = t, found
+        return chosen, best
+
+    def _tried(
+        self, members: IntArray, change: FloatArray, fitted: Fit, limit: float
+    ) -> Iterator[tuple[int, float]]:
+        """Yield the candidates that promise the largest change, if any does, and E^2 with each of them."""
+        from .project_kernel import energies_with
+
+        tried = []
         for _ in range(FITTED if fitted.feasible else 3 * FITTED):
             t = first_least(change) if len(change) else -1
             if t < 0 or change[t] >= 0:
@@ -189,10 +185,10 @@ class DenseModel:
             if fitted.feasible and fitted.energy + change[t] > limit + DOUBT * abs(limit):
                 break
             change[t] = 0.0
-            found = self.energy(np.append(members, t))
-            if is_less(found, best):
-                chosen, best = t, found
-        return chosen, best
+            tried.append(t)
+        limits, joining = self.limits, np.array(tried, dtype=np.int64)
+        given = self.gram, self.slope, self.constant, self.least, limits.most, limits.total
+        yield from zip(tried, energies_with(*given, members, joining).tolist(), strict=True)
 
     def grown(self, members: IntArray) -> IntArray | None:
         """Return the members and the best further one, if there is any."""
@@ -207,11 +203,13 @@ class DenseModel:
 
     def shrunk(self, members: IntArray) -> IntArray | None:
         """Return the members without the one that is missed least."""
+        from .project_kernel import project
+
         places = np.arange(len(self.fixed), len(members))
         if len(places) > MANY:
             # Too many to fit the rest without each: only those that cost least while others are refitted freely.
             fitted = self.fit(members)
-            _, _, kept, _ = self._projected(members)
+            kept = project(self.gram, self.diagonal, members, self.limits.has_sum, True)[2]
             loss = fitted.curvatures[places] ** 2 / np.maximum(kept[places], 1e-300)
             places = places[np.argsort(loss, kind="stable")[:FITTED]]
         chosen, best = None, math.inf
@@ -228,15 +226,16 @@ class DenseModel:
         Removing a member is a rank one change of the inverse, so all members against all candidates cost little more
         than scoring the candidates once. Members held at a bound, and the required, are left out.
         """
+        from .project_kernel import gradients, project
         from .swap_kernel import swap_table
 
-        limits, diagonal = self.limits, np.diag(self.gram)
+        limits, diagonal = self.limits, self.diagonal
         change, which = np.full(len(members), np.inf), np.full(len(members), -1)
         places = np.flatnonzero(self.are_inside(members, fitted.curvatures))
         if not len(places):
             return change, which
-        gradient = self.slope + fitted.multiplier + fitted.curvatures @ self.gram[members]
-        remain, rows, kept, bare = self._projected(members[places])
+        gradient = gradients(self.gram, self.slope, members, fitted.curvatures, fitted.multiplier)
+        remain, rows, kept, bare = project(self.gram, diagonal, members[places], limits.has_sum, True)
         movable = np.flatnonzero((places >= len(self.fixed)) & (kept > 1e-10 * bare))
         places = places[movable]
         is_open = self.usable.copy()

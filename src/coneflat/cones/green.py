@@ -1,7 +1,8 @@
 """The biharmonic kernel of a mesh: what cones at given vertices contribute to the area distortion.
 
 With G the inverse of the Laplacian and A the covariance under the vertex areas, A = diag(a) - a a^T, the distortion of
-target curvatures k is E^2 = (K - k)^T G A G (K - k). Rows of G A G cost two back-substitutions each.
+target curvatures k is E^2 = (K - k)^T G A G (K - k). An entry of G A G is a product of two Green's
+functions, a back-substitution each.
 """
 
 from __future__ import annotations
@@ -44,27 +45,29 @@ class GreenOperator:
         """
         if not self.is_closed:
             return self._factor.solve(source)
-        source = source - _outer(self.areas, source.sum(axis=0))
-        solution = np.zeros_like(source)
-        solution[1:] = self._factor.solve(source[1:])
-        solution -= self.areas @ solution
-        return solution
+        # By rows, each in one piece: what sources look like as columns.
+        rows = np.atleast_2d(source.T)
+        rows = rows - np.outer(rows.sum(axis=1), self.areas)
+        solution = np.zeros_like(rows)
+        solution[:, 1:] = self._factor.solve(rows[:, 1:].T).T
+        solution -= (solution @ self.areas)[:, None]
+        return solution[0] if source.ndim == 1 else solution.T
 
     def weighted(self, values: FloatArray) -> FloatArray:
         """Return A values for (f,) or (f, k)."""
         centred = values - self.areas @ values
         return self.areas * centred if values.ndim == 1 else self.areas[:, None] * centred
 
-    def kernel_rows(self, unknowns: IntArray, at: IntArray) -> FloatArray:
-        """Return (k, p) the entries of G A G at rows `unknowns` and columns `at`."""
-        rows = np.empty((len(unknowns), len(at)))
+    def responses(self, unknowns: IntArray) -> FloatArray:
+        """Return (k, f) the Green's functions of sources at some unknowns."""
+        rows = np.empty((len(unknowns), len(self.vertices)))
         for start in range(0, len(unknowns), BATCH):
             some = unknowns[start : start + BATCH]
-            source = np.zeros((len(self.vertices), len(some)))
-            source[some, np.arange(len(some))] = 1.0
-            rows[start : start + BATCH] = self.solve(self.weighted(self.solve(source)))[at].T
+            source = np.zeros((len(some), len(self.vertices)))
+            source[np.arange(len(some)), some] = 1.0
+            rows[start : start + BATCH] = self.solve(source.T).T
         return rows
 
-
-def _outer(areas: FloatArray, sums: FloatArray | float) -> FloatArray:
-    return areas * sums if np.ndim(sums) == 0 else np.outer(areas, sums)
+    def products(self, one: FloatArray, other: FloatArray) -> FloatArray:
+        """Return (k, l) the covariances of functions (k, f) and (l, f) under the areas."""
+        return (one * self.areas) @ other.T - np.outer(one @ self.areas, other @ self.areas)

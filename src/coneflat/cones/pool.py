@@ -15,6 +15,7 @@ from .green import GreenOperator
 WORTHWHILE = 2e-4
 # Rounds of moves for a set of cones; most come to rest after three or four.
 ROUNDS = 12
+CAUTION = (1.0, 4.0)
 
 
 class Pool:
@@ -24,7 +25,6 @@ class Pool:
         self,
         operator: GreenOperator,
         coarse: CoarseModel,
-        curvature: FloatArray,
         log_scale: FloatArray,
         usable: BoolArray,
         required: IntArray,
@@ -33,11 +33,13 @@ class Pool:
     ) -> None:
         self._operator = operator
         self._coarse = coarse
-        self._curvature = curvature
         self._usable = usable
         self._indptr = operator.laplacian.indptr.astype(np.int64)
         self._indices = operator.laplacian.indices.astype(np.int64)
+        self._log_scale = log_scale
         self._slope = operator.solve(operator.weighted(log_scale))
+        # The Green's functions of the unknowns, in blocks as they came.
+        self._responses: list[FloatArray] = []
         self.unknowns: IntArray = np.empty(0, dtype=np.int64)
         none = np.empty(0)
         self.model = DenseSearch(
@@ -54,7 +56,10 @@ class Pool:
             new = unknowns if not len(self.unknowns) else new
             model = self.model
             self.unknowns = np.concatenate([self.unknowns, new])
-            rows = self._operator.kernel_rows(new, self.unknowns)
+            self._responses.append(self._operator.responses(new))
+            rows = np.hstack(
+                [self._operator.products(self._responses[-1], block) for block in self._responses]
+            )
             old = len(self.unknowns) - len(new)
             gram = np.empty((len(self.unknowns), len(self.unknowns)))
             gram[:old, :old] = model.gram
@@ -75,10 +80,13 @@ class Pool:
 
     def score(self, members: IntArray, curvatures: FloatArray) -> FloatArray:
         """Return (f,) half the derivative of E^2 by the curvature of a cone at each vertex."""
-        source = -self._curvature
-        source[self.unknowns[members]] += curvatures
-        operator = self._operator
-        return operator.solve(operator.weighted(operator.solve(source)))
+        log_scale = self._log_scale.copy()
+        first = 0
+        for block in self._responses:
+            inside = (members >= first) & (members < first + len(block))
+            log_scale += curvatures[inside] @ block[members[inside] - first]
+            first += len(block)
+        return self._operator.solve(self._operator.weighted(log_scale))
 
     def polish(self, members: IntArray) -> tuple[float, IntArray]:
         """Move cones over the mesh until E comes to rest; return E^2 and the members."""
@@ -127,7 +135,7 @@ class Pool:
             linear = 2 * k * (score[near] - score[s])
             bending = k * k * self.squared_distances(s, near)
             # A longer and a more cautious step: the distances are those of a coarse model.
-            for caution in (1.0, 4.0):
+            for caution in CAUTION:
                 change = linear + caution * bending
                 best = first_least(change)
                 if change[best] < -WORTHWHILE * energy:

@@ -97,6 +97,9 @@ class ConformalProblem:
                 broken = sum_angles(*arrays)
         curvature = self.flat_turn - sums
         residual = np.where(self.fixed, 0.0, self.target - curvature)
+        if not self.fixed.any() and np.count_nonzero(self.pinned) == 1:
+            # Gauss-Bonnet holds but for the rounding of 2 pi at every vertex, which no scale can take away.
+            residual -= residual.mean()
         self.last = State(log_scale, curvature, cots, broken, residual)
         return self.last
 

@@ -24,7 +24,7 @@ MODULES = {
 }
 INSTALLED_BY = {"pardiso": "coneflat[fast]", "scikit-sparse": "scikit-sparse", "amg": "coneflat[amg]"}
 # Unknowns below which loading MKL takes longer than what it saves.
-LARGE = 30_000
+LARGE = 20_000
 # Unknowns from which a factorization without supernodes and nested dissection takes minutes and too much memory.
 HUGE = 2_000_000
 

@@ -25,6 +25,8 @@ ANALYSE, FACTORIZE, SOLVE, RELEASE = 11, 22, 33, -1
 # Positions in PARDISO's table of parameters, and what they are set to.
 NO_DEFAULTS, ORDERING, PERMUTATION, FROM_ZERO = 0, 1, 4, 34
 NESTED_DISSECTION, GIVEN, WANTED = 2, 1, 2
+# So many right-hand sides are solved faster together than one by one.
+TOGETHER = 12
 # PARDISO's codes.
 OUT_OF_MEMORY, ZERO_PIVOT = -2, -4
 
@@ -64,7 +66,11 @@ class PardisoFactor:
         # One after the other in memory; of (k, n) this is a view.
         columns = np.ascontiguousarray(right.T, dtype=np.float64)
         solution = np.empty_like(columns)
-        self._call(SOLVE, columns, solution)
+        if columns.ndim == 2 and len(columns) < TOGETHER:
+            for i in range(len(columns)):
+                self._call(SOLVE, columns[i], solution[i])
+        else:
+            self._call(SOLVE, columns, solution)
         return solution.T
 
     def renewed(self, matrix: csc_matrix) -> PardisoFactor:
