@@ -12,6 +12,7 @@ from coneflat.conformal.doubling import double
 from coneflat.conformal.exact import exact_metric
 from coneflat.conformal.hessian import HessianPattern
 from coneflat.conformal.linear import scaled_lengths
+from coneflat.conformal.newton import conjugate_gradients
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths
 from coneflat.geometry.intrinsic import intrinsic_triangulation
 from coneflat.layout.straighten import straight_triangles
@@ -272,3 +273,42 @@ class TestRefusal:
         assert not metric.converged
         assert metric.residual > 1e-10
         assert abs(metric.curvature[metric.worst_vertex]) > 0
+
+
+class Scaled:
+    """The inverse of the Laplacian of the input, or nothing like it."""
+
+    def __init__(self, mesh, worth, is_good):
+        laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths_of(mesh)), len(mesh.vertices))
+        self.inverse = np.linalg.pinv(laplacian.toarray()) if is_good else np.eye(len(mesh.vertices))
+        self.worth, self.calls = worth, 0
+
+    def solve(self, right):
+        self.calls += 1
+        return self.inverse @ right
+
+
+@pytest.mark.parametrize(("worth", "is_good"), [(60, True), (4, True), (60, False), (1, False)])
+def test_a_preconditioner_changes_the_way_not_the_end(worth, is_good):
+    mesh = random_sphere(300, 7)
+    target = cones_on(mesh, np.full(4, np.pi))
+    expected = exact_metric(mesh, lengths_of(mesh), target)
+    inverse = Scaled(mesh, worth, is_good)
+    metric = exact_metric(mesh, lengths_of(mesh), target, preconditioner=inverse)
+    assert metric.converged
+    assert metric.residual < 1e-12
+    assert inverse.calls
+    assert metric.log_scale == pytest.approx(expected.log_scale, abs=1e-9)
+
+
+def test_conjugate_gradients_tell_what_they_cannot_solve():
+    mesh = random_sphere(60, 1)
+    inverse = Scaled(mesh, 60, True)
+    laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths_of(mesh)), 60)
+    right = np.random.default_rng(0).normal(size=60)
+    right -= right.mean()
+    solution = conjugate_gradients(laplacian, right, inverse, 1e-10)
+    assert laplacian @ solution == pytest.approx(right, abs=1e-9)
+    assert conjugate_gradients(-laplacian, right, inverse, 1e-10) is None
+    assert conjugate_gradients(laplacian, np.full(60, np.nan), inverse, 1e-10) is None
+    assert conjugate_gradients(laplacian, right, Scaled(mesh, 5, False), 1e-10) is None

@@ -13,7 +13,7 @@ class SolveFigures:
     """How a metric and its layout were found.
 
     Attributes:
-        newton_steps: factorizations of Newton's method.
+        newton_steps: steps of Newton's method.
         euclidean_flips: edges flipped to make the input Delaunay.
         ptolemy_flips: edges flipped during the solve.
         residual: largest curvature error of the metric where curvature was prescribed, radians.

@@ -13,7 +13,7 @@ from .dense_model import MANY, Limits
 from .dense_search import DenseSearch
 from .green import GreenOperator
 from .pool import Pool
-from .solution import FULL_TURN, ConeSolution, target_from_log_scale
+from .solution import FULL_TURN, ConeSolution, LaplacianInverse, target_from_log_scale
 
 # Unknowns of the coarse model: one for so many vertices, within bounds that keep its dense inverse cheaper than the
 # factorization of the mesh's own Laplacian.
@@ -269,4 +269,7 @@ class ConeSearch:
         log_scale = np.zeros(len(target))
         log_scale[operator.vertices] = operator.solve((target - self.curvature)[operator.vertices])
         absorbed = target_from_log_scale(self._laplacian, self.curvature, log_scale, self._is_boundary)
-        return ConeSolution(cones, target + absorbed, log_scale)
+        is_zero = np.ones(len(target), dtype=bool)
+        is_zero[operator.vertices] = False
+        inverse = LaplacianInverse(operator.solve_at_vertices, is_zero, operator.worth)
+        return ConeSolution(cones, target + absorbed, log_scale, inverse)

@@ -38,6 +38,11 @@ class GreenOperator:
         inner = self.laplacian[1:][:, 1:] if self.is_closed else self.laplacian
         self._factor: Factor = factorize(csc_matrix(inner))
 
+    @property
+    def worth(self) -> int:
+        """How many solutions take as long as another factorization."""
+        return self._factor.worth
+
     def solve(self, source: FloatArray) -> FloatArray:
         """Return G source for (f,) or (f, k): zero on the boundary; without one, mean-free.
 
@@ -57,6 +62,16 @@ class GreenOperator:
         """Return A values for (f,) or (f, k)."""
         centred = values - self.areas @ values
         return self.areas * centred if values.ndim == 1 else self.areas[:, None] * centred
+
+    def solve_at_vertices(self, source: FloatArray) -> FloatArray:
+        """Return (n,) G source for (n,), both in the numbering of vertices.
+
+        Without a boundary the source must sum to 0, and the solution is one of those that differ by a constant.
+        """
+        inside = self.vertices[1:] if self.is_closed else self.vertices
+        solution = np.zeros(len(source))
+        solution[inside] = self._factor.solve(source[inside])
+        return solution
 
     def responses(self, unknowns: IntArray) -> FloatArray:
         """Return (k, f) the Green's functions of sources at some unknowns."""

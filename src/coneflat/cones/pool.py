@@ -15,7 +15,9 @@ from .green import GreenOperator
 WORTHWHILE = 2e-4
 # Rounds of moves for a set of cones; most come to rest after three or four.
 ROUNDS = 12
-CAUTION = (1.0, 4.0)
+# A cone is tried at the end of a longer and of a more cautious step, as the distances are those of a coarse model; of
+# one in between where the mesh is large and back-substitutions are what takes long.
+CAUTIONS, CAUTION, LARGE = (1.0, 4.0), (2.0,), 50_000
 
 
 class Pool:
@@ -134,8 +136,7 @@ class Pool:
                 continue
             linear = 2 * k * (score[near] - score[s])
             bending = k * k * self.squared_distances(s, near)
-            # A longer and a more cautious step: the distances are those of a coarse model.
-            for caution in CAUTION:
+            for caution in CAUTION if len(score) > LARGE else CAUTIONS:
                 change = linear + caution * bending
                 best = first_least(change)
                 if change[best] < -WORTHWHILE * energy:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,25 @@ FULL_TURN = 2 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
+class LaplacianInverse:
+    """A factorized Laplacian, as a function of (n,) sources, up to a constant where nothing is held at zero.
+
+    Attributes:
+        apply: the function.
+        is_zero: (n,) the vertices where its solutions are zero.
+        worth: how many solutions take as long as another factorization.
+    """
+
+    apply: Callable[[FloatArray], FloatArray]
+    is_zero: BoolArray
+    worth: int
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return (n,) the solution for a source (n,)."""
+        return self.apply(right)
+
+
+@dataclass(frozen=True, eq=False)
 class ConeSolution:
     """Cones, target curvatures and the log scale that produces them to first order.
 
@@ -25,11 +45,13 @@ class ConeSolution:
         target: (n,) target curvature, radians: 0 but at cones and on the boundary.
         log_scale: (n,) phi with L phi = target - curvature; constant on cones and boundary where their
             curvature was not prescribed.
+        inverse: what solved for the log scale, if it was kept: zero on the boundary, mean-free without one.
     """
 
     cones: IntArray
     target: FloatArray
     log_scale: FloatArray
+    inverse: LaplacianInverse | None = None
 
     @property
     def curvatures(self) -> FloatArray:

@@ -13,7 +13,7 @@ from ..geometry.intrinsic import IntrinsicTriangulation, intrinsic_triangulation
 from ..geometry.triangles import double_areas
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from .doubling import double
-from .newton import ConformalProblem, State, minimize
+from .newton import ConformalProblem, Inverse, State, minimize
 
 # How far, in radians, prescribed curvatures may miss Gauss-Bonnet; decimals typed by hand are good to more.
 SUM_TOLERANCE = 1e-8
@@ -30,7 +30,7 @@ class ExactMetric:
             model units times exp(phi).
         flips: half-edges flipped on the way there from the input's triangles, in order.
         euclidean_flips: how many of them made the input Delaunay; the others happened during the solve.
-        steps: Newton steps (factorizations).
+        steps: Newton steps.
         residual: largest curvature error, radians, over the vertices with a target.
         worst_vertex: where it is.
         converged: whether the residual is within the tolerance and every triangle has area.
@@ -63,6 +63,7 @@ def exact_metric(
     fixed: BoolArray | None = None,
     fixed_log_scale: FloatArray | float = 0.0,
     start: FloatArray | None = None,
+    preconditioner: Inverse | None = None,
     tolerance: float = 1e-10,
     delaunay: bool = True,
     max_steps: int = 200,
@@ -78,8 +79,10 @@ def exact_metric(
             constant, is chosen to keep the total area.
         fixed_log_scale: (n,) or one number, phi at the fixed vertices.
         start: (n,) first guess of phi; the linear solution is a good one.
-        tolerance: curvature error, radians, that counts as converged. Rounding permitting the solve goes on
-            for two more digits where this is cheap.
+        preconditioner: solves for the Laplacian of the mesh, zero at the fixed vertices, if something does
+            already: then less is factorized.
+        tolerance: curvature error, radians, that counts as converged. The solve goes on as far as rounding
+            permits.
         delaunay: flip the input to its intrinsic Delaunay triangulation first. Without it, the conformal
             class is that of the input's own triangles; the same on Delaunay meshes.
         max_steps: Newton steps after which the best metric so far is returned; counted anew if the surface
@@ -105,7 +108,7 @@ def exact_metric(
 
     triangulation = intrinsic_triangulation(mesh, lengths)
     flat_turn = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
-    problem = ConformalProblem(triangulation, flat_turn, target, fixed, pinned)
+    problem = ConformalProblem(triangulation, flat_turn, target, fixed, pinned, preconditioner)
     euclidean = _prepare(problem, delaunay)
     state = minimize(problem, log_scale, tolerance, max_steps)
     original = np.arange(n)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
+from scipy.sparse import csc_matrix
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import MetricError
@@ -15,16 +17,77 @@ from ..solver import Factor, factorize
 from .hessian import HessianPattern
 
 # Residual, radians, below which nothing is left to gain: the rounding of a sum of a few angles.
-GOAL = 1e-14
+GOAL = 1e-13
 # Largest change of phi in one step. Beyond e^5 in length the quadratic model says nothing any more.
 LARGEST_STEP = 5.0
-# A factorization serves on as long as each step with it divides the residual by this much at least; it costs
-# as much as five to twenty back-substitutions with the flips and angles that go with them.
-CONTRACTION = 0.2
+# A factorization serves on as the preconditioner of later steps while the iterations that these take, as the first few
+# foretell, cost less than a new one.
+FIRST_FEW = 4
+# A step is solved for to the accuracy of the residual, but to this at least: more is lost to the next.
+COARSEST = 0.05
 # Halvings of a step after which it is taken for rounding: the change is then below 1e-9 of the first trial.
 HALVINGS = 30
 # The same where the surface can be doubled instead of creeping along triangles that are about to break.
 HALVINGS_BOUNDED = 6
+
+
+class Inverse(Protocol):
+    """What applies the inverse of a Laplacian, or something close to it; see `coneflat.solver.Factor`."""
+
+    @property
+    def worth(self) -> int:
+        """How many solutions take as long as another factorization."""
+        ...
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return (n,) the solution for a right-hand side (n,)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class HeldInverse:
+    """A factorized Laplacian with rows and columns of the identity where the solution is held at 0."""
+
+    factor: Factor
+    held: BoolArray
+
+    @property
+    def worth(self) -> int:
+        """How many solutions take as long as another factorization."""
+        return self.factor.worth
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return (n,) the solution, 0 where it is held."""
+        return np.where(self.held, 0.0, self.factor.solve(np.where(self.held, 0.0, right)))
+
+
+def conjugate_gradients(
+    matrix: csc_matrix, right: FloatArray, inverse: Inverse, accuracy: float
+) -> FloatArray | None:
+    """Solve a semidefinite system whose right side is in its range; None if it is not one or takes too long.
+
+    accuracy: what the residual, in the norm of the inverse that preconditions it, comes down to, relatively.
+    """
+    solution, residual = np.zeros_like(right), right.copy()
+    step = towards = inverse.solve(residual)
+    size = first = float(residual @ towards)
+    for done in range(1, inverse.worth + 1):
+        if not 0 < size < np.inf:
+            return None
+        image = matrix @ step
+        bend = float(step @ image)
+        if not bend > 0:
+            return None
+        solution += size / bend * step
+        residual -= size / bend * image
+        towards = inverse.solve(residual)
+        size, before = float(residual @ towards), size
+        if abs(size) <= accuracy**2 * first:
+            return solution
+        if done == FIRST_FEW and not size <= accuracy ** (2 * FIRST_FEW / inverse.worth) * first:
+            return None
+        step = towards + size / before * step
+    return None
 
 
 @dataclass(eq=False)
@@ -58,7 +121,8 @@ class ConformalProblem:
         fixed: (n,) True where phi is given.
         pinned: (n,) True for one vertex of each component without fixed ones.
         records: half-edges flipped so far.
-        steps: factorizations so far.
+        preconditioner: solves for the Laplacian of a metric that is similar, zero at fixed vertices; may be none.
+        steps: Newton steps so far.
         last: the state evaluated last, the one the triangulation belongs to.
     """
 
@@ -67,6 +131,7 @@ class ConformalProblem:
     target: FloatArray
     fixed: BoolArray
     pinned: BoolArray
+    preconditioner: Inverse | None = None
     records: list[IntArray] = field(default_factory=list)
     steps: int = 0
     last: State | None = None
@@ -103,19 +168,25 @@ class ConformalProblem:
         self.last = State(log_scale, curvature, cots, broken, residual)
         return self.last
 
-    def factorize(self, state: State) -> Factor:
-        """Factorize the Hessian of the state just evaluated."""
+    def direction(self, state: State) -> tuple[FloatArray, bool]:
+        """Return the Newton direction of the state just evaluated, 0 at fixed vertices, and whether it is exact.
+
+        Raises:
+            MetricError: the Hessian is singular in double precision.
+        """
         if self._pattern is None:
             self._pattern = HessianPattern(self.triangulation)
-        held = self.fixed | self.pinned
         self.steps += 1
-        self._factor = factorize(self._pattern.matrix(state.cots, held), self._factor)
-        return self._factor
-
-    def direction(self, factor: Factor, state: State) -> FloatArray:
-        """Return the Newton direction of a state; 0 at vertices that are held."""
+        if self.preconditioner is not None:
+            accuracy = min(max(state.largest, GOAL / state.largest / 4), COARSEST)
+            hessian = self._pattern.matrix(state.cots, self.fixed)
+            step = conjugate_gradients(hessian, state.residual, self.preconditioner, accuracy)
+            if step is not None:
+                return np.where(self.fixed, 0.0, step), False
         held = self.fixed | self.pinned
-        return np.where(held, 0.0, factor.solve(np.where(held, 0.0, state.residual)))
+        self._factor = factorize(self._pattern.matrix(state.cots, held), self._factor)
+        self.preconditioner = HeldInverse(self._factor, held)
+        return self.preconditioner.solve(state.residual), True
 
 
 def minimize(problem: ConformalProblem, log_scale: FloatArray, tolerance: float, max_steps: int) -> State:
@@ -136,30 +207,24 @@ def minimize(problem: ConformalProblem, log_scale: FloatArray, tolerance: float,
     state = best = problem.evaluate(log_scale)
     if bounded and state.broken:
         state = best = problem.evaluate(np.where(problem.fixed, log_scale, 0.0))
-    factor: Factor | None = None
-    while best.largest > GOAL and not (bounded and state.broken):
-        fresh = factor is None
-        if factor is None:
-            if problem.steps == max_steps or best.largest <= tolerance / 100:
-                break
-            if problem.last is not state:  # the Hessian needs the triangulation of its own metric
-                state = problem.evaluate(state.log_scale)
-            try:
-                factor = problem.factorize(state)
-            except MetricError:  # singular in double precision: the best so far has to do
-                break
-        step = problem.direction(factor, state)
+    while best.largest > GOAL and not (bounded and state.broken) and problem.steps < max_steps:
+        if problem.last is not state:  # the Hessian needs the triangulation of its own metric
+            state = problem.evaluate(state.log_scale)
+        try:
+            step, is_exact = problem.direction(state)
+        except MetricError:  # singular in double precision: the best so far has to do
+            break
         halvings = 0
-        if fresh and best.largest > tolerance:
+        if is_exact and best.largest > tolerance:
             halvings = HALVINGS_BOUNDED if bounded else HALVINGS
         trial, length = search_line(problem, state, step, best.largest, halvings)
         if trial is None:
-            if fresh:
+            if is_exact or best.largest <= tolerance:
                 break
-            factor = None
+            problem.preconditioner = None
             continue
-        if length < 1 or trial.largest > CONTRACTION * state.largest:
-            factor = None
+        if length < 1:
+            problem.preconditioner = None
         gained = trial.largest <= best.largest / 2
         state = trial
         if state.largest < best.largest:

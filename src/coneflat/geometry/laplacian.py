@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, diags
 
 from .._arrays import FloatArray, IntArray
 from ..mesh import NEXT, PREVIOUS
@@ -14,10 +14,12 @@ def cotangent_laplacian(faces: IntArray, cots: FloatArray, vertex_count: int) ->
 
     (L x)_i = sum_j w_ij (x_i - x_j); its kernel are the constants on each component.
     """
-    i = faces[:, NEXT].ravel()
-    j = faces[:, PREVIOUS].ravel()
+    i = faces[:, NEXT].ravel().astype(np.int32)
+    j = faces[:, PREVIOUS].ravel().astype(np.int32)
     w = cots.ravel() / 2
-    rows = np.concatenate([i, j, i, j])
-    columns = np.concatenate([j, i, i, j])
-    values = np.concatenate([-w, -w, w, w])
-    return csc_matrix((values, (rows, columns)), shape=(vertex_count, vertex_count))
+    shape = vertex_count, vertex_count
+    # Half of the entries, and their mirror image: sorting all of them at once takes three times as long.
+    half = csc_matrix((w, (i, j)), shape=shape)
+    weights = half + half.T.tocsc()
+    diagonal = np.bincount(i, w, vertex_count) + np.bincount(j, w, vertex_count)
+    return csc_matrix(diags(diagonal, format="csc") - weights)

@@ -197,9 +197,16 @@ def _solve(
     """Return the metric and the curvature it was solved for; a round boundary follows from the metric."""
     boundary = choices.boundary
 
+    inverse = solution.inverse
+    if inverse is not None and not np.array_equal(inverse.is_zero, fixed):
+        inverse = None
+
     def solve(wanted: FloatArray, start: FloatArray) -> ExactMetric:
         # The common subdivision is that of the mesh's own conformal class, without flips before the solve.
-        return exact_metric(mesh, lengths, wanted, fixed=fixed, start=start, delaunay=not choices.refine)
+        flips = not choices.refine
+        return exact_metric(
+            mesh, lengths, wanted, fixed=fixed, start=start, delaunay=flips, preconditioner=inverse
+        )
 
     inside = np.where(mesh.is_boundary_vertex, 0.0, solution.target)
     if boundary is None:

@@ -13,6 +13,8 @@ from .types import NotPositiveDefinite
 class CholespyFactor:
     """A sparse Cholesky factorization."""
 
+    worth = 60
+
     def __init__(self, matrix: csc_matrix) -> None:
         try:
             self._solver = CholeskySolverD(

@@ -14,6 +14,8 @@ from .types import NotPositiveDefinite
 class ScikitSparseFactor:
     """A sparse Cholesky factorization whose analysis serves matrices of the same pattern."""
 
+    worth = 25
+
     def __init__(self, matrix: csc_matrix) -> None:
         from sksparse.cholmod import analyze
 

@@ -13,6 +13,8 @@ from ..errors import MetricError
 class SuperLUFactor:
     """A sparse LU factorization that keeps a symmetric ordering."""
 
+    worth = 60
+
     def __init__(self, matrix: csc_matrix) -> None:
         try:
             self._factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})

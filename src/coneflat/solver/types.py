@@ -15,7 +15,13 @@ class NotPositiveDefinite(ArithmeticError):
 
 
 class Factor(Protocol):
-    """A factorized matrix."""
+    """A factorized matrix.
+
+    Attributes:
+        worth: how many solutions, with what conjugate gradients do besides, take as long as another factorization.
+    """
+
+    worth: int
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
@@ -32,6 +38,8 @@ class Factor(Protocol):
 
 class EmptyFactor:
     """The factor of a matrix without rows, which a mesh without free vertices has."""
+
+    worth = 1
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return an empty solution."""
