@@ -9,7 +9,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from .search import as_keywords, search_options
+from .search import as_keywords, place_options, search_options
 
 
 @click.command(short_help="Find cones, or show what how many of them gain.")
@@ -21,6 +21,7 @@ from .search import as_keywords, search_options
     help="File to write the cones to, VERTEX CURVATURE on each line, for flatten --cones-file.",
 )
 @search_options
+@place_options
 @click.option(
     "--curve", is_flag=True, help="A table and a picture of the area distortion against the number of cones."
 )

@@ -10,6 +10,7 @@ import click
 
 from .. import __version__
 from ..errors import ConeflatError
+from .batch import batch
 from .cones import cones
 from .demo import demo
 from .flatten import flatten
@@ -26,6 +27,7 @@ def cli() -> None:
 
 
 cli.add_command(flatten)
+cli.add_command(batch)
 cli.add_command(cones)
 cli.add_command(demo)
 

@@ -73,6 +73,8 @@ _OPTIONS = (
         help="Importance of each vertex, from which distortion keeps off: a property of the PLY file, color for what "
         "is painted, or a file with a number for each vertex (.txt, .npy).",
     ),
+)
+_PLACES = (
     click.option(
         "--require",
         metavar="VERTEX",
@@ -94,8 +96,15 @@ _OPTIONS = (
 
 
 def search_options(command: Command) -> Command:
-    """Add the options of the pursuit to a command."""
+    """Add the options of the pursuit that fit any mesh to a command."""
     for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def place_options(command: Command) -> Command:
+    """Add the options of the pursuit that name vertices of one mesh."""
+    for option in reversed(_PLACES):
         command = option(command)
     return command
 
@@ -110,13 +119,17 @@ def as_keywords(params: Mapping[str, Any]) -> dict[str, Any]:
     from .given import read_vertices, read_weights
 
     same = ("distortion", "cone_count", "min_cone_angle", "max_cone_angle", "positive_only")
-    return {
+    keywords = {
         **{name: params[name] for name in same},
         "weights": None if params["weights"] is None else read_weights(params["weights"]),
-        "required_cones": params["require"],
-        "forbidden_cones": read_vertices("--forbid", params["forbid"] or ""),
-        "allowed_cones": None if params["only"] is None else read_vertices("--only", params["only"]),
     }
+    if "require" in params:
+        keywords |= {
+            "required_cones": params["require"],
+            "forbidden_cones": read_vertices("--forbid", params["forbid"] or ""),
+            "allowed_cones": None if params["only"] is None else read_vertices("--only", params["only"]),
+        }
+    return keywords
 
 
 def is_file(text: str) -> bool:

@@ -1,0 +1,111 @@
+"""What a batch is to do: a mesh, where its result goes, and how to know that it is done."""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import json
+import os
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import OptionError
+
+READABLE = (".obj", ".ply", ".stl", ".off", ".gltf", ".glb")
+
+
+@dataclass(frozen=True)
+class Job:
+    """A mesh to flatten.
+
+    Attributes:
+        mesh, output: absolute paths.
+        options: keyword arguments of `coneflat.flatten`, as JSON has them.
+        weld: merge vertices at the same position; None for the format's default.
+        mark: what changes when the mesh file, the options or the version do.
+    """
+
+    mesh: str
+    output: str
+    options: Mapping[str, Any]
+    weld: bool | None
+    mark: str
+
+    def as_json(self) -> str:
+        """Return the job as one line."""
+        return json.dumps(asdict(self))
+
+
+def find_jobs(
+    patterns: Iterable[str], folder: Path, ending: str, options: Mapping[str, Any], weld: bool | None
+) -> list[Job]:
+    """Return a job for each mesh that the patterns name, in the order of their paths.
+
+    Args:
+        patterns: files, folders (every mesh in them), or patterns with *, ? and ** for any depth.
+        folder: where results go, under the meshes' own names.
+        ending: of the results, such as ".obj".
+        options, weld: see `Job`.
+
+    Raises:
+        OptionError: a pattern matches nothing, or a result would overwrite a mesh.
+    """
+    found: dict[str, None] = {}
+    for pattern in patterns:
+        for path in _matches(pattern):
+            found[os.path.realpath(path)] = None
+    meshes = sorted(found)
+    jobs = [
+        Job(mesh, str(folder / name), options, weld, _mark(mesh, options, weld))
+        for mesh, name in zip(meshes, _names(meshes, ending), strict=True)
+    ]
+    for job in jobs:
+        if os.path.realpath(job.output) in found:
+            raise OptionError(f"the result of {job.mesh} would overwrite {job.output}: choose another folder")
+    return jobs
+
+
+def _matches(pattern: str) -> list[str]:
+    if os.path.isdir(pattern):
+        every = sorted(os.path.join(pattern, name) for name in os.listdir(pattern))
+        matches = [path for path in every if path.lower().endswith(READABLE)]
+    elif os.path.exists(pattern):
+        matches = [pattern]
+    else:
+        every = sorted(glob.glob(pattern, recursive=True))
+        matches = [path for path in every if os.path.isfile(path) and path.lower().endswith(READABLE)]
+    if not matches:
+        raise OptionError(f"{pattern!r} matches no mesh ({', '.join(READABLE)})")
+    return matches
+
+
+def _names(meshes: list[str], ending: str) -> list[str]:
+    """Return a name for each result: the mesh's own, with as much of its path as it takes to be the only one."""
+    paths = [Path(mesh) for mesh in meshes]
+    names = [path.stem for path in paths]
+    for depth in range(max((len(path.parts) for path in paths), default=0)):
+        twice = {name for name, count in Counter(name.lower() for name in names).items() if count > 1}
+        if not twice:
+            break
+        # First the kind of file tells them apart, then the folders.
+        names = [
+            _longer(path, depth) if name.lower() in twice else name
+            for path, name in zip(paths, names, strict=True)
+        ]
+    return [name + ending for name in names]
+
+
+def _longer(path: Path, depth: int) -> str:
+    kind = f"{path.stem}_{path.suffix[1:].lower()}"
+    return "_".join([*path.parent.parts[len(path.parent.parts) - depth :], kind]) if depth else kind
+
+
+def _mark(mesh: str, options: Mapping[str, Any], weld: bool | None) -> str:
+    from .. import __version__
+
+    about = os.stat(mesh)
+    text = json.dumps([about.st_size, about.st_mtime_ns, dict(options), weld, __version__], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -1,0 +1,87 @@
+"""A child process that flattens one mesh after the other, with a time limit for each."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from typing import Any
+
+from .jobs import Job
+
+# Each process computes on one core: there are as many processes as cores.
+ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
+)
+
+
+class Child:
+    """A process that is started when there is something to do, and again after it was ended or has died."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[str] | None = None
+
+    def flatten(self, job: Job, limit: float | None) -> dict[str, Any]:
+        """Return the row of a job; a process that takes longer than the limit, seconds, is ended."""
+        start = time.perf_counter()
+        process = self._started()
+        timer = threading.Timer(limit, process.kill) if limit is not None else None
+        line = ""
+        if timer is not None:
+            timer.start()
+        assert process.stdin is not None
+        assert process.stdout is not None
+        with suppress(OSError):  # It may die before it takes the job.
+            process.stdin.write(job.as_json() + "\n")
+            process.stdin.flush()
+            line = process.stdout.readline()
+        if timer is not None:
+            timer.cancel()
+        seconds = time.perf_counter() - start
+        if line.endswith("\n"):
+            row: dict[str, Any] = json.loads(line)
+            return row
+        self.end()
+        if limit is not None and seconds >= limit:
+            error = f"it took longer than {limit:g} s"
+        else:
+            error = f"its process ended with code {process.returncode}, for want of memory perhaps"
+        return {
+            "mesh": job.mesh,
+            "output": job.output,
+            "status": "failed",
+            "error": error,
+            "seconds": round(seconds, 3),
+        }
+
+    def end(self) -> None:
+        """End the process, whatever it does; for the thread that uses it."""
+        if self._process is not None:
+            self._process.kill()
+            # Closes the pipes, where a job may still be stuck.
+            with suppress(OSError, ValueError):
+                self._process.communicate()
+            self._process = None
+
+    def kill(self) -> None:
+        """End the process from another thread; the one that uses it finds it dead."""
+        process = self._process
+        if process is not None:
+            process.kill()
+
+    def _started(self) -> subprocess.Popen[str]:
+        if self._process is None or self._process.poll() is not None:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "coneflat.batch.child"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                text=True,
+                encoding="utf-8",
+                env={**os.environ, **ONE_THREAD},
+            )
+        return self._process

@@ -1,0 +1,169 @@
+"""Options that say how to flatten, which several commands have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+import click
+from click.core import ParameterSource
+
+from .search import PURSUIT_OPTIONS, Angle, as_keywords, search_options
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+QUANTUM_OPTIONS = ("quantise", "correct_handles")
+SEARCH_OPTIONS = ("cones", "epsilon", "max_cones", *PURSUIT_OPTIONS, *QUANTUM_OPTIONS)
+EXACT_OPTIONS = ("at_cones", "boundary", "corner", "best_effort", "refine")
+METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "metric", "lengths", *EXACT_OPTIONS)
+
+_BEFORE_SEARCH = (
+    click.option("--paper", is_flag=True, help="The method exactly as published (Ben-Chen et al. 2008)."),
+    click.option(
+        "--cones",
+        type=click.Choice(["auto", "pursuit", "greedy", "none"]),
+        default="auto",
+        show_default=True,
+        help="How to find cones.  pursuit: the fewest for the distortion allowed.  greedy: the paper's.  none: for "
+        "bounded meshes and tori.  auto: pursuit, but none where the boundary is prescribed.",
+    ),
+)
+_AFTER_SEARCH = (
+    click.option(
+        "--quantise",
+        type=Angle(),
+        metavar="ANGLE",
+        help="Cones whose curvatures are multiples of this, pi/2 say, so that seams turn by such multiples.",
+    ),
+    click.option(
+        "--correct-handles",
+        is_flag=True,
+        help="With --quantise: make rotations around handles multiples, too, by a map that is not quite conformal.",
+    ),
+    click.option(
+        "--epsilon",
+        type=float,
+        default=1.0,
+        show_default=True,
+        help="The greedy search stops when the log of the scale varies by at most this.",
+    ),
+    click.option("--max-cones", type=int, help="Searches stop at this many cones."),
+    click.option(
+        "--metric",
+        type=click.Choice(["exact", "linear"]),
+        default="exact",
+        show_default=True,
+        help="exact: no curvature error, no flipped triangle.  linear: the paper's.",
+    ),
+    click.option(
+        "--at-cones",
+        type=click.Choice(["auto", "scale", "curvature"]),
+        default="auto",
+        show_default=True,
+        help="Exact metric: prescribe scale 1 at cones, or the curvatures that the search found.",
+    ),
+    click.option(
+        "--boundary",
+        type=click.Choice(["free", "lengths", "disk", "straight"]),
+        default="free",
+        show_default=True,
+        help="Exact metric: free (least area distortion), lengths (kept at the model's scale), a round disk, or "
+        "straight sides between corners that the search finds.",
+    ),
+    click.option("--best-effort", is_flag=True, help="Write a result even if the metric did not converge."),
+    click.option(
+        "--lengths",
+        type=click.Choice(["integral", "mean"]),
+        default="integral",
+        show_default=True,
+        help="Linear metric: scale an edge by the mean of the scale along it, or by the scale at the mean.",
+    ),
+    click.option(
+        "--refine",
+        is_flag=True,
+        help="Exact metric: cut the input's triangles along the flat triangulation's edges; nothing can be inverted.",
+    ),
+    click.option(
+        "--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces."
+    ),
+    click.option("--strict", is_flag=True, help="Refuse triangles without area instead of opening them."),
+    click.option(
+        "--solver",
+        type=click.Choice(["auto", "pardiso", "scikit-sparse", "cholespy", "scipy", "amg"]),
+        default="auto",
+        show_default=True,
+        help="What solves the linear systems; auto is the fastest installed.  amg iterates, for what fits no other.",
+    ),
+    click.option(
+        "--weld/--no-weld",
+        default=None,
+        help="Merge vertices at the same position.  [default: for STL and glTF only]",
+    ),
+)
+
+
+def method_options(command: Command) -> Command:
+    """Add the options that do not name vertices of one mesh."""
+    for option in reversed(_AFTER_SEARCH):
+        command = option(command)
+    command = search_options(command)
+    for option in reversed(_BEFORE_SEARCH):
+        command = option(command)
+    return command
+
+
+def method_keywords(params: Mapping[str, Any]) -> dict[str, Any]:
+    """Return keyword arguments of `coneflat.flatten` from the values of the options.
+
+    Raises:
+        OptionError: vertices or weights are not what they should be.
+        MeshFileError: a file of them cannot be read.
+    """
+    general = {name: params[name] for name in ("repair", "strict", "solver")}
+    if params["paper"]:
+        from ..options import PAPER
+
+        return {**PAPER, **general}
+    same = (
+        "cones",
+        "correct_handles",
+        "epsilon",
+        "max_cones",
+        "metric",
+        "at_cones",
+        "boundary",
+        "best_effort",
+    )
+    return {
+        **as_keywords(params),
+        **{name: params[name] for name in (*same, "refine")},
+        "quantum": params["quantise"],
+        "length_rule": params["lengths"],
+        **general,
+    }
+
+
+def check_combinations(context: click.Context) -> None:
+    """Refuse options that would have no effect."""
+    params = context.params
+    cones, metric = params["cones"], params["metric"]
+    rules = [
+        (params["paper"], METHOD_OPTIONS, "--paper fixes the method"),
+        (
+            params.get("cone") or params.get("cones_file"),
+            SEARCH_OPTIONS,
+            "with cones given there is nothing to search",
+        ),
+        (cones == "none", SEARCH_OPTIONS[1:], "--cones none searches for none"),
+        (cones == "greedy", (*PURSUIT_OPTIONS, *QUANTUM_OPTIONS), "--cones greedy has no such choice"),
+        (cones in ("auto", "pursuit"), ("epsilon",), "only --cones greedy has this choice"),
+        (params["cone_count"] is not None, ("distortion", "max_cones"), "the number of cones is given"),
+        (metric == "linear", EXACT_OPTIONS, "--metric linear has no such choice"),
+        (metric == "exact", ("lengths",), "only --metric linear has this choice"),
+    ]
+    for applies, names, reason in rules:
+        for name in names if applies else ():
+            if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+                raise click.UsageError(f"{reason}: leave out --{name.replace('_', '-')}", context)
+    if context.params.get("corner") and context.params["boundary"] != "free":
+        raise click.UsageError("--corner makes a polygon: leave out --boundary", context)

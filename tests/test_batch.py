@@ -1,0 +1,218 @@
+"""Many meshes: what fails or hangs stops nothing, what is done is not done again, and a cluster does the same."""
+
+from __future__ import annotations
+
+import csv
+import os
+import signal
+import threading
+import time
+
+import pytest
+import shapes
+from click.testing import CliRunner
+
+from coneflat import errors, read_mesh
+from coneflat.batch import find_jobs, run_batch
+from coneflat.batch.process import Child
+from coneflat.cli.main import cli
+
+
+def write_obj(path, mesh):
+    vertices, faces = mesh
+    lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a} {b} {c}" for a, b, c in faces + 1]
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("\n".join(lines))
+
+
+@pytest.fixture
+def models(tmp_path):
+    write_obj(tmp_path / "models" / "ball.obj", shapes.sphere(2))
+    write_obj(tmp_path / "models" / "hill.obj", shapes.hill(8, 6))
+    (tmp_path / "models" / "broken.obj").write_text("v 0 0 0\nf 1 2 3\n")
+    (tmp_path / "models" / "notes.txt").write_text("no mesh")
+    return tmp_path / "models"
+
+
+def rows_of(path):
+    with open(path, newline="") as file:
+        return {os.path.basename(row["mesh"]): row for row in csv.DictReader(file)}
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(cli, [str(argument) for argument in arguments])
+
+
+def test_failures_stop_nothing(models, tmp_path):
+    out = tmp_path / "out"
+    result = invoke("batch", models, "--out", out, "--jobs", 2)
+    assert result.exit_code == 1
+    assert "2 of 3 meshes are flattened; 1 failed" in result.output
+    rows = rows_of(out / "summary.csv")
+    assert {name: row["status"] for name, row in rows.items()} == {
+        "ball.obj": "done",
+        "hill.obj": "done",
+        "broken.obj": "failed",
+    }
+    assert "vertex" in rows["broken.obj"]["error"]
+    assert int(rows["ball.obj"]["cones"]) >= 3
+    assert float(rows["ball.obj"]["curvature_error_max"]) < 1e-10
+    assert (out / "ball.obj").read_text().count("\nvt ") > 100
+    assert not (out / "broken.obj").exists()
+
+
+def test_a_further_run_does_what_is_left(models, tmp_path):
+    out = tmp_path / "out"
+    invoke("batch", models, "--out", out)
+    before = (out / "ball.obj").stat().st_mtime_ns
+    write_obj(models / "broken.obj", shapes.torus(12, 8))
+    result = invoke("batch", models, "--out", out)
+    assert result.exit_code == 0
+    assert "3 of 3 meshes are flattened, 2 of them before" in result.output
+    assert (out / "ball.obj").stat().st_mtime_ns == before
+    # Other options, another mesh, a result that is gone: each is a reason to work again.
+    assert "of them before" not in invoke("batch", models, "--out", out, "--distortion", 0.5).output
+    write_obj(models / "ball.obj", shapes.sphere(1))
+    (out / "hill.obj").unlink()
+    assert "1 of them before" in invoke("batch", models, "--out", out, "--distortion", 0.5).output
+    assert "of them before" not in invoke("batch", models, "--out", out, "--distortion", 0.5, "--redo").output
+
+
+def test_a_line_that_was_cut_off_is_no_row(models, tmp_path):
+    out = tmp_path / "out"
+    invoke("batch", models / "ball.obj", "--out", out)
+    with (out / "batch.jsonl").open("a") as file:
+        file.write('{"mesh": "hal')
+    result = invoke("batch", models / "ball.obj", "--out", out)
+    assert "1 of them before" in result.output
+
+
+def test_a_mesh_that_hangs_is_ended(models, tmp_path):
+    jobs = find_jobs([str(models / "ball.obj"), str(models / "hill.obj")], tmp_path, ".npz", {}, None)
+    child = Child()
+    try:
+        hanging = child.flatten(jobs[0], 0.05)
+        assert hanging["status"] == "failed"
+        assert "longer than 0.05 s" in hanging["error"]
+        assert child.flatten(jobs[1], 60)["status"] == "done"
+    finally:
+        child.end()
+
+
+def test_a_process_that_dies_is_replaced(models, tmp_path):
+    jobs = find_jobs([str(models / "ball.obj")], tmp_path, ".npz", {}, None)
+    child = Child()
+    try:
+        process = child._started()
+        killer = threading.Timer(0.05, process.kill)
+        killer.start()
+        row = child.flatten(jobs[0], None)
+        assert row["status"] == "failed"
+        assert "ended with code" in row["error"]
+        assert child.flatten(jobs[0], None)["status"] == "done"
+    finally:
+        child.end()
+
+
+def test_parquet(models, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    summary = tmp_path / "all.parquet"
+    invoke("batch", models / "ball.obj", "--out", tmp_path / "out", "--summary", summary)
+    table = parquet.read_table(summary).to_pylist()
+    assert [row["status"] for row in table] == ["done"]
+    assert table[0]["flipped"] == 0
+
+
+def test_names_of_results(tmp_path):
+    for name in ("a/one.obj", "b/one.obj", "b/one.off", "b/two.ply"):
+        path = tmp_path / "in" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    jobs = find_jobs([str(tmp_path / "in" / "**" / "*")], tmp_path, ".glb", {}, None)
+    names = [os.path.basename(job.output) for job in jobs]
+    assert names == ["a_one_obj.glb", "b_one_obj.glb", "one_off.glb", "two.glb"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nothing*.obj", "--out", "out"], "matches no mesh"),
+        (["models", "--out", "models"], "would overwrite"),
+        (["models", "--out", "out", "--jobs", "0"], "at least one process"),
+        (["models", "--out", "out", "--time-limit", "0"], "must be positive"),
+        (["models", "--out", "out", "--summary", "table.xls"], ".csv or .parquet"),
+        (["models", "--out", "out", "--distortion", "-1"], "distortion must be a positive number"),
+        (["models", "--out", "out", "--jobs", "2", "--dask", "tcp://localhost:1"], "leave out --jobs"),
+        (["models", "--out", "broken", "--cones", "none", "--epsilon", "2"], "leave out --epsilon"),
+    ],
+)
+def test_refusals(models, monkeypatch, arguments, message):
+    monkeypatch.chdir(models.parent)
+    result = invoke("batch", *arguments)
+    text = result.output if result.exception is None else str(result.exception) + result.output
+    assert result.exit_code != 0
+    assert message in text
+
+
+def test_a_cluster_does_the_same_even_if_it_loses_a_worker(models, tmp_path, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    for i in range(6):
+        write_obj(models / f"ball{i}.obj", shapes.sphere(2, seed=i))
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    there.mkdir()
+    run_batch(find_jobs([str(models)], here, ".obj", {}, None), here)
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        killed = []
+
+        def listener(row, done, count):
+            if not killed:
+                killed.append(next(iter(cluster.workers.values())).process.pid)
+                os.kill(killed[0], signal.SIGKILL)
+
+        found = run_batch(
+            find_jobs([str(models)], there, ".obj", {}, None),
+            there,
+            dask=cluster.scheduler_address,
+            limit=60,
+            listener=listener,
+        )
+    assert killed
+    assert found.failed == 1
+    one, other = rows_of(here / "summary.csv"), rows_of(there / "summary.csv")
+    for name in one:
+        for column in ("status", "error", "cones", "qc_mean", "seam_length", "curvature_error_max"):
+            assert one[name][column] == other[name][column]
+        if one[name]["status"] == "done":
+            assert (here / name).read_bytes() == (there / name).read_bytes()
+
+
+def test_no_cluster_answers(models, tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("coneflat.batch.cluster.PATIENCE", "1s")
+    with pytest.raises(errors.OptionError, match="no Dask scheduler"):
+        run_batch(find_jobs([str(models)], tmp_path, ".obj", {}, None), tmp_path, dask="tcp://127.0.0.1:9")
+
+
+def test_interrupted_batches_keep_what_they_have(models, tmp_path):
+    jobs = find_jobs([str(models)], tmp_path, ".obj", {}, None)
+
+    def listener(row, done, count):
+        raise KeyboardInterrupt
+
+    start = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        run_batch(jobs, tmp_path, listener=listener)
+    assert time.perf_counter() - start < 60
+    assert len(rows_of(tmp_path / "summary.csv")) == 1
+    assert len(run_batch(jobs, tmp_path).rows) == 3
+
+
+def test_results_are_those_of_flatten(models, tmp_path):
+    invoke("batch", models / "ball.obj", "--out", tmp_path / "out")
+    invoke("flatten", models / "ball.obj", "-o", tmp_path / "alone.obj")
+    alone, batch = read_mesh(tmp_path / "alone.obj"), read_mesh(tmp_path / "out" / "ball.obj")
+    assert (alone.vertices == batch.vertices).all()
+    assert (tmp_path / "alone.obj").read_bytes() == (tmp_path / "out" / "ball.obj").read_bytes()
