@@ -1,0 +1,177 @@
+"""What a whole flattening costs: `python benchmarks/whole.py` prints Markdown tables.
+
+The default flattening in memory (check, cones, exact metric, cut, layout, measures), by stage, against one bare
+analysis and factorization of the same mesh's Laplacian by the same solver, and against what else can be installed with pip:
+the LSCM of libigl on our cut mesh, xatlas, uvunwrap. Each mesh has a process of its own, which compiles and loads
+everything before the clock starts; its peak memory is that of the process with our flattening alone. Models of
+`../shared/meshes`, where they are, and a bumpy sphere, split in four over and over up to --largest triangles.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+
+import numpy as np
+from common import MODELS, best_time, shapes
+from scipy.sparse import csc_matrix
+
+from coneflat import Flattening, cotangent_laplacian, cotangents, edge_lengths, flatten, read_mesh
+from coneflat.solver import factorize, solving
+from coneflat.solver.ladder import best_for
+
+STAGES = ("check", "cones", "metric", "cut", "layout", "measure")
+FITTED_FROM = 90_000  # triangles, from where on the growth is that of large meshes
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--models", default="fandisk,bunny,horse")
+    parser.add_argument("--largest", type=int, default=1_600_000, help="triangles")
+    parser.add_argument("--peers", type=int, default=100_000, help="triangles up to which others run, too")
+    parser.add_argument("--runs", type=int, default=2, help="the best counts")
+    parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.one:
+        print(json.dumps(measured(arguments.one[0], int(arguments.one[1]), arguments.runs, arguments.peers)))
+        return
+    rows = []
+    print(
+        f"| model | triangles | cones | solver | factorization, s | total, s | ratio | {' | '.join(STAGES)} | MB |"
+    )
+    print("| --- " * (len(STAGES) + 8) + "|")
+    for name, rounds in cases(arguments.models.split(","), arguments.largest):
+        command = [sys.executable, __file__, "--one", name, str(rounds)]
+        command += ["--runs", str(arguments.runs), "--peers", str(arguments.peers)]
+        rows.append(json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout))
+        print(line(rows[-1]), flush=True)
+    print(f"\nStages in units of the factorization.{growth(rows)}\n")
+    print_peers([row for row in rows if row["peers"]])
+
+
+def cases(names: list[str], largest: int) -> Iterator[tuple[str, int]]:
+    """Yield models and how often they are split."""
+    for name in ("sphere", *names):
+        if name != "sphere" and not list(MODELS.glob(f"{name}.*")):
+            continue
+        count, rounds = len(model(name, 0)[1]), 0
+        while count <= largest:
+            yield name, rounds
+            count, rounds = 4 * count, rounds + 1
+
+
+def model(name: str, rounds: int) -> tuple[np.ndarray, np.ndarray]:
+    if name == "sphere":
+        vertices, faces = shapes.sphere(5)
+    else:
+        source = read_mesh(next(iter(sorted(MODELS.glob(f"{name}.*")))))
+        vertices, faces = source.vertices, source.corners.reshape(-1, 3)
+    for _ in range(rounds):
+        vertices, faces = shapes.subdivide(vertices, faces)
+    return vertices, faces
+
+
+def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
+    """Return the row of a mesh."""
+    vertices, faces = model(name, rounds)
+    flatten(*shapes.sphere(2))  # compiles, or loads what was compiled
+    solver = best_for(len(vertices))
+    with solving(solver):
+        factorize(csc_matrix(np.eye(3)))  # loads
+    lengths = edge_lengths(vertices, faces)
+    laplacian = csc_matrix(cotangent_laplacian(faces, cotangents(lengths), len(vertices))[1:][:, 1:])
+    with solving(solver):
+        bare = best_time(lambda: factorize(laplacian), runs)
+    found: list[Flattening] = []
+    times = []
+    for _ in range(runs):
+        start = time.perf_counter()
+        found.append(flatten(vertices, faces))
+        times.append(time.perf_counter() - start)
+    best = found[int(np.argmin(times))]
+    return {
+        "model": name,
+        "triangles": len(faces),
+        "cones": len(best.cones),
+        "solver": solver,
+        "bare": bare,
+        "total": min(times),
+        "stages": best.seconds,
+        "memory": peak_memory(),
+        "peers": peers(vertices, faces, best) if len(faces) <= largest_of_peers else {},
+    }
+
+
+def peak_memory() -> float:
+    """Return the largest memory of this process so far, MB; nan where it cannot be told."""
+    if find_spec("resource") is None:
+        return float("nan")
+    import resource
+
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
+
+
+def peers(vertices: np.ndarray, faces: np.ndarray, result: Flattening) -> dict[str, float]:
+    """Return the seconds that others take for the same mesh, of those that are installed."""
+    calls: dict[str, tuple[str, Callable[[], object]]] = {
+        "libigl LSCM": ("igl", lambda: lscm(vertices, result)),
+        "xatlas": ("xatlas", lambda: __import__("xatlas").parametrize(vertices, faces)),
+        "uvunwrap": ("uvunwrap", lambda: uvunwrap(vertices, faces)),
+    }
+    return {name: best_time(call, 1) for name, (module, call) in calls.items() if find_spec(module)}
+
+
+def lscm(vertices: np.ndarray, result: Flattening) -> object:
+    """Flatten our cut mesh; two far points are pinned."""
+    import igl
+
+    points = np.empty((len(result.uv), 3))
+    points[result.uv_faces] = vertices[result.faces]
+    pins = np.array([0, int(np.argmax(((points - points[0]) ** 2).sum(axis=1)))])
+    return igl.lscm(points, result.uv_faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
+
+
+def uvunwrap(vertices: np.ndarray, faces: np.ndarray) -> object:
+    import uvunwrap
+
+    return uvunwrap.generate([uvunwrap.Mesh(vertices.ravel().tolist(), faces.ravel().tolist())])
+
+
+def line(row: dict) -> str:
+    stages = " | ".join(f"{row['stages'][name] / row['bare']:.2f}" for name in STAGES)
+    return (
+        f"| {row['model']} | {row['triangles']:,} | {row['cones']} | {row['solver']} | {row['bare']:.3f} | "
+        f"{row['total']:.2f} | {row['total'] / row['bare']:.1f} | {stages} | {row['memory']:.0f} |"
+    )
+
+
+def growth(rows: list[dict]) -> str:
+    """Return the exponents of growth of models with two sizes or more that are large."""
+    found = []
+    for name in dict.fromkeys(row["model"] for row in rows):
+        large = [row for row in rows if row["model"] == name and row["triangles"] >= FITTED_FROM]
+        if len(large) > 1:
+            sizes, times = (np.log([row[key] for row in large]) for key in ("triangles", "total"))
+            found.append(f"{name} {np.polyfit(sizes, times, 1)[0]:.2f}")
+    return f" Time grows with the number of triangles to the power of: {', '.join(found)}." if found else ""
+
+
+def print_peers(rows: list[dict]) -> None:
+    names = list(dict.fromkeys(name for row in rows for name in row["peers"]))
+    if not names:
+        return
+    print(f"| model | triangles | coneflat, s | {', s | '.join(names)}, s |")
+    print("| --- " * (len(names) + 3) + "|")
+    for row in rows:
+        others = " | ".join(f"{row['peers'][name]:.2f}" if name in row["peers"] else "" for name in names)
+        print(f"| {row['model']} | {row['triangles']:,} | {row['total']:.2f} | {others} |")
+
+
+if __name__ == "__main__":
+    main()
