@@ -13,8 +13,8 @@ from scipy.sparse import csc_matrix, csr_matrix
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..solver import Factor, factorize
 
-# Right-hand sides solved at once: more gain nothing and cost memory.
-BATCH = 32
+# Right-hand sides solved at once: more gain nothing and cost memory, of which they take so many numbers at most.
+BATCH, NUMBERS = 32, 50_000_000
 
 
 class GreenOperator:
@@ -76,11 +76,12 @@ class GreenOperator:
     def responses(self, unknowns: IntArray) -> FloatArray:
         """Return (k, f) the Green's functions of sources at some unknowns."""
         rows = np.empty((len(unknowns), len(self.vertices)))
-        for start in range(0, len(unknowns), BATCH):
-            some = unknowns[start : start + BATCH]
+        batch = min(BATCH, max(1, NUMBERS // len(self.vertices)))
+        for start in range(0, len(unknowns), batch):
+            some = unknowns[start : start + batch]
             source = np.zeros((len(some), len(self.vertices)))
             source[np.arange(len(some)), some] = 1.0
-            rows[start : start + BATCH] = self.solve(source.T).T
+            rows[start : start + batch] = self.solve(source.T).T
         return rows
 
     def products(self, one: FloatArray, other: FloatArray) -> FloatArray:

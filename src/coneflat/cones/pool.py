@@ -17,7 +17,7 @@ WORTHWHILE = 2e-4
 ROUNDS = 12
 # A cone is tried at the end of a longer and of a more cautious step, as the distances are those of a coarse model; of
 # one in between where the mesh is large and back-substitutions are what takes long.
-CAUTIONS, CAUTION, LARGE = (1.0, 4.0), (2.0,), 50_000
+CAUTIONS, CAUTION, LARGE = (1.0, 4.0), (2.0,), 30_000
 
 
 class Pool:
