@@ -17,6 +17,7 @@ from .errors import OptionError
 from .geometry.areas import area_distortion, weighted_areas
 from .options import Options
 from .prepare import Component, prepare
+from .threads import one_blas_thread
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -100,11 +101,12 @@ def find_cones(
         allowed_cones=allowed_cones,
         repair=repair,
     )
-    opened = _open(mesh, faces, options)
-    if isinstance(opened, FoundCones):
-        return opened
-    search, part = opened
-    found = pursue(search, distortion=options.distortion, count=options.cone_count)
+    with one_blas_thread():
+        opened = _open(mesh, faces, options)
+        if isinstance(opened, FoundCones):
+            return opened
+        search, part = opened
+        found = pursue(search, distortion=options.distortion, count=options.cone_count)
     return _named(found.solution, found.distortion, part)
 
 
@@ -138,11 +140,12 @@ def cone_curve(
         allowed_cones=allowed_cones,
         repair=repair,
     )
-    opened = _open(mesh, faces, options)
-    if isinstance(opened, FoundCones):
-        return ConeCurve((opened,))
-    search, part = opened
-    found = search.best_of_sizes(int(most))
+    with one_blas_thread():
+        opened = _open(mesh, faces, options)
+        if isinstance(opened, FoundCones):
+            return ConeCurve((opened,))
+        search, part = opened
+        found = search.best_of_sizes(int(most))
     if not found:
         raise OptionError(f"no set of up to {most} cones carries this surface's curvature; allow more")
     return ConeCurve(tuple(_named(search.solution(members), energy, part) for energy, members in found))

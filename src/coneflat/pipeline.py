@@ -30,6 +30,7 @@ from .seams import cut_open, find_seams
 from .solver import solving
 from .stages import Progress, Stages
 from .text import plural
+from .threads import one_blas_thread
 from .wishes import Wishes
 
 # Searches for cones at most: each forbids those where the triangles of the one before had no room for the angle.
@@ -149,7 +150,7 @@ def flatten(
     stages = Stages(progress)
     with stages("check"):
         prepared = prepare(mesh, faces, options)
-    with solving(options.solver) as solvers:
+    with one_blas_thread(), solving(options.solver) as solvers:
         pieces = _flatten_components(prepared, options, stages)
     return replace(assemble(prepared, pieces, options, stages), solvers=tuple(solvers.used))
 
