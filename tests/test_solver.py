@@ -117,3 +117,15 @@ def test_too_little_memory_for_a_factorization(monkeypatch, matrix):
 
 def test_no_unknowns():
     assert factorize(csc_matrix((0, 0))).solve(np.zeros(0)).shape == (0,)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_flattening_is_the_same_to_the_last_bit(name):
+    """Whatever the memory looks like: results must not depend on where arrays lie."""
+    vertices, faces = shapes.sphere(4)
+    results, held = [], []
+    for i in range(3):
+        results.append(flatten(vertices, faces, solver=name, max_cones=4).uv)
+        held.append(np.empty(50_001 + 7 * i))
+    assert np.array_equal(results[0], results[1])
+    assert np.array_equal(results[0], results[2])

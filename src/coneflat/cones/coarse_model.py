@@ -13,6 +13,9 @@ from ..errors import MetricError
 from .coarsen import coarse_basis, representatives
 from .green import GreenOperator
 
+# E^2 that is zero but for rounding.
+ROUNDING = 1e-18
+
 
 @dataclass(frozen=True, eq=False)
 class CoarseModel:
@@ -73,7 +76,8 @@ def coarse_model(
     slope = -(kernel @ bare)
     constant = float(-(slope @ bare))
     exact = float(log_scale @ operator.weighted(log_scale))
-    scale = exact / constant if constant > 0 else 1.0
+    # A surface that is evenly curved has no E to compare.
+    scale = exact / constant if min(exact, constant) > ROUNDING else 1.0
     return CoarseModel(basis, kernel * scale, slope * scale, exact)
 
 

@@ -26,7 +26,7 @@ ANALYSE, FACTORIZE, SOLVE, RELEASE = 11, 22, 33, -1
 NO_DEFAULTS, ORDERING, PERMUTATION, FROM_ZERO = 0, 1, 4, 34
 NESTED_DISSECTION, GIVEN, WANTED = 2, 1, 2
 # So many right-hand sides are solved faster together than one by one.
-TOGETHER = 12
+TOGETHER = 8
 # PARDISO's codes.
 OUT_OF_MEMORY, ZERO_PIVOT = -2, -4
 
@@ -54,25 +54,23 @@ class PardisoFactor:
         self._rows = np.ascontiguousarray(rows[self._is_lower], dtype=np.int32)
         self._starts = np.zeros(len(starts), dtype=np.int32)
         np.cumsum(np.bincount(columns[self._is_lower], minlength=len(starts) - 1), out=self._starts[1:])
-        self._values = matrix.data[self._is_lower]
+        self._values = _aligned(matrix.data[self._is_lower])
         self._call(ANALYSE)
         # From now on the order is known.
         self._table[PERMUTATION] = GIVEN
 
     def _fill(self, matrix: csc_matrix) -> None:
-        self._values = matrix.data[self._is_lower]
+        self._values = _aligned(matrix.data[self._is_lower])
         self._call(FACTORIZE)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
         # One after the other in memory; of (k, n) this is a view.
-        columns = np.ascontiguousarray(right.T, dtype=np.float64)
-        solution = np.empty_like(columns)
-        if columns.ndim == 2 and len(columns) < TOGETHER:
-            for i in range(len(columns)):
-                self._call(SOLVE, columns[i], solution[i])
-        else:
-            self._call(SOLVE, columns, solution)
+        if right.ndim == 2 and right.shape[1] < TOGETHER:
+            return np.stack([self.solve(column) for column in right.T]).T
+        columns = _aligned(right.T)
+        solution = _aligned(columns, with_values=False)
+        self._call(SOLVE, columns, solution)
         return solution.T
 
     def renewed(self, matrix: csc_matrix) -> PardisoFactor:
@@ -101,6 +99,16 @@ class PardisoFactor:
             raise RuntimeError(f"PARDISO failed with code {code} in phase {phase}")
 
 
+def _aligned(array: AnyArray, with_values: bool = True) -> FloatArray:
+    """Return a copy, in one piece, that starts at a multiple of 64 bytes: what MKL's last digits depend on."""
+    buffer = np.empty(array.size + 8)
+    start = -(buffer.ctypes.data // 8) % 8
+    copy = buffer[start : start + array.size].reshape(array.shape)
+    if with_values:
+        copy[...] = array
+    return copy
+
+
 def _release(kind: int, handle: AnyArray, table: AnyArray, n: int) -> None:
     none = np.zeros(1)
     order = np.zeros(1, dtype=np.int32)
@@ -119,7 +127,10 @@ def _pardiso(
 ) -> int:
     values, starts, rows, order = matrix
     code = ctypes.c_int32(0)
-    _routine()(
+    pardiso, set_threads = _routines()
+    # On several threads the last digits of a solution depend on who comes first; those of a factorization do not.
+    threads = set_threads(1) if phase == SOLVE else None
+    pardiso(
         _address(handle),
         *map(_number, (1, 1, kind, phase, len(starts) - 1)),
         *map(_address, (values, starts, rows, order)),
@@ -129,6 +140,8 @@ def _pardiso(
         *map(_address, sides),
         ctypes.byref(code),
     )
+    if threads is not None:
+        set_threads(threads)
     return code.value
 
 
@@ -141,9 +154,12 @@ def _address(array: AnyArray | None) -> ctypes.c_void_p:
 
 
 @lru_cache(maxsize=1)
-def _routine() -> Any:
+def _routines() -> tuple[Any, Any]:
+    """Return PARDISO, and what sets the number of threads of the calling thread and returns the one before."""
     from pypardiso import PyPardisoSolver
 
-    routine = PyPardisoSolver().libmkl["pardiso"]
-    routine.restype = None
-    return routine
+    library = PyPardisoSolver().libmkl
+    pardiso, set_threads = library["pardiso"], library["MKL_Set_Num_Threads_Local"]
+    pardiso.restype = None
+    set_threads.argtypes, set_threads.restype = [ctypes.c_int], ctypes.c_int
+    return pardiso, set_threads
