@@ -241,3 +241,11 @@ def test_fewer_cones_than_published(shared, name, count):
     found = pursue(vertices, faces, distortion=0.2, min_cone_angle=0.1 * np.pi)
     assert found.distortion <= 0.2
     assert len(found.solution.cones) <= count
+
+
+def test_long_thin_triangles_take_no_more_cones_than_needed(shared):
+    """Where the coarse model is far off, it is the mesh that tells how many cones do."""
+    model = read_mesh(shared("spot.obj"))
+    found = pursue(model.vertices * [30, 1, 1], model.corners.reshape(-1, 3), distortion=0.2)
+    assert found.distortion <= 0.2
+    assert len(found.solution.cones) <= 16

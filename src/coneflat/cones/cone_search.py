@@ -207,6 +207,9 @@ class ConeSearch:
         coarse = self.coarse.best.get(count)
         if coarse is not None and coarse[0] <= goal * COARSE_DOUBT:
             return True
+        larger = self.pool.model.best.get(count + 1)
+        if larger is not None and larger[0] <= goal / COARSE_DOUBT:
+            return True  # The coarse model is far off: it is the mesh that tells.
         known = self.pool.model.best.get(count)
         return known is not None and known[0] <= goal * COARSE_DOUBT
 
@@ -220,8 +223,11 @@ class ConeSearch:
         starts = []
         if count in self.coarse.best:
             starts.append(pool.insert(self.places[self.coarse.best[count][1]]))
-        if count + 1 in model.best:
-            shrunk = model.shrunk(model.best[count + 1][1])
+        larger = min((known for known in model.best if known > count), default=0)
+        if larger:
+            shrunk: IntArray | None = model.best[larger][1]
+            while shrunk is not None and len(shrunk) > count:
+                shrunk = model.shrunk(shrunk)
             if shrunk is not None:
                 starts.append(shrunk)
         if count - 1 in model.best:
