@@ -312,3 +312,10 @@ def test_conjugate_gradients_tell_what_they_cannot_solve():
     assert conjugate_gradients(-laplacian, right, inverse, 1e-10) is None
     assert conjugate_gradients(laplacian, np.full(60, np.nan), inverse, 1e-10) is None
     assert conjugate_gradients(laplacian, right, Scaled(mesh, 5, False), 1e-10) is None
+
+
+def test_double_keeps_the_numbers_that_refine_relies_on():
+    mesh = TriangleMesh(*shapes.hill(4, 3))
+    given, original = double(intrinsic_triangulation(mesh, edge_lengths(mesh.vertices, mesh.faces)))
+    assert np.array_equal(original[: len(mesh.vertices)], np.arange(len(mesh.vertices)))
+    assert np.array_equal(given.faces[: len(mesh.faces)], mesh.faces)

@@ -6,6 +6,7 @@ import shapes
 
 from coneflat import TriangleMesh, edge_lengths, errors, least_squares_layout
 from coneflat.layout import arrange
+from coneflat.layout.pieces import triangulations
 
 
 def similar(points, reference):
@@ -60,3 +61,10 @@ def test_layout_without_finite_solution_is_refused():
     mesh = TriangleMesh(*shapes.grid(2, 2))
     with pytest.raises(errors.MetricError):
         least_squares_layout(mesh, np.full((8, 3), np.nan))
+
+
+def test_polygons_have_catalan_many_triangulations():
+    for corners, count in ((3, 1), (4, 2), (5, 5), (6, 14)):
+        choices = triangulations(corners)
+        assert choices.shape == (count, corners - 2, 3)
+        assert len({tuple(sorted(map(tuple, choice.tolist()))) for choice in choices}) == count

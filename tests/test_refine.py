@@ -7,13 +7,11 @@ import pytest
 import shapes
 
 from coneflat import TriangleMesh, check_mesh, cut_open, edge_lengths, errors, find_seams, mollify, read_mesh
-from coneflat.conformal.doubling import double
 from coneflat.conformal.exact import exact_metric
 from coneflat.geometry.intrinsic import intrinsic_triangulation
 from coneflat.geometry.triangles import corner_angles, double_areas
 from coneflat.inputs import as_input
 from coneflat.layout.overlay import overlay
-from coneflat.layout.pieces import triangulations
 from coneflat.layout.refine import refine
 from coneflat.layout.straighten import straight_triangles
 from coneflat.layout.undo_kernel import place_triangles
@@ -373,20 +371,6 @@ def test_other_meshes_metrics_are_refused():
     vertices, faces, _ = shapes.renumber(*shape)
     with pytest.raises(errors.MetricError, match="different meshes"):
         refine(TriangleMesh(vertices, faces), metric)
-
-
-def test_polygons_have_catalan_many_triangulations():
-    for corners, count in ((3, 1), (4, 2), (5, 5), (6, 14)):
-        choices = triangulations(corners)
-        assert choices.shape == (count, corners - 2, 3)
-        assert len({tuple(sorted(map(tuple, choice.tolist()))) for choice in choices}) == count
-
-
-def test_double_keeps_the_numbers_that_refine_relies_on():
-    mesh = TriangleMesh(*shapes.hill(4, 3))
-    given, original = double(intrinsic_triangulation(mesh, edge_lengths(mesh.vertices, mesh.faces)))
-    assert np.array_equal(original[: len(mesh.vertices)], np.arange(len(mesh.vertices)))
-    assert np.array_equal(given.faces[: len(mesh.faces)], mesh.faces)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,9 @@ import shapes
 from scipy.sparse import csc_matrix
 
 from coneflat import errors, flatten
+from coneflat.cli.main import cli
 from coneflat.geometry import cotangent_laplacian, cotangents, edge_lengths
+from coneflat.options import SOLVERS as SOLVER_NAMES
 from coneflat.solver import available, factorize, solving
 from coneflat.solver.ladder import HUGE, LARGE, MODULES, best_for
 
@@ -129,3 +131,10 @@ def test_flattening_is_the_same_to_the_last_bit(name):
         held.append(np.empty(50_001 + 7 * i))
     assert np.array_equal(results[0], results[1])
     assert np.array_equal(results[0], results[2])
+
+
+def test_every_list_of_solvers_is_the_same():
+    choices = next(
+        option for option in cli.commands["flatten"].params if option.name == "solver"
+    ).type.choices
+    assert tuple(choices) == SOLVER_NAMES == ("auto", *MODULES)

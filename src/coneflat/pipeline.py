@@ -21,7 +21,7 @@ from .errors import ConvergenceError, CurvatureError
 from .geometry.areas import area_distortion, weighted_areas
 from .methods import ExactChoices, FlatMetric, LaidOut, exact_flattening, linear_flattening
 from .methods.exact import ExactFlatMetric
-from .methods.handles import corrected_flattening, flat_triangles
+from .methods.handles import corrected_flattening
 from .options import Boundary, Cones, Options
 from .prepare import Component, Prepared, prepare
 from .result import Flattening
@@ -248,7 +248,7 @@ def _turning_meter(surface: Surface, wishes: Wishes, options: Options) -> Turned
 
     def turned(solution: ConeSolution) -> FloatArray:
         metric = find_metric(surface, solution, wishes, plain)
-        return turning.of_flat(flat_triangles(metric)) if isinstance(metric, ExactFlatMetric) else np.empty(0)
+        return turning.of_flat(metric.straight()) if isinstance(metric, ExactFlatMetric) else np.empty(0)
 
     return turned
 

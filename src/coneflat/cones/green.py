@@ -59,9 +59,8 @@ class GreenOperator:
         return solution[0] if source.ndim == 1 else solution.T
 
     def weighted(self, values: FloatArray) -> FloatArray:
-        """Return A values for (f,) or (f, k)."""
-        centred = values - self.areas @ values
-        return self.areas * centred if values.ndim == 1 else self.areas[:, None] * centred
+        """Return (f,) A values."""
+        return self.areas * (values - self.areas @ values)
 
     def solve_at_vertices(self, source: FloatArray) -> FloatArray:
         """Return (n,) G source for (n,), both in the numbering of vertices.

@@ -15,6 +15,7 @@ from scipy.sparse import csc_matrix, csr_matrix
 
 from .._arrays import FloatArray, IntArray
 from ..geometry import cotangents
+from ..geometry.intrinsic import halfedge_twins
 from ..layout.straighten import FlatTriangles
 from ..mesh import TriangleMesh
 from ..seams.handles import corner_signs, handle_loops
@@ -41,10 +42,6 @@ class Turning:
     loops: list[IntArray]
     signs: csr_matrix
 
-    def of_angles(self, angles: FloatArray) -> FloatArray:
-        """Return (2 genus,) the turning in a metric with corner angles (m, 3), radians."""
-        return np.asarray(self.signs @ angles.ravel())
-
     def of_flat(self, flat: FlatTriangles) -> FloatArray:
         """Return (2 genus,) the turning in a flat metric, up to full turns."""
         return np.array([np.angle(np.prod(flat.turns[loop])) for loop in self.loops])
@@ -61,10 +58,7 @@ class Turning:
 def open_turning(mesh: TriangleMesh) -> Turning:
     """Return the turning of the loops across a mesh's handles."""
     loops = handle_loops(mesh)
-    pairs = mesh.edge_halfedges
-    twin = np.full(3 * len(mesh.faces), -1)
-    inside = ~mesh.is_boundary_edge
-    twin[pairs[inside, 0]], twin[pairs[inside, 1]] = pairs[inside, 1], pairs[inside, 0]
+    twin = halfedge_twins(mesh)
     parts = [corner_signs(loop, twin) for loop in loops]
     rows = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
     columns = np.concatenate([part[0] for part in parts] or [np.empty(0, dtype=np.int64)])

@@ -88,7 +88,7 @@ class ExactFlatMetric:
 
     def _lay_out_straight(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
         mesh, solved = self.mesh, self.solved
-        flat = straight_triangles(solved.triangulation, solved.flips, len(mesh.faces))
+        flat = self.straight()
         cut = mesh.is_boundary_edge.copy()
         cut[seams] = True
         pinned, on_seam = np.zeros((2, len(mesh.vertices)), dtype=bool)
@@ -113,6 +113,10 @@ class ExactFlatMetric:
             ),
             notes=self.notes,
         )
+
+    def straight(self) -> FlatTriangles:
+        """Return the input's triangles with straight sides in the metric."""
+        return straight_triangles(self.solved.triangulation, self.solved.flips, len(self.mesh.faces))
 
     def _lay_out_refined(self, seams: IntArray) -> LaidOut:
         from ..layout.refine import refine

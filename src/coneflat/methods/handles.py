@@ -17,7 +17,6 @@ from ..conformal.turning import Turning, curvature_by_log_lengths, edge_means, o
 from ..errors import ConvergenceError
 from ..geometry import corner_angles, double_areas
 from ..geometry.triangles import slacks
-from ..layout.straighten import FlatTriangles, straight_triangles
 from ..mesh import TriangleMesh
 from ..solver import factorize
 from .exact import ExactChoices, ExactFlatMetric, exact_flattening
@@ -33,11 +32,6 @@ SCALING = 1e-3
 # Shear at cones turns loops best, for it amounts to moving the cones; but little room has to bear much of it then.
 # So many rings around them are spared by counting it so many times.
 RINGS, SPARED = 3, 1e3
-
-
-def flat_triangles(metric: ExactFlatMetric) -> FlatTriangles:
-    """Return the input's triangles with straight sides in the metric."""
-    return straight_triangles(metric.solved.triangulation, metric.solved.flips, len(metric.mesh.faces))
 
 
 def corrected_flattening(
@@ -59,14 +53,14 @@ def corrected_flattening(
     """
     mesh = turning.mesh
     metric = exact_flattening(mesh, lengths, solution, choices)
-    off = off_multiple(turning.of_flat(flat_triangles(metric)), quantum)
+    off = off_multiple(turning.of_flat(metric.straight()), quantum)
     fixed = mesh.is_boundary_vertex & (choices.boundary is None)
     changes = None
     for _ in range(STEPS):
         if np.abs(off).max() <= TOLERANCE:
             return metric
         if changes is None:
-            sides = np.abs(flat_triangles(metric).sides).reshape(-1, 3)
+            sides = np.abs(metric.straight().sides).reshape(-1, 3)
             changes = least_changes(turning, sides, shear_norm(mesh, lengths, solution.cones), fixed)
             inverse = np.eye(len(off))
         step = -inverse @ off
@@ -80,7 +74,7 @@ def corrected_flattening(
         lengths = sheared
         solution = replace(solution, log_scale=metric.solved.log_scale)
         metric = exact_flattening(mesh, lengths, solution, choices)
-        before, off = off, off_multiple(turning.of_flat(flat_triangles(metric)), quantum)
+        before, off = off, off_multiple(turning.of_flat(metric.straight()), quantum)
         if part < 1:
             changes = None
             continue
