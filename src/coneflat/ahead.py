@@ -1,0 +1,47 @@
+"""Compiling the kernels ahead: `python -m coneflat.ahead`.
+
+Kernels are compiled when first called and kept beside their sources from then on (see `geometry.compiled`), which
+makes the first flattening of an installation wait for half a minute. The build does this for it (hatch_build.py).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._arrays import FloatArray, IntArray
+from .pipeline import flatten
+from .sample import sample_path
+
+TAU = 2 * np.pi
+
+
+def compile_kernels() -> None:
+    """Flatten small meshes of every kind, so that every kernel that flattening uses is compiled."""
+    flatten(sample_path())
+    flatten(sample_path(), cones="greedy", metric="linear")
+    for mesh in (_tube(closed=True), _tube(closed=False)):
+        flatten(*mesh)
+        flatten(*mesh, cones="greedy", refine=True)
+    flatten(*_tube(closed=True), quantum=np.pi / 2)
+    flatten(*_tube(closed=False), boundary="disk", best_effort=True)
+
+
+def _tube(closed: bool, around: int = 40, across: int = 24) -> tuple[FloatArray, IntArray]:
+    """Return a bumpy torus, or the part of it that a rectangle of its parameters covers, bent to a spiral."""
+    u, v = np.meshgrid(np.arange(around), np.arange(across), indexing="ij")
+    a, b = TAU * u / around, TAU * v / across
+    radius = 0.4 + 0.05 * np.sin(3 * a) * np.cos(2 * b)
+    ring = 1 + radius * np.cos(b)
+    points = np.stack([ring * np.cos(a), ring * np.sin(a), radius * np.sin(b)], axis=-1).reshape(-1, 3)
+    if not closed:
+        u, v = u[:-1, : across // 2], v[:-1, : across // 2]
+    number = lambda i, j: (i % around * across + j % across).ravel()  # noqa: E731
+    one, two = number(u, v), number(u + 1, v)
+    three, four = number(u + 1, v + 1), number(u, v + 1)
+    faces = np.concatenate([np.stack([one, two, three], 1), np.stack([one, three, four], 1)])
+    used, faces = np.unique(faces, return_inverse=True)
+    return points[used], faces.reshape(-1, 3)
+
+
+if __name__ == "__main__":
+    compile_kernels()
