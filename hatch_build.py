@@ -38,7 +38,9 @@ class KernelHook(BuildHookInterface):
             return
         sources = Path(self.root) / "src"
         if version != "editable":
-            self._scratch = tempfile.TemporaryDirectory(prefix="coneflat-kernels-", ignore_cleanup_errors=True)
+            self._scratch = tempfile.TemporaryDirectory(
+                prefix="coneflat-kernels-", ignore_cleanup_errors=True
+            )
             copy = Path(self._scratch.name) / "src"
             shutil.copytree(sources, copy, ignore=shutil.ignore_patterns("__pycache__"))
             sources = copy

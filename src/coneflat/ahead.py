@@ -35,9 +35,9 @@ def _tube(closed: bool, around: int = 40, across: int = 24) -> tuple[FloatArray,
     points = np.stack([ring * np.cos(a), ring * np.sin(a), radius * np.sin(b)], axis=-1).reshape(-1, 3)
     if not closed:
         u, v = u[:-1, : across // 2], v[:-1, : across // 2]
-    number = lambda i, j: (i % around * across + j % across).ravel()  # noqa: E731
-    one, two = number(u, v), number(u + 1, v)
-    three, four = number(u + 1, v + 1), number(u, v + 1)
+    one, two, three, four = (
+        ((u + i) % around * across + (v + j) % across).ravel() for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))
+    )
     faces = np.concatenate([np.stack([one, two, three], 1), np.stack([one, three, four], 1)])
     used, faces = np.unique(faces, return_inverse=True)
     return points[used], faces.reshape(-1, 3)
