@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._arrays import BoolArray, FloatArray, IntArray
-from .mesh import NEXT, PREVIOUS, TriangleMesh, label_components
+from ._arrays import BoolArray, FloatArray, IntArray, dots
+from .mesh import TriangleMesh, end_corners, label_components
 
 ZERO_AREA = 1e-12  # twice the area over the longest side squared: no digit of the shape is left below
 JOINED = 1e-6  # UV distance over UV edge length at which two sides of an edge count as one
@@ -87,7 +87,7 @@ def measure(
     area, longest = _model_areas(mesh)
     one, two = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
     uv_area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-    uv_longest = np.sqrt(np.maximum.reduce([(side**2).sum(axis=1) for side in (one, two, two - one)]))
+    uv_longest = np.sqrt(np.maximum.reduce([dots(side, side) for side in (one, two, two - one)]))
     has_area = area > ZERO_AREA * longest**2
     has_uv_area = np.abs(uv_area) > ZERO_AREA * uv_longest**2
     valid = has_area & has_uv_area
@@ -127,8 +127,9 @@ def _model_areas(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
     """Return twice the area of each triangle in space, and its longest side."""
     corners = mesh.vertices[mesh.faces]
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    longest = np.sqrt(np.maximum.reduce([(side**2).sum(axis=1) for side in (one, two, two - one)]))
-    return np.linalg.norm(np.cross(one, two), axis=1), longest
+    longest = np.sqrt(np.maximum.reduce([dots(side, side) for side in (one, two, two - one)]))
+    normal = np.cross(one, two)
+    return np.sqrt(dots(normal, normal)), longest
 
 
 def _singular_value_ratio(
@@ -147,8 +148,8 @@ def _singular_value_ratio(
     """
     corners = mesh.vertices[mesh.faces[chosen]]
     along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    base = np.linalg.norm(along, axis=1)
-    x = (along * across).sum(axis=1) / base
+    base = np.sqrt(dots(along, along))
+    x = dots(along, across) / base
     height = area / base
     column_x = one / base[:, None]
     column_y = (two - column_x * x[:, None]) / height[:, None]
@@ -163,23 +164,24 @@ def _singular_value_ratio(
 
 def _sides(mesh: TriangleMesh, corner_uv: FloatArray, edges: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return the UV ends (k, 2, 2) of interior edges as each of their two faces sees them, in one order."""
-    one, two = mesh.edge_halfedges[edges].T
-    here = np.stack([corner_uv[one // 3, NEXT[one % 3]], corner_uv[one // 3, PREVIOUS[one % 3]]], axis=1)
-    there = np.stack([corner_uv[two // 3, PREVIOUS[two % 3]], corner_uv[two // 3, NEXT[two % 3]]], axis=1)
-    return here, there
+    corners = corner_uv.reshape(-1, 2)
+    one, two = (end_corners(mesh.edge_halfedges[edges, side]) for side in (0, 1))
+    return corners[np.stack(one, axis=1)], corners[np.stack(two[::-1], axis=1)]
 
 
 def _side_lengths(ends: FloatArray) -> FloatArray:
-    lengths: FloatArray = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    return lengths
+    side = ends[:, 1] - ends[:, 0]
+    return np.sqrt(dots(side, side))
 
 
 def _seams_and_charts(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[IntArray, int, IntArray]:
     """Return the interior edges whose UVs differ, the number of charts, and the chart of each face."""
     inside = np.flatnonzero(~mesh.is_boundary_edge)
     here, there = _sides(mesh, corner_uv, inside)
-    gap = np.linalg.norm(here - there, axis=2).max(axis=1)
-    joined = gap <= JOINED * np.maximum(_side_lengths(here), _side_lengths(there))
+    joined = np.logical_and.reduce((here == there).reshape(-1, 4).T)
+    apart = np.flatnonzero(~joined)
+    gap = np.sqrt(dots(here[apart] - there[apart], here[apart] - there[apart])).max(axis=1)
+    joined[apart] = gap <= JOINED * np.maximum(_side_lengths(here[apart]), _side_lengths(there[apart]))
     faces = mesh.edge_faces[inside[joined]]
     count, chart = label_components(len(mesh.faces), faces[:, 0], faces[:, 1])
     return inside[~joined], count, chart

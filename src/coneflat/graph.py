@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
 from ._arrays import FloatArray, IntArray
+from .mesh import sort_pairs
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,13 +31,13 @@ class MultiGraph:
     @cached_property
     def _simple(self) -> tuple[IntArray, IntArray]:
         """The cheapest edge of each pair of adjacent nodes, and the sorted keys of the pairs."""
-        keys = self._keys(self.tails, self.heads)
-        order = np.lexsort((self.costs, keys))
-        order = order[self.tails[order] != self.heads[order]]
-        first = np.ones(len(order), dtype=bool)
-        first[1:] = keys[order[1:]] != keys[order[:-1]]
+        order, first = sort_pairs(self.tails, self.heads, self.nodes)
+        if not first.all():
+            group = np.cumsum(first)
+            order = order[np.lexsort((self.costs[order], group))]
         chosen = order[first]
-        return chosen, keys[chosen]
+        chosen = chosen[self.tails[chosen] != self.heads[chosen]]
+        return chosen, self._keys(self.tails[chosen], self.heads[chosen])
 
     def _keys(self, one: IntArray, two: IntArray) -> IntArray:
         keys: IntArray = np.minimum(one, two).astype(np.int64) * self.nodes + np.maximum(one, two)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ._arrays import BoolArray, FloatArray, IntArray
@@ -25,6 +25,26 @@ def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int,
     graph = coo_matrix((np.ones(len(tails), dtype=np.int8), (tails, heads)), shape=(count, count))
     number, labels = connected_components(graph, directed=False)
     return int(number), labels.astype(np.int64)
+
+
+def sort_by_counting(keys: IntArray, bound: int) -> IntArray:
+    """Return the stable order of integers from 0 up to a bound, in linear time."""
+    # To turn rows into columns, SciPy counts.
+    count = len(keys)
+    rows = csr_matrix((np.empty(count, dtype=np.int8), keys, np.arange(count + 1)), shape=(count, bound))
+    order: IntArray = rows.tocsc().indices
+    return order
+
+
+def sort_pairs(one: IntArray, two: IntArray, bound: int) -> tuple[IntArray, BoolArray]:
+    """Return the stable order of unordered pairs, by the smaller index first, and where in it each pair comes first."""
+    low, high = np.minimum(one, two), np.maximum(one, two)
+    by_high = sort_by_counting(high, bound)
+    order = by_high[sort_by_counting(low[by_high], bound)].astype(np.int64)
+    first = np.ones(len(order), dtype=bool)
+    low, high = low[order], high[order]
+    first[1:] = (low[1:] != low[:-1]) | (high[1:] != high[:-1])
+    return order, first
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +65,8 @@ class TriangleMesh:
     def _pairing(self) -> tuple[IntArray, IntArray, IntArray]:
         """Edges as vertex pairs (e, 2), edge of each half-edge (3m,), half-edges of each edge (e, 2)."""
         tails, heads = self.tails, self.heads
-        keys = np.minimum(tails, heads) * len(self.vertices) + np.maximum(tails, heads)
-        order = np.argsort(keys, kind="stable")
-        first = np.ones(len(keys), dtype=bool)
-        first[1:] = keys[order[1:]] != keys[order[:-1]]
-        edge_of = np.empty(len(keys), dtype=np.int64)
+        order, first = sort_pairs(tails, heads, len(self.vertices))
+        edge_of = np.empty(len(order), dtype=np.int64)
         edge_of[order] = np.cumsum(first) - 1
         one = order[first]
         two = np.full(len(one), -1, dtype=np.int64)
@@ -157,8 +174,8 @@ def corner_fans(faces: IntArray, one: IntArray, two: IntArray) -> tuple[int, Int
     """
     flat = faces.ravel()
     # A half-edge's end corners, ordered so that both sides name the same vertex first.
-    start_one, end_one = _end_corners(one)
-    start_two, end_two = _end_corners(two)
+    start_one, end_one = end_corners(one)
+    start_two, end_two = end_corners(two)
     opposed = flat[start_one] == flat[end_two]
     start_two, end_two = np.where(opposed, end_two, start_two), np.where(opposed, start_two, end_two)
     count, labels = label_components(
@@ -167,6 +184,8 @@ def corner_fans(faces: IntArray, one: IntArray, two: IntArray) -> tuple[int, Int
     return count, labels.reshape(faces.shape)
 
 
-def _end_corners(halfedges: IntArray) -> tuple[IntArray, IntArray]:
-    base = halfedges - halfedges % 3
-    return base + NEXT[halfedges % 3], base + PREVIOUS[halfedges % 3]
+def end_corners(halfedges: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the corners, numbered along `faces.ravel()`, that half-edges start from and end at."""
+    corner = halfedges % 3
+    base = halfedges - corner
+    return base + NEXT[corner], base + PREVIOUS[corner]

@@ -18,7 +18,7 @@ from .errors import (
     NonOrientableError,
 )
 from .graph import MultiGraph
-from .mesh import NEXT, PREVIOUS, TriangleMesh, corner_fans, label_components
+from .mesh import NEXT, PREVIOUS, TriangleMesh, corner_fans, label_components, sort_by_counting, sort_pairs
 from .text import list_some, plural
 
 REPAIR_ADVICE = "run with --repair (repair=True)"
@@ -171,14 +171,12 @@ class _Check:
     def pair_halfedges(self) -> None:
         """Find the pairs of half-edges (k, 2) that are glued; edges of three or more faces are not."""
         tails, heads = self.faces[:, NEXT].ravel(), self.faces[:, PREVIOUS].ravel()
-        low, high = np.minimum(tails, heads), np.maximum(tails, heads)
-        keys = low * len(self.vertices) + high
-        order = np.argsort(keys, kind="stable")
-        starts = np.flatnonzero(np.concatenate([[True], keys[order[1:]] != keys[order[:-1]]]))
-        counts = np.diff(np.append(starts, len(keys)))
+        order, is_first = sort_pairs(tails, heads, len(self.vertices))
+        starts = np.flatnonzero(is_first)
+        counts = np.diff(np.append(starts, len(order)))
         crowded = starts[counts > 2]
         if len(crowded):
-            edges = [f"{low[h]}-{high[h]}" for h in order[crowded[:5]]]
+            edges = ["{}-{}".format(*sorted((tails[h], heads[h]))) for h in order[crowded[:5]]]
             what = plural(len(crowded), "edge")
             if not self.repair:
                 raise NonManifoldError(
@@ -255,7 +253,7 @@ class _Check:
         if isolated:
             self.notes.append(f"Left out {plural(isolated, 'vertex', 'vertices')} without a face.")
         # Numbered as the input is, the parts of a split vertex one after the other.
-        order = np.argsort(origin, kind="stable")
+        order = sort_by_counting(origin, len(self.vertices))
         rank = np.empty(fans, dtype=np.int64)
         rank[order] = np.arange(fans)
         self.vertex_origin = origin[order]
