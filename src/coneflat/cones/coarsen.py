@@ -45,7 +45,9 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
         areas: (n,) vertex areas.
         size: the number of basis functions wanted.
     """
-    functions = identity(laplacian.shape[0], format="csr")
+    functions: csr_matrix | None = (
+        None  # None for the identity, whose products with large matrices take their time
+    )
     level, mass = laplacian, csr_matrix(diags(areas))
     order = np.arange(laplacian.shape[0])
     while level.shape[0] > 1.2 * size:
@@ -54,12 +56,20 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
         part = _smoothed_aggregates(level, order, ratio ** (1 / steps))
         if part.shape[1] > 0.9 * level.shape[0]:
             break
-        functions = csr_matrix(functions @ part)
         transposed = csr_matrix(part.T)
         level = csr_matrix(transposed @ (level @ part))
-        mass = csr_matrix(transposed @ (mass @ part))
+        weighted = mass @ part if functions is not None else _with_scaled_rows(part, areas)
+        mass = csr_matrix(transposed @ weighted)
+        functions = part if functions is None else csr_matrix(functions @ part)
         order = _order_of_aggregates(part, order)
+    if functions is None:
+        functions = identity(laplacian.shape[0], format="csr")
     return CoarseBasis(functions, level, mass)
+
+
+def _with_scaled_rows(matrix: csr_matrix, factors: FloatArray) -> csr_matrix:
+    data = matrix.data * np.repeat(factors, np.diff(matrix.indptr))
+    return csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def _smoothed_aggregates(level: csr_matrix, order: IntArray, size: float) -> csr_matrix:
