@@ -63,8 +63,8 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -
         NonOrientableError: the faces cannot be oriented consistently.
     """
     points = _as_vertices(vertices)
-    triangles = _as_faces(faces, len(points))
-    _require_finite(points, triangles)
+    triangles = as_faces(faces, len(points))
+    require_finite(points, triangles)
     work = _Check(points, triangles, repair)
     work.drop_degenerate_faces()
     work.pair_halfedges()
@@ -88,7 +88,7 @@ def _as_vertices(vertices: ArrayLike) -> FloatArray:
     return points
 
 
-def _as_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
+def as_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
     try:
         array = np.asarray(faces)
         if array.dtype.kind not in "fiu" and array.size:
@@ -113,7 +113,7 @@ def _as_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
     return triangles
 
 
-def _require_finite(points: FloatArray, triangles: IntArray) -> None:
+def require_finite(points: FloatArray, triangles: IntArray) -> None:
     """Raise NonFiniteError if a face has a vertex that is nowhere; vertices without a face do not matter."""
     is_bad: BoolArray = np.any(~np.isfinite(points), axis=1)
     if is_bad.any():
