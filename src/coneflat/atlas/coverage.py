@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
-from ..mesh import NEXT
+from ..mesh import NEXT, sort_pairs
 
 # Crossings of horizontal lines with sides that are sorted at a time, to bound the memory.
 AT_A_TIME = 2_000_000
@@ -52,13 +52,12 @@ def _outline(corners: FloatArray) -> IntArray:
     One side of each number of equal ones stands for all: positive as it runs, negative the other way.
     """
     _, ends = np.unique(corners.reshape(-1, 2) @ np.array([1, 1j]), return_inverse=True)
-    tails = ends.reshape(-1, 3)
-    heads = tails[:, NEXT]
-    keys = (np.minimum(tails, heads) * corners.size + np.maximum(tails, heads)).ravel()
-    ways = np.where(tails < heads, 1, -1).ravel()
-    _, first, edge = np.unique(keys, return_index=True, return_inverse=True)
-    steps = np.zeros(len(keys), dtype=np.int64)
-    steps[first] = np.bincount(edge, weights=ways).astype(np.int64) * ways[first]
+    tails, heads = ends, ends.reshape(-1, 3)[:, NEXT].ravel()
+    order, first = sort_pairs(tails, heads, len(ends))
+    ways = np.where(tails < heads, 1, -1)
+    sides = order[first]
+    steps = np.zeros(len(ends), dtype=np.int64)
+    steps[sides] = np.add.reduceat(ways[order], np.flatnonzero(first)) * ways[sides]
     return steps.reshape(-1, 3)
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import IntArray
-from ..mesh import NEXT, label_components
+from ..mesh import NEXT, label_components, sort_by_counting, sort_pairs
 
 
 def overlap_regions(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray]:
     """Return the number of regions where a layout overlaps itself, and the region of each pair.
 
     Two pairs are neighbours where they have a triangle in common, and their other triangles share a side: the
-    overlap goes on across it. So a region has two layers, each a connected part of the mesh.
+    overlap goes on across it. Where two layers have sides in common, it ends for this purpose.
 
     Args:
         pairs: (k, 2) as in `Overlaps`: sorted, the smaller index first.
@@ -22,12 +22,12 @@ def overlap_regions(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray
         return 0, np.empty(0, dtype=np.int64)
     count = len(triangles)
     one, two = _neighbours(np.unique(pairs), triangles)
-    order = np.argsort(one, kind="stable")
-    one, two = one[order], two[order]
+    two = two[sort_by_counting(one, count)]
+    ways = np.bincount(one, minlength=count)
+    starts = np.cumsum(ways) - ways
     # Every pair both ways round; the second triangle goes to each of its neighbours.
     kept, moved = pairs.ravel(), pairs[:, ::-1].ravel()
-    first = np.searchsorted(one, moved)
-    ways = np.searchsorted(one, moved, side="right") - first
+    first, ways = starts[moved], ways[moved]
     source = np.repeat(np.arange(len(moved)), ways)
     step = np.arange(len(source)) - np.repeat(np.cumsum(ways) - ways - first, ways)
     kept, moved = kept[source], two[step]
@@ -40,10 +40,8 @@ def overlap_regions(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray
 
 def _neighbours(chosen: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
     """Return the chosen triangles that share a side, two and two, each both ways round."""
-    tails = triangles[chosen].ravel()
-    heads = triangles[chosen][:, NEXT].ravel()
-    keys = np.minimum(tails, heads) * (int(triangles.max()) + 1) + np.maximum(tails, heads)
-    order = np.argsort(keys, kind="stable")
-    same = keys[order[1:]] == keys[order[:-1]]
-    one, two = chosen[order[:-1][same] // 3], chosen[order[1:][same] // 3]
+    tails, heads = triangles[chosen].ravel(), triangles[chosen][:, NEXT].ravel()
+    order, first = sort_pairs(tails, heads, int(triangles.max()) + 1)
+    again = np.flatnonzero(~first)
+    one, two = chosen[order[again - 1] // 3], chosen[order[again] // 3]
     return np.concatenate([one, two]), np.concatenate([two, one])
