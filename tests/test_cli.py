@@ -200,3 +200,13 @@ def test_help_lists_the_commands(tmp_path):
     assert "demo" in done.stdout
     assert "coneflat, version" in run("--version", cwd=tmp_path).stdout
     assert run(cwd=tmp_path).returncode == 2
+
+
+@pytest.mark.parametrize(("ending", "charts"), [("obj", "atlas"), ("glb", "atlas"), ("ply", "one")])
+def test_what_is_to_be_textured_becomes_an_atlas(model, tmp_path, ending, charts):
+    for extra, expected in (((), charts), (("--charts", "one"), "one"), (("--paper",), "one")):
+        done = run(
+            "flatten", model, "-q", "-o", f"out.{ending}", "--report", "out.json", *extra, cwd=tmp_path
+        )
+        assert done.returncode == 0
+        assert json.loads((tmp_path / "out.json").read_text())["settings"]["charts"] == expected

@@ -17,7 +17,7 @@ TAU = 2 * np.pi
 
 def compile_kernels() -> None:
     """Flatten small meshes of every kind, so that every kernel that flattening uses is compiled."""
-    flatten(sample_path())
+    flatten(sample_path(), charts="atlas")
     flatten(sample_path(), cones="greedy", metric="linear")
     for mesh in (_tube(closed=True), _tube(closed=False)):
         flatten(*mesh)

@@ -42,12 +42,9 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     faces = np.concatenate([ids[one.mesh.faces] for ids, one in zip(numbers, laid_out, strict=True)])[order]
 
     with stages("layout"):
-        charts, scale = arrange([one.points for one in laid_out])
-        first = np.cumsum([0] + [len(chart) for chart in charts[:-1]])
-        corners = np.concatenate([one.corners + start for one, start in zip(laid_out, first, strict=True)])[
-            order
-        ]
-        uv = np.concatenate(charts)
+        points, corners, chart = _all_charts(laid_out)
+        uv, scale = _arranged(points, corners, chart)
+        corners = corners[order]
 
     def spread(values: Sequence[FloatArray]) -> FloatArray:
         every = np.full(len(positions), np.nan)
@@ -93,6 +90,28 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         face_corners=face_corners,
         source=given.source,
     )
+
+
+def _all_charts(laid_out: Sequence[LaidOut]) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return the points, corners and charts of all components, numbered one after the other."""
+    corners, charts, points, count = [], [], 0, 0
+    for one in laid_out:
+        chart = np.zeros(len(one.corners), dtype=np.int64) if one.chart is None else one.chart
+        corners.append(one.corners + points)
+        charts.append(chart + count)
+        points, count = points + len(one.points), count + int(chart.max()) + 1
+    return np.concatenate([one.points for one in laid_out]), np.concatenate(corners), np.concatenate(charts)
+
+
+def _arranged(points: FloatArray, corners: IntArray, chart: IntArray) -> tuple[FloatArray, float]:
+    """Return the points with the charts side by side in the unit square, and the scale."""
+    chart_of = np.empty(len(points), dtype=np.int64)
+    chart_of[corners] = chart[:, None]
+    members = np.split(np.argsort(chart_of, kind="stable"), np.cumsum(np.bincount(chart_of))[:-1])
+    placed, scale = arrange([points[some] for some in members])
+    uv = np.empty_like(points)
+    uv[np.concatenate(members)] = np.concatenate(placed)
+    return uv, scale
 
 
 def _number_vertices(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._arrays import BoolArray, FloatArray, IntArray, dots
+from .atlas.overlap import find_overlaps
 from .mesh import TriangleMesh, end_corners, label_components
 
 ZERO_AREA = 1e-12  # twice the area over the longest side squared: no digit of the shape is left below
@@ -36,6 +37,8 @@ class Distortion:
         seam_motion_mismatch: how far the two sides of a seam are from one rigid motion of each other: the largest
             change of the rotation between them from one seam edge to the next, radians; where seams branch
             or end, and at cones, there is none to compare.
+        overlap: part of the area that the layout covers that it covers more than once.
+        overlapping_pairs: pairs of triangles with inner points in common, without rounding.
         curvature_error: ||target - K||_2 / n of the metric, in units of pi (Table 1 of the paper).
         curvature_error_max: largest |target - K|, in units of pi.
     """
@@ -55,6 +58,8 @@ class Distortion:
     seam_mismatch: float
     seam_mismatch_max: float
     seam_motion_mismatch: float
+    overlap: float
+    overlapping_pairs: int
     curvature_error: float = float("nan")
     curvature_error_max: float = float("nan")
 
@@ -101,6 +106,7 @@ def measure(
     seams, charts, chart = _seams_and_charts(mesh, corner_uv)
     majority = np.sign(np.bincount(chart, weights=np.where(valid, uv_area, 0), minlength=charts))
     against = np.where(valid, np.sign(uv_area), 0) * majority[chart] < 0
+    overlaps = find_overlaps(corner_uv)
     seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
     return Distortion(
         qc=qc,
@@ -118,6 +124,8 @@ def measure(
         seam_mismatch=_mean(mismatches, seam_lengths) if len(seams) else 0.0,
         seam_mismatch_max=float(mismatches.max()) if len(seams) else 0.0,
         seam_motion_mismatch=_seam_motion_mismatch(mesh, corner_uv, seams, cones),
+        overlap=overlaps.fraction,
+        overlapping_pairs=len(overlaps.pairs),
         curvature_error=curvature_error[0],
         curvature_error_max=curvature_error[1],
     )

@@ -17,6 +17,7 @@ METRICS = ("exact", "linear")
 LENGTH_RULES = ("integral", "mean")
 AT_CONES = ("auto", "scale", "curvature")
 SOLVERS = ("auto", "pardiso", "scikit-sparse", "cholespy", "scipy", "amg")
+CHARTS = ("one", "atlas")
 BOUNDARIES = ("free", "lengths", "disk", "straight")
 
 # What asks for cones by the pursuit, and it alone.
@@ -74,6 +75,7 @@ class Options:
     repair: bool = False
     strict: bool = False
     solver: str = "auto"
+    charts: str = "one"
     given_cones: Mapping[int, float | None] = field(init=False, default_factory=dict)
     corners: Mapping[int, float | None] = field(init=False, default_factory=dict)
 
@@ -104,6 +106,7 @@ class Options:
         _choice("metric", self.metric, METRICS)
         _choice("length_rule", self.length_rule, LENGTH_RULES)
         _choice("solver", self.solver, SOLVERS)
+        _choice("charts", self.charts, CHARTS)
         epsilon = _number("epsilon", self.epsilon)
         if not 0 < epsilon < math.inf:
             raise OptionError(f"epsilon must be a positive number, not {epsilon:g}")

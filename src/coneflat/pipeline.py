@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import FloatArray, IntArray
+from ._arrays import FloatArray, IntArray, dots
 from .assemble import assemble
+from .atlas import Seams, injective_charts
 from .choose import DEARER, Surface, Turned, choose_cones, pursues
 from .cones import ConeSolution
 from .conformal.boundary import prescribed_boundary, straight_boundary
@@ -68,6 +69,7 @@ def flatten(
     repair: bool = False,
     strict: bool = False,
     solver: str = "auto",
+    charts: str = "one",
     progress: Progress | None = None,
 ) -> Flattening:
     """Flatten a triangle mesh of any topology conformally, one disk per connected component.
@@ -114,6 +116,8 @@ def flatten(
         strict: refuse triangles without area, instead of opening them by a tiny perturbation.
         solver: what factorizes: "pardiso", "scikit-sparse", "cholespy", "scipy", or "amg", which iterates and
             needs little memory; "auto" takes the fastest that is installed.
+        charts: "one" lays every component out as a single disk, which may overlap itself, as the paper does; "atlas"
+            moves its seams, and cuts where it must, so that nothing overlaps.
         progress: called with the name of each stage and the fraction of triangles done.
 
     Raises:
@@ -146,6 +150,7 @@ def flatten(
         repair=repair,
         strict=strict,
         solver=solver,
+        charts=charts,
     )
     stages = Stages(progress)
     with stages("check"):
@@ -166,7 +171,7 @@ def _flatten_components(prepared: Prepared, options: Options, stages: Stages) ->
                 raise
             where = f"in the component of vertex {part.wishes.names[0]} ({len(part.faces):,} triangles)"
             raise type(error)(f"{where}: {error}") from error
-        stages.done += stages.share
+        stages.end_part()
     return pieces
 
 
@@ -178,10 +183,28 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
         if not len(unheld) or not pursues(part.mesh, options) or options.metric != "exact":
             break
         part = replace(part, wishes=part.wishes.without(unheld))
+    if options.charts == "atlas":
+        with stages("atlas", 1.0):
+            laid_out = _without_overlaps(laid_out)
     notes = _missed_distortion(laid_out, part, options)
     if options.metric == "exact":
         notes += shortfalls(laid_out, part.wishes.names)
     return replace(laid_out, notes=laid_out.notes + notes)
+
+
+def _without_overlaps(laid_out: LaidOut) -> LaidOut:
+    """Return the layout split, as little as can be, into charts that do not overlap themselves."""
+    mesh = laid_out.mesh
+    ends = mesh.vertices[mesh.edges]
+    lengths = np.sqrt(dots(ends[:, 1] - ends[:, 0], ends[:, 1] - ends[:, 0]))
+    charts = injective_charts(mesh, laid_out.points, laid_out.corners, lengths)
+    return replace(
+        laid_out,
+        points=charts.points,
+        corners=charts.corners,
+        chart=charts.chart,
+        seams=mesh.edges[Seams(mesh, charts).edges],
+    )
 
 
 def _missed_distortion(laid_out: LaidOut, part: Component, options: Options) -> tuple[str, ...]:
@@ -276,7 +299,7 @@ def _lay_out(
         seams = find_seams(mesh, solution.cones, part.lengths.ravel()[mesh.edge_halfedges[:, 0]], forbidden)
         disk = cut_open(mesh, seams).mesh
 
-    with stages("layout", 1.0):
+    with stages("layout", 0.95):
         laid_out = metric.lay_out(disk, seams)
         linear, reached = (
             area_distortion(phi, weighted_areas(surface.areas, part.wishes.weights))

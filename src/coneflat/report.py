@@ -31,6 +31,8 @@ MEASURES = (
     "seam_mismatch",
     "seam_mismatch_max",
     "seam_motion_mismatch",
+    "overlap",
+    "overlapping_pairs",
 )
 
 
@@ -138,6 +140,11 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
             "degenerate",
             f"{d.degenerate:,}",
             f"without area in the plane; {d.degenerate_input:,} had none before",
+        ),
+        (
+            "overlap",
+            f"{d.overlap:.3g}" if d.overlapping_pairs else "none",
+            f"of the area covered, covered twice; {plural(d.overlapping_pairs, 'pair')} of triangles",
         ),
         ("charts", f"{d.charts:,}", "pieces of the layout"),
         ("seam length", f"{d.seam_length:.3f}", "over the square root of the area"),

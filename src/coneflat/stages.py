@@ -40,7 +40,12 @@ class Stages:
             yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
-        self._within = until if until < 1 else 0.0
+        self._within = until
+
+    def end_part(self) -> None:
+        """Count the part at hand as done."""
+        self.done += self.share
+        self._within = 0.0
 
     def tell(self, detail: str = "") -> None:
         """Tell the listener what is being done, with a detail about the stage."""

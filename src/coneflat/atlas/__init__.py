@@ -1,6 +1,16 @@
 """Charts in the plane: where they overlap."""
 
+from .injective import injective_charts
+from .layout import Layout, Seams
 from .overlap import Overlaps, find_overlaps
-from .regions import overlap_regions
+from .regions import overlap_layers, overlap_regions
 
-__all__ = ["Overlaps", "find_overlaps", "overlap_regions"]
+__all__ = [
+    "Layout",
+    "Seams",
+    "Overlaps",
+    "find_overlaps",
+    "injective_charts",
+    "overlap_layers",
+    "overlap_regions",
+]

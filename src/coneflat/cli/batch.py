@@ -79,7 +79,7 @@ def batch(
     check_combinations(context)
     if jobs is not None and dask is not None:
         raise click.UsageError("the cluster has its own processes: leave out --jobs", context)
-    options = method_keywords(method)
+    options = method_keywords(method, f".{ending}")
     if options.get("weights") is not None and not isinstance(options["weights"], str):
         raise click.UsageError("a file of --weights fits one mesh: name a property, or color", context)
     Options(**options)  # Says what makes no sense before the work.

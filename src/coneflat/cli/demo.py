@@ -29,7 +29,9 @@ def demo(output: Path, quiet: bool) -> None:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise MeshFileError(f"cannot make the folder {output}: {error.strerror}") from error
-    result = run(sample_path(), output / "sample.obj", {}, report=output / "sample.json", quiet=quiet)
+    result = run(
+        sample_path(), output / "sample.obj", {"charts": "atlas"}, report=output / "sample.json", quiet=quiet
+    )
 
     picture = output / "sample.png"
     save_figure(demo_figure(result), picture)

@@ -68,7 +68,7 @@ def flatten(
     from .run import run
 
     check_combinations(context)
-    options = method_keywords(method)
+    options = method_keywords(method, ".obj" if output is None else output.suffix.lower())
     given = parse_vertices("cone", cone, cones_file)
     corners = parse_vertices("corner", corner)
     if given:

@@ -15,6 +15,8 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 QUANTUM_OPTIONS = ("quantise", "correct_handles")
 SEARCH_OPTIONS = ("cones", "epsilon", "max_cones", *PURSUIT_OPTIONS, *QUANTUM_OPTIONS)
 EXACT_OPTIONS = ("at_cones", "boundary", "corner", "best_effort", "refine")
+# Formats of models to be textured, where nothing may overlap.
+TEXTURED = (".obj", ".glb")
 METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "metric", "lengths", *EXACT_OPTIONS)
 
 _BEFORE_SEARCH = (
@@ -84,6 +86,12 @@ _AFTER_SEARCH = (
         help="Exact metric: cut the input's triangles along the flat triangulation's edges; nothing can be inverted.",
     ),
     click.option(
+        "--charts",
+        type=click.Choice(["one", "atlas"]),
+        help="one: a single chart per component, as in the paper, which may overlap itself.  atlas: seams moved, and "
+        "cuts where it must be, so that nothing overlaps.  [default: atlas for .obj and .glb, but one with --paper]",
+    ),
+    click.option(
         "--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces."
     ),
     click.option("--strict", is_flag=True, help="Refuse triangles without area instead of opening them."),
@@ -112,14 +120,18 @@ def method_options(command: Command) -> Command:
     return command
 
 
-def method_keywords(params: Mapping[str, Any]) -> dict[str, Any]:
+def method_keywords(params: Mapping[str, Any], ending: str) -> dict[str, Any]:
     """Return keyword arguments of `coneflat.flatten` from the values of the options.
+
+    ending: of the files to be written.
 
     Raises:
         OptionError: vertices or weights are not what they should be.
         MeshFileError: a file of them cannot be read.
     """
-    general = {name: params[name] for name in ("repair", "strict", "solver")}
+    general = {name: params[name] for name in ("repair", "strict", "solver", "charts")}
+    if general["charts"] is None:
+        general["charts"] = "atlas" if ending in TEXTURED and not params["paper"] else "one"
     if params["paper"]:
         from ..options import PAPER
 

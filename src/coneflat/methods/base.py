@@ -24,6 +24,8 @@ class LaidOut:
         face_origin: (m,) the given face of each of its faces.
         points: (c, 2) points of the plane, model units.
         corners: (m, 3) index into `points` of every triangle corner.
+        chart: (m,) the chart of each triangle, from 0; charts have no points in common and may lie over each other.
+            None for one chart.
         cones: (s,) vertices.
         seams: (k, 2) vertex pairs.
         log_scale: (n,) phi; flat lengths are about l * exp(phi).
@@ -43,6 +45,7 @@ class LaidOut:
     target: FloatArray
     curvature: FloatArray
     figures: SolveFigures
+    chart: IntArray | None = None
     notes: tuple[str, ...] = ()
     rotations: Rotations | None = None
 

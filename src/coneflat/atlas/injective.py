@@ -1,0 +1,55 @@
+"""Charts without overlaps, as few as there can be."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import FloatArray, IntArray
+from ..mesh import TriangleMesh
+from .glue import glue_charts
+from .layout import Layout, Seams
+from .overlap import find_overlaps
+from .split import split_overlaps
+
+# Parts of the area that charts should have at least. Where the cheapest cuts leave several charts, dearer ones that
+# leave larger pieces may leave fewer.
+LEAST_PARTS = (0.0, 0.002, 0.01)
+# Below this part of the area a chart is a sliver.
+SLIVER = 0.001
+
+
+def injective_charts(
+    mesh: TriangleMesh, points: FloatArray, corners: IntArray, lengths: FloatArray
+) -> Layout:
+    """Return a layout of a connected mesh in charts that do not overlap themselves.
+
+    What overlaps is split off by the cheapest cuts, and what was split off is glued on where it fits. Charts are
+    not moved apart.
+
+    Args:
+        mesh: the mesh.
+        points: (u, 2) of the plane, at the mesh's scale.
+        corners: (m, 3) the point of each triangle corner; one disk.
+        lengths: (e,) of the edges, which cuts and seams cost.
+    """
+    whole = Layout(points, corners, np.zeros(len(corners), dtype=np.int64))
+    places = points[corners]
+    sides = places[:, 1:] - places[:, :1]
+    areas = (sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]) / 2
+    pairs = find_overlaps(points, corners).pairs
+    # What an inverted triangle covers is not to be had apart from its neighbours.
+    pairs = pairs[(areas[pairs] > 0).all(axis=1)]
+    if not len(pairs):
+        return glue_charts(mesh, whole, lengths).numbered_anew()
+    found: list[tuple[tuple[int, int, float], int, Layout]] = []
+    for part in LEAST_PARTS:
+        least = part * float(np.abs(areas).sum())
+        chart = split_overlaps(points, corners, lengths[mesh.halfedge_edges], np.abs(areas), pairs, least)
+        layout = glue_charts(mesh, whole.split(chart), lengths).numbered_anew()
+        sizes = np.bincount(layout.chart, weights=np.abs(areas))
+        slivers = int((sizes < SLIVER * sizes.sum()).sum())
+        length = float(lengths[Seams(mesh, layout).edges].sum())
+        found.append(((slivers, len(sizes), length), len(found), layout))
+        if len(sizes) == 1:
+            break
+    return min(found, key=lambda one: one[:2])[2]

@@ -1,0 +1,98 @@
+"""A mesh laid out in charts, and the seams between and within them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import FloatArray, IntArray
+from ..mesh import TriangleMesh, end_corners, label_components
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A layout in charts, which have no points in common and may lie over each other.
+
+    Attributes:
+        points: (u, 2) of the plane.
+        corners: (m, 3) index of a point for each triangle corner.
+        chart: (m,) the chart of each triangle.
+    """
+
+    points: FloatArray
+    corners: IntArray
+    chart: IntArray
+
+    @property
+    def places(self) -> NDArray[np.complex128]:
+        """(u,) the points as complex numbers."""
+        return self.points @ np.array([1, 1j])
+
+    def split(self, chart: IntArray) -> Layout:
+        """Return the layout in other charts, parts of these, with points of their own."""
+        keys = chart[:, None] * len(self.points) + self.corners
+        used, corners = np.unique(keys, return_inverse=True)
+        return Layout(self.points[used % len(self.points)], corners.reshape(-1, 3), chart)
+
+    def joined(self, pairs: IntArray) -> Layout:
+        """Return the layout with pairs of points (k, 2) made one, whichever has the smallest index."""
+        if not len(pairs):
+            return self
+        count = len(self.points)
+        number, label = label_components(count, pairs[:, 0], pairs[:, 1])
+        first = np.full(number, count)
+        np.minimum.at(first, label, np.arange(count))
+        return Layout(self.points, first[label][self.corners], self.chart)
+
+    def numbered_anew(self) -> Layout:
+        """Return the layout without unused points, charts counted from 0."""
+        used, corners = np.unique(self.corners, return_inverse=True)
+        _, chart = np.unique(self.chart, return_inverse=True)
+        return Layout(self.points[used], corners.reshape(-1, 3), chart)
+
+
+class Seams:
+    """The inner edges whose two sides have different points.
+
+    Attributes:
+        edges: (k,) of the mesh.
+        here, there: (k, 2) points at the ends of an edge, as the faces of its two half-edges have them.
+        charts: (k, 2) of these faces.
+    """
+
+    def __init__(self, mesh: TriangleMesh, layout: Layout) -> None:
+        inside = np.flatnonzero(~mesh.is_boundary_edge)
+        halfedges = mesh.edge_halfedges[inside]
+        flat = layout.corners.ravel()
+        here = flat[np.stack(end_corners(halfedges[:, 0]), axis=1)]
+        there = flat[np.stack(end_corners(halfedges[:, 1])[::-1], axis=1)]
+        cut = np.flatnonzero((here != there).any(axis=1))
+        self.edges, self.here, self.there = inside[cut], here[cut], there[cut]
+        self.charts = layout.chart[halfedges[cut] // 3]
+
+    def within(self, *charts: int) -> IntArray:
+        """Return which of the edges have both sides in given charts."""
+        return np.flatnonzero(np.isin(self.charts, charts).all(axis=1))
+
+    def coinciding(self, layout: Layout, chosen: IntArray, tolerance: float) -> IntArray:
+        """Return pairs of points (k, 2) at the ends of chosen edges whose sides lie on each other.
+
+        tolerance: relative to the length of the edge.
+        """
+        here, there = layout.places[self.here[chosen]], layout.places[self.there[chosen]]
+        gap = np.abs(here - there).max(axis=1, initial=0.0)
+        same = gap <= tolerance * np.abs(here[:, 1] - here[:, 0])
+        return np.stack([self.here[chosen][same].ravel(), self.there[chosen][same].ravel()], axis=1)
+
+    def stretches(self, mesh: TriangleMesh) -> IntArray:
+        """Return (k,) the stretch that each edge is part of: a chain between the same two charts, without branches."""
+        at = mesh.edges[self.edges].ravel()
+        low, high = self.charts.min(axis=1), self.charts.max(axis=1)
+        order = np.argsort(at, kind="stable")
+        meet = at[order[1:]] == at[order[:-1]]
+        one, two = order[:-1][meet] // 2, order[1:][meet] // 2
+        goes_on = np.bincount(at, minlength=len(mesh.vertices))[at[order[:-1][meet]]] == 2
+        goes_on &= (low[one] == low[two]) & (high[one] == high[two])
+        return label_components(len(self.edges), one[goes_on], two[goes_on])[1]
