@@ -163,3 +163,37 @@ def renumber(vertices, faces, seed: int = 1):
 def rotation(seed: int = 2):
     q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     return q * np.sign(np.linalg.det(q))
+
+
+def box(cells: int = 4, sides=(1.0, 2.0, 3.0)):
+    """A box with square-cut faces."""
+    steps = np.linspace(0, 1, cells + 1)
+    points, faces, count = [], [], (cells + 1) ** 2
+    for axis in range(3):
+        for end in (0, 1):
+            sheet = np.zeros((cells + 1, cells + 1, 3))
+            sheet[..., axis] = end
+            sheet[..., (axis + 1) % 3], sheet[..., (axis + 2) % 3] = np.meshgrid(steps, steps, indexing="ij")
+            i, j = np.meshgrid(np.arange(cells), np.arange(cells), indexing="ij")
+            q = (len(points) * count + i * (cells + 1) + j).ravel()
+            side = np.concatenate(
+                [np.stack([q, q + cells + 1, q + cells + 2], 1), np.stack([q, q + cells + 2, q + 1], 1)]
+            )
+            points.append(sheet.reshape(-1, 3))
+            faces.append(side if end else side[:, ::-1])
+    vertices, number = np.unique(np.round(np.concatenate(points), 9), axis=0, return_inverse=True)
+    return vertices * np.array(sides), number.ravel()[np.concatenate(faces)]
+
+
+def cylinder(around: int = 24, along: int = 8, height: float = 3.0, caps: bool = False):
+    """A cylinder of radius 1, open or with flat caps of one triangle per side."""
+    points, faces = grid(around, along, wrap=(True, False))
+    angle = 2 * np.pi * points[:, 0]
+    vertices = np.stack([np.cos(angle), np.sin(angle), height * points[:, 1]], axis=1)
+    if not caps:
+        return vertices, faces
+    lids = []
+    for index, level in enumerate((0, 1)):
+        rim = np.flatnonzero(points[:, 1] == level)
+        lids.append(np.stack([rim, np.roll(rim, -1), np.full(around, len(vertices) + index)], axis=1))
+    return np.concatenate([vertices, [[0, 0, 0], [0, 0, height]]]), np.concatenate([faces, *lids])

@@ -78,7 +78,9 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         curvatures=target[cones],
         log_scale=spread([one.log_scale for one in laid_out]),
         curvature_residual=residual,
-        seams=np.concatenate([ids[one.seams] for ids, one in zip(numbers, laid_out, strict=True)]),
+        seams=np.concatenate(
+            [number[prepared.seams], *(ids[one.seams] for ids, one in zip(numbers, laid_out, strict=True))]
+        ),
         distortion=distortion,
         seconds=dict(stages.seconds),
         notes=(*checked.notes, *prepared.notes, *(note for one in laid_out for note in one.notes), *lost),

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 # The angle of a cone for which each triangle around it has room on its straight sides: less than half a turn, as not
 # all of them can be spread alike.
 ROOM = 0.6 * np.pi
+# Up to so many corners of a polyhedron are all made cones. Below so many radians a vertex is none.
+FEW, FLAT = 24, 1e-6
 # How much larger E may get for the sake of rotations along handles.
 DEARER = 1.15
 
@@ -72,7 +74,8 @@ def choose_cones(
     """Return cones with their curvatures and linear log scale; `turned` is asked where these are quantised."""
     mesh = surface.mesh
     if pursues(mesh, options):
-        return _pursued(surface, wishes, options, turned)
+        corners = corners_alone(surface, wishes, options)
+        return _pursued(surface, wishes, options, turned) if corners is None else corners
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     if options.method == "greedy":
         solution = greedy_cones(
@@ -94,6 +97,22 @@ def choose_cones(
         )
         check_feasible(solution.cones, solution.curvatures, wishes.names, advice)
     return solution
+
+
+def corners_alone(surface: Surface, wishes: Wishes, options: Options) -> ConeSolution | None:
+    """Return a polyhedron's corners as cones if they are few: it unfolds without any distortion. Else None."""
+    if options.method != "auto" or options.wishes_cones or options.boundary_kind == "straight":
+        return None
+    mesh, curvature = surface.mesh, surface.curvature
+    corners = np.flatnonzero((np.abs(curvature) > FLAT) & ~mesh.is_boundary_vertex)
+    angles = 2 * np.pi - curvature[corners]
+    most = FEW if options.max_cones is None else min(options.max_cones, FEW)
+    if not 0 < len(corners) <= most or not wishes.is_allowed[corners].all():
+        return None
+    if angles.min() < options.min_cone_angle or angles.max() > (options.max_cone_angle or np.inf):
+        return None
+    given = surface.laplacian, curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
+    return cones_with_curvature(*given, corners, curvature[corners])
 
 
 def _pursued(surface: Surface, wishes: Wishes, options: Options, turned: Turned | None) -> ConeSolution:

@@ -37,6 +37,12 @@ class InputMesh:
         sides: BoolArray = is_polygon_side(self.face_corners, self.source.offsets)[:, [1, 2, 0]]
         return sides
 
+    def corner_texture(self) -> IntArray | None:
+        """Return (m, 3) what tells apart the UVs that a triangle's corners have in the input; None without UVs."""
+        if self.source is None or self.source.texture is None or self.face_corners is None:
+            return None
+        return self.source.texture[self.face_corners]
+
 
 def as_input(mesh: Any, faces: ArrayLike | None = None) -> InputMesh:
     """Return the triangles of whatever the user has.

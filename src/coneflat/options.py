@@ -76,6 +76,8 @@ class Options:
     strict: bool = False
     solver: str = "auto"
     charts: str = "one"
+    seams: ArrayLike | str | None = None
+    sharp_angle: float | None = None
     given_cones: Mapping[int, float | None] = field(init=False, default_factory=dict)
     corners: Mapping[int, float | None] = field(init=False, default_factory=dict)
 
@@ -133,7 +135,33 @@ class Options:
                 if isinstance(getattr(self, name), Mapping):
                     raise OptionError(f"{noun}s are vertices alone, without curvatures: give a list of them")
                 object.__setattr__(self, name, tuple(_given_vertices(noun, getattr(self, name))))
+        self._check_marks()
         self._check_pursuit()
+
+    def _check_marks(self) -> None:
+        """Check what names edges that are to be cut."""
+        if isinstance(self.seams, str):
+            _choice("seams", self.seams, ("input",))
+        elif self.seams is not None:
+            pairs = np.asarray(list(self.seams) if isinstance(self.seams, (set, frozenset)) else self.seams)
+            if not pairs.size:
+                pairs = np.empty((0, 2), dtype=np.int64)
+            if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
+                raise OptionError(
+                    f"seams must be pairs of vertices (k, 2), not of shape {pairs.shape} and type {pairs.dtype}"
+                )
+            object.__setattr__(self, "seams", pairs.astype(np.int64))
+        if self.sharp_angle is not None:
+            object.__setattr__(self, "sharp_angle", _number("sharp_angle", self.sharp_angle))
+            if not 0 < _number("sharp_angle", self.sharp_angle) < math.pi:
+                raise OptionError(
+                    f"the sharp angle must be between 0 and pi, not {self.sharp_angle:g} radians"
+                )
+
+    @property
+    def marks_seams(self) -> bool:
+        """Whether there may be edges that are cut in any case."""
+        return self.seams is not None or self.sharp_angle is not None
 
     def _check_pursuit(self) -> None:
         """Check the options that only a pursuit takes, and those of whole quanta."""
@@ -194,6 +222,8 @@ class Options:
         for name, given in (("cones", values.pop("given_cones")), ("boundary", values.pop("corners"))):
             if not isinstance(values[name], str):
                 values[name] = given
+        if isinstance(self.seams, np.ndarray):
+            values["seams"] = self.seams.tolist()
         values["weights"] = self.weights if isinstance(self.weights, (str, type(None))) else "given"
         return values
 

@@ -70,6 +70,8 @@ def flatten(
     strict: bool = False,
     solver: str = "auto",
     charts: str = "one",
+    seams: ArrayLike | str | None = None,
+    sharp_angle: float | None = None,
     progress: Progress | None = None,
 ) -> Flattening:
     """Flatten a triangle mesh of any topology conformally, one disk per connected component.
@@ -81,7 +83,8 @@ def flatten(
         cones: "pursuit" finds the fewest cones for the area distortion allowed, "greedy" is the paper's search,
             "none" uses none (bounded meshes and tori); vertices get the curvatures that minimise scale
             distortion; a map from vertex to curvature in radians is taken as it is. "auto" is "pursuit",
-            but "none" for components with a prescribed boundary. Vertices are those of the input.
+            but "none" for components with a prescribed boundary, and the corners of polyhedra that have few, which
+            so unfold without distortion. Vertices are those of the input.
         distortion: of the pursuit: the area distortion E allowed in the linear model, the standard deviation of
             the log scale by area.
         cone_count: of the pursuit: a number of cones per component, to be placed for the least distortion, instead.
@@ -118,6 +121,9 @@ def flatten(
             needs little memory; "auto" takes the fastest that is installed.
         charts: "one" lays every component out as a single disk, which may overlap itself, as the paper does; "atlas"
             moves its seams, and cuts where it must, so that nothing overlaps.
+        seams: edges to be cut in any case: (k, 2) pairs of vertices, or "input" for the seams of the file's own UVs.
+            They act like a boundary; where they close curves, the mesh falls into several charts.
+        sharp_angle: edges whose faces' normals differ by more than this are cut, too, radians.
         progress: called with the name of each stage and the fraction of triangles done.
 
     Raises:
@@ -151,6 +157,8 @@ def flatten(
         strict=strict,
         solver=solver,
         charts=charts,
+        seams=seams,
+        sharp_angle=sharp_angle,
     )
     stages = Stages(progress)
     with stages("check"):
@@ -333,7 +341,8 @@ def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, option
     choices = ExactChoices(
         scale_at_cones=options.scale_at_cones,
         boundary=boundary,
-        keep_area=options.boundary_kind != "lengths",
+        # Both sides of a marked seam are to have the same length.
+        keep_area=options.boundary_kind != "lengths" and not options.marks_seams,
         best_effort=options.best_effort,
         refine=options.refine,
         names=wishes.names,

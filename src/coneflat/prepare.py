@@ -6,14 +6,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ._arrays import BoolArray, FloatArray, IntArray
 from .geometry import edge_lengths, mollify
 from .inputs import InputMesh, as_input
+from .marks import marked_edges
 from .mesh import TriangleMesh
 from .numbering import at_unit_size, turn_corners
 from .options import Options
+from .seams import CutMesh, open_along
 from .validation import CheckedMesh, check_mesh
 from .wishes import Wishes, locate_wishes
 
@@ -24,7 +27,7 @@ class Component:
 
     Attributes:
         mesh: the mesh.
-        vertices, faces: (n,), (m,) those of the whole mesh.
+        vertices, faces: (n,), (m,) those of the whole mesh; a vertex of a marked seam may be there several times.
         lengths: (m, 3) side lengths, with which every triangle has area.
         is_diagonal: (m, 3) sides inside a polygon of the input, which should not be cut.
         wishes: what the user says of its vertices.
@@ -46,13 +49,15 @@ class Prepared:
         given: the input.
         checked: the mesh, at a size of about one.
         notes: what was done to triangles without area.
-        components: its connected parts.
+        components: its connected parts, apart also where seams are marked.
+        seams: (k, 2) vertices of the edges marked as seams.
     """
 
     given: InputMesh
     checked: CheckedMesh
     notes: tuple[str, ...]
     components: tuple[Component, ...]
+    seams: IntArray
 
 
 def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
@@ -71,10 +76,18 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
     )
     is_diagonal = turn_corners(checked, ~given.is_side())
     wishes = locate_wishes(checked, options, given)
+    marked = np.empty(0, dtype=np.int64)
+    opened = CutMesh(checked.mesh, np.arange(len(checked.mesh.vertices)))
+    if options.marks_seams:
+        marked = np.flatnonzero(marked_edges(checked, options, given))
+        wishes.keep_off(checked.mesh.edges[marked])
+        opened = open_along(checked.mesh, marked)
 
     def components() -> Iterator[Component]:
-        for part, vertices, part_faces in checked.mesh.split_components():
+        for part, vertices, part_faces in opened.mesh.split_components():
             shape = lengths[part_faces], is_diagonal[part_faces]
-            yield Component(part, vertices, part_faces, *shape, wishes.within(vertices))
+            origin = opened.origin[vertices]
+            yield Component(part, origin, part_faces, *shape, wishes.within(origin))
 
-    return Prepared(given, checked, () if note is None else (note,), tuple(components()))
+    notes = () if note is None else (note,)
+    return Prepared(given, checked, notes, tuple(components()), checked.mesh.edges[marked])

@@ -65,6 +65,14 @@ class Wishes:
         is_allowed[vertices] = False
         return replace(self, is_allowed=is_allowed)
 
+    def keep_off(self, seams: IntArray) -> None:
+        """Raise OptionError if a cone is wished for on seams, given by vertices, that are cut in any case."""
+        for place in (self.cones, self.required):
+            for vertex in place.vertices[np.isin(place.vertices, seams)]:
+                raise OptionError(
+                    f"cone {self.names[vertex]} lies on a seam that is marked, which takes what curvature it needs"
+                )
+
     def within(self, component: IntArray) -> Wishes:
         """Return what is said of a component, numbered there; `component` are its vertices, ascending."""
         return Wishes(

@@ -26,6 +26,7 @@ class MeshFile:
         obj: the text of an OBJ file, from which the output keeps groups, materials and comments.
         properties: what the file says of every vertex besides its position, by name, each (n,): `quality` or
             `red` of a PLY file, say. Colours are 0 to 1.
+        texture: (c,) a number for the UV point that the file gives every corner, if it gives some.
     """
 
     path: Path
@@ -35,3 +36,4 @@ class MeshFile:
     welded: int = 0
     obj: ObjText | None = None
     properties: Mapping[str, FloatArray] = field(default_factory=dict)
+    texture: IntArray | None = None

@@ -8,12 +8,12 @@ import numpy as np
 
 from .._arrays import IntArray
 from ..errors import MetricError
-from ..mesh import TriangleMesh, corner_fans
+from ..mesh import TriangleMesh, corner_fans, sort_by_counting
 
 
 @dataclass(frozen=True, eq=False)
 class CutMesh:
-    """A mesh opened along seams: a topological disk.
+    """A mesh opened along seams.
 
     Attributes:
         mesh: the cut mesh; its faces are those of the mesh before the cut, in the same order.
@@ -34,16 +34,26 @@ def cut_open(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
     Raises:
         MetricError: the seams do not open the mesh to a disk.
     """
-    glued = ~mesh.is_boundary_edge
-    glued[seams] = False
-    count, corners = corner_fans(mesh.faces, *mesh.edge_halfedges[glued].T)
-    origin = np.empty(count, dtype=np.int64)
-    origin[corners] = mesh.faces
-    disk = TriangleMesh(mesh.vertices[origin], corners)
+    cut = open_along(mesh, seams)
+    disk = cut.mesh
     loops = disk.boundary_loops[0]
     if disk.euler_characteristic != 1 or loops != 1:
         raise MetricError(
             f"cutting along {len(seams)} edges leaves no disk: Euler characteristic "
             f"{disk.euler_characteristic}, {loops} boundary loops"
         )
-    return CutMesh(disk, origin)
+    return cut
+
+
+def open_along(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
+    """Return a mesh whose faces are not joined at given edges (k,); vertices are numbered as before, in their order."""
+    glued = ~mesh.is_boundary_edge
+    glued[seams] = False
+    count, fans = corner_fans(mesh.faces, *mesh.edge_halfedges[glued].T)
+    origin = np.empty(count, dtype=np.int64)
+    origin[fans] = mesh.faces
+    order = sort_by_counting(origin, len(mesh.vertices))
+    number = np.empty(count, dtype=np.int64)
+    number[order] = np.arange(count)
+    origin = origin[order]
+    return CutMesh(TriangleMesh(mesh.vertices[origin], number[fans]), origin)

@@ -1,0 +1,76 @@
+"""Edges that the user wants cut in any case."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._arrays import BoolArray, FloatArray, IntArray, dots
+from .errors import OptionError
+from .inputs import InputMesh
+from .mesh import TriangleMesh, end_corners
+from .numbering import turn_corners
+from .options import Options
+from .text import list_some, plural
+from .validation import CheckedMesh
+
+
+def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh) -> BoolArray:
+    """Return (e,) True for inner edges that are to be seams: named, sharp, or seams of the input's own UVs.
+
+    Raises:
+        OptionError: a pair of vertices is no edge; the input has no UVs.
+    """
+    mesh = checked.mesh
+    marked = np.zeros(len(mesh.edges), dtype=bool)
+    if isinstance(options.seams, str):
+        marked |= _seams_of_input(checked, given)
+    elif options.seams is not None:
+        marked[_named(checked, np.asarray(options.seams))] = True
+    if options.sharp_angle is not None:
+        marked |= dihedral_angles(mesh) > options.sharp_angle
+    return marked & ~mesh.is_boundary_edge
+
+
+def dihedral_angles(mesh: TriangleMesh) -> FloatArray:
+    """Return (e,) the angle between the normals of the faces beside each edge, radians; 0 on the boundary."""
+    corners = mesh.vertices[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    one, two = normals[mesh.edge_faces[:, 0]], normals[mesh.edge_faces[:, 1]]
+    across = np.cross(one, two)
+    angles: FloatArray = np.arctan2(np.sqrt(dots(across, across)), dots(one, two))
+    return np.where(mesh.is_boundary_edge, 0.0, angles)
+
+
+def _named(checked: CheckedMesh, pairs: IntArray) -> IntArray:
+    """Return the edges between pairs of the input's vertices."""
+    origin = checked.vertex_origin
+    bound = int(origin.max()) + 1
+    ends = np.sort(origin[checked.mesh.edges], axis=1)
+    keys = ends[:, 0] * bound + ends[:, 1]
+    low, high = pairs.min(axis=1), pairs.max(axis=1)
+    wanted = np.where((low >= 0) & (high < bound), low * bound + high, -1)
+    missing = np.flatnonzero(~np.isin(wanted, keys))
+    if len(missing):
+        names = [f"{a}-{b}" for a, b in pairs[missing[:5]].tolist()]
+        raise OptionError(
+            f"{plural(len(missing), 'seam')} of {len(pairs):,} between vertices that no edge connects: "
+            f"{list_some(names, len(missing))}"
+        )
+    return np.flatnonzero(np.isin(keys, wanted))
+
+
+def _seams_of_input(checked: CheckedMesh, given: InputMesh) -> BoolArray:
+    """Return (e,) True where the sides of an edge have different UVs in the input's file."""
+    texture = given.corner_texture()
+    if texture is None:
+        raise OptionError("the input has no UV coordinates whose seams could be kept")
+    mesh = checked.mesh
+    at = turn_corners(checked, texture)
+    inside = ~mesh.is_boundary_edge
+    one, two = mesh.edge_halfedges.T
+    flat = at.ravel()
+    marked = np.zeros(len(mesh.edges), dtype=bool)
+    tails, heads = (flat[ends] for ends in end_corners(one[inside]))
+    others, those = (flat[ends] for ends in end_corners(two[inside]))
+    marked[inside] = (tails != those) | (heads != others)
+    return marked

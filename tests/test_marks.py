@@ -1,0 +1,123 @@
+"""Seams that the user marks, and sharp edges."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+import coneflat
+from coneflat import errors
+from coneflat.marks import dihedral_angles
+from coneflat.mesh import TriangleMesh
+
+
+def seam_pairs(result):
+    return {tuple(sorted(pair)) for pair in result.seams.tolist()}
+
+
+def test_sharp_edges_take_a_box_apart_into_its_sides():
+    result = coneflat.flatten(*shapes.box(), sharp_angle=1.0)
+    assert result.distortion.charts == 6
+    assert len(result.cones) == 0
+    assert result.distortion.qc_max == pytest.approx(1, abs=1e-9)
+    assert result.distortion.area_std == pytest.approx(0, abs=1e-9)
+    assert len(result.seams) == 12 * 4
+    assert result.distortion.seam_mismatch_max < 1e-12
+
+
+def test_a_closed_cylinder_is_a_strip_and_two_disks():
+    result = coneflat.flatten(*shapes.cylinder(caps=True), sharp_angle=1.0)
+    assert result.distortion.charts == 3
+    assert result.distortion.qc_max == pytest.approx(1, abs=1e-9)
+
+
+def test_named_seams_are_cut_and_act_like_a_boundary():
+    vertices, faces = shapes.torus()
+    mesh = TriangleMesh(vertices, faces)
+    ring = mesh.edges[np.abs(vertices[mesh.edges][:, :, 1]).max(axis=1) < 1e-9]
+    ring = ring[(vertices[ring][:, :, 0] > 0).all(axis=1)]  # one circle around the tube
+    result = coneflat.flatten(vertices, faces, seams=ring, charts="atlas")
+    assert {tuple(sorted(pair)) for pair in ring.tolist()} <= seam_pairs(result)
+    assert result.distortion.charts == 1
+    assert result.distortion.seam_mismatch_max < 1e-9
+    assert result.distortion.flipped == 0
+    # Each vertex of the closed seam has a place on either side.
+    at = [len(np.unique(result.uv_faces[result.faces == vertex])) for vertex in np.unique(ring)]
+    assert min(at) >= 2
+
+
+def test_seams_through_numbers_and_settings():
+    vertices, faces = shapes.box()
+    mesh = TriangleMesh(vertices, faces)
+    sharp = mesh.edges[dihedral_angles(mesh) > 1]
+    by_angle = coneflat.flatten(vertices, faces, sharp_angle=1.0)
+    by_name = coneflat.flatten(vertices, faces, seams=sharp)
+    assert seam_pairs(by_name) == seam_pairs(by_angle)
+    assert by_name.report()["settings"]["seams"] == sharp.tolist()
+    shuffled, turned, new = shapes.renumber(vertices, faces)
+    other = coneflat.flatten(shuffled, turned, seams=new[sharp])
+    assert other.distortion.seam_length == pytest.approx(by_name.distortion.seam_length)
+
+
+def test_dihedral_angles():
+    angles = dihedral_angles(TriangleMesh(*shapes.box(2)))
+    assert np.count_nonzero(np.isclose(angles, np.pi / 2)) == 12 * 2
+    assert np.count_nonzero(np.isclose(angles, 0)) == len(angles) - 24
+    assert (dihedral_angles(TriangleMesh(*shapes.grid())) == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"seams": [[0, 0]]}, "1 seam of 1 between vertices that no edge connects: 0-0"),
+        ({"seams": [[0, 99999], [0, 1]]}, "no edge connects: 0-99999"),
+        ({"seams": [0, 1]}, "pairs of vertices"),
+        ({"seams": [[0.5, 1.0]]}, "pairs of vertices"),
+        ({"seams": "uv"}, "unknown seams"),
+        ({"seams": "input"}, "no UV coordinates"),
+        ({"sharp_angle": 0}, "between 0 and pi"),
+        ({"sharp_angle": "x"}, "sharp_angle must be a number"),
+        ({"charts": "many"}, "unknown charts"),
+    ],
+)
+def test_what_makes_no_sense(options, message):
+    with pytest.raises(errors.OptionError, match=message):
+        coneflat.flatten(*shapes.torus(), **options)
+
+
+def test_a_cone_cannot_lie_on_a_marked_seam():
+    vertices, faces = shapes.torus()
+    edge = TriangleMesh(vertices, faces).edges[:1]
+    with pytest.raises(errors.OptionError, match="lies on a seam"):
+        coneflat.flatten(vertices, faces, seams=edge, required_cones=edge[0, :1])
+
+
+def test_no_seams_change_nothing():
+    one = coneflat.flatten(*shapes.torus())
+    none = coneflat.flatten(*shapes.torus(), seams=[])
+    assert np.array_equal(np.sort(one.cones), np.sort(none.cones))
+
+
+class TestPolyhedra:
+    def test_a_box_unfolds_without_distortion(self):
+        result = coneflat.flatten(*shapes.box(), charts="atlas")
+        assert len(result.cones) == 8
+        assert result.distortion.qc_max == pytest.approx(1, abs=1e-9)
+        assert result.distortion.charts == 1
+        assert result.distortion.overlapping_pairs == 0
+
+    def test_only_where_corners_are_few_and_nothing_else_is_asked(self):
+        assert len(coneflat.flatten(*shapes.box(), cones="pursuit").cones) < 8
+        assert len(coneflat.flatten(*shapes.box(), max_cones=5).cones) <= 5
+        assert len(coneflat.flatten(*shapes.cylinder(40, caps=True)).cones) < 24
+
+    @pytest.mark.parametrize("shape", [(6, 1), (8, 2), (96, 30)])
+    def test_open_cylinders_unroll_to_strips(self, shape):
+        result = coneflat.flatten(*shapes.cylinder(*shape), charts="atlas")
+        assert len(result.cones) == 0
+        assert result.distortion.qc_max == pytest.approx(1, abs=1e-9)
+        # Along the cylinder and no further: the cut is straight.
+        assert result.distortion.seam_length == pytest.approx(
+            3 / np.sqrt(3 * 2 * shape[0] * np.sin(np.pi / shape[0])), rel=1e-6
+        )
