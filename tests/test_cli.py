@@ -202,6 +202,30 @@ def test_help_lists_the_commands(tmp_path):
     assert run(cwd=tmp_path).returncode == 2
 
 
+def test_marked_seams(tmp_path):
+    write_obj(tmp_path / "box.obj", *shapes.box(2))
+    done = run(
+        "flatten", "box.obj", "-o", "six.obj", "--sharp-angle", "60deg", "--report", "r.json", cwd=tmp_path
+    )
+    assert done.returncode == 0
+    assert json.loads((tmp_path / "r.json").read_text())["charts"] == 6
+    (tmp_path / "pairs.txt").write_text("0 1  # an edge\n")
+    assert run("flatten", "box.obj", "-q", "--seams", "pairs.txt", cwd=tmp_path).returncode == 0
+    for text, message in (
+        ("0 x\n", "line 1: '0 x' is not a pair"),
+        ("# none\n", "holds no pairs"),
+        ("0 25", "0-25"),
+    ):
+        (tmp_path / "pairs.txt").write_text(text)
+        done = run("flatten", "box.obj", "-q", "--seams", "pairs.txt", cwd=tmp_path)
+        assert done.returncode == 2
+        assert message in done.stderr
+    done = run("flatten", "box.obj", "-q", "--seams", "pairs.txt", "--keep-seams", cwd=tmp_path)
+    assert "leave out --keep-seams" in done.stderr
+    done = run("flatten", "box.obj", "-q", "--keep-seams", cwd=tmp_path)
+    assert "no UV coordinates" in done.stderr
+
+
 @pytest.mark.parametrize(("ending", "charts"), [("obj", "atlas"), ("glb", "atlas"), ("ply", "one")])
 def test_what_is_to_be_textured_becomes_an_atlas(model, tmp_path, ending, charts):
     for extra, expected in (((), charts), (("--charts", "one"), "one"), (("--paper",), "one")):

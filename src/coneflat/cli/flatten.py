@@ -39,6 +39,11 @@ from .search import place_options
     multiple=True,
     help="Exact metric: a polygon with this boundary vertex as a corner; repeat: four make a rectangle.",
 )
+@click.option(
+    "--seams",
+    type=click.Path(path_type=Path),
+    help="Cut the edges of a text file in any case, two vertices (from 0) on each line.",
+)
 @click.option("--report", type=click.Path(path_type=Path), help="Write all measures to this JSON file.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @click.pass_context
@@ -50,6 +55,7 @@ def flatten(
     cone: tuple[str, ...],
     cones_file: Path | None,
     corner: tuple[str, ...],
+    seams: Path | None,
     weld: bool | None,
     report: Path | None,
     quiet: bool,
@@ -62,9 +68,10 @@ def flatten(
       coneflat flatten horse.ply -o horse.obj
       coneflat flatten hand.obj -o hand.glb --distortion 0.1 --report hand.json
       coneflat flatten part.stl --cone 12 --cone 507 --cone 1044
+      coneflat flatten bracket.stl -o bracket.obj --sharp-angle 40deg
       coneflat flatten sheet.obj -o flat.obj --corner 10 --corner 95 --corner 230 --corner 310
     """
-    from .given import parse_vertices
+    from .given import parse_vertices, read_pairs
     from .run import run
 
     check_combinations(context)
@@ -73,6 +80,12 @@ def flatten(
     corners = parse_vertices("corner", corner)
     if given:
         options["cones"] = given
+    if seams is not None:
+        if method["keep_seams"]:
+            raise click.UsageError(
+                "seams are those of a file or of the input: leave out --keep-seams", context
+            )
+        options["seams"] = read_pairs(seams)
     if corners:
         options["boundary"] = corners
     run(mesh, output, options, weld=weld, report=report, quiet=quiet)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, IntArray
 from ..errors import MeshFileError, OptionError
 from .search import is_file
 
@@ -67,6 +67,26 @@ def read_vertices(option: str, text: str) -> tuple[int, ...]:
         if not re.fullmatch(r"[-+]?[0-9]{1,18}", word):
             raise OptionError(f"{option}: {word!r} is no vertex, and there is no such file")
     return tuple(dict.fromkeys(int(word) for word in words))
+
+
+def read_pairs(path: Path) -> IntArray:
+    """Return (k, 2) the two vertices on each line of a text file.
+
+    Raises:
+        OptionError: a line holds something else.
+        MeshFileError: the file cannot be read.
+    """
+    pairs = []
+    for number, line in enumerate(_lines(path), start=1):
+        text = line.split("#", 1)[0].strip()
+        if not text:
+            continue
+        if not re.fullmatch(r"[0-9]{1,18}(\s*[,;-]\s*|\s+)[0-9]{1,18}", text):
+            raise OptionError(f"{path}, line {number}: {text!r} is not a pair of vertices")
+        pairs.append([int(word) for word in re.findall(r"[0-9]+", text)])
+    if not pairs:
+        raise OptionError(f"{path} holds no pairs of vertices")
+    return np.array(pairs, dtype=np.int64)
 
 
 def read_weights(text: str) -> str | FloatArray:

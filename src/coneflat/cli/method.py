@@ -92,6 +92,13 @@ _AFTER_SEARCH = (
         "cuts where it must be, so that nothing overlaps.  [default: atlas for .obj and .glb, but one with --paper]",
     ),
     click.option(
+        "--sharp-angle",
+        type=Angle(),
+        metavar="ANGLE",
+        help="Cut edges at which the surface bends by more, 40deg say: CAD parts open there.",
+    ),
+    click.option("--keep-seams", is_flag=True, help="Cut where the file's own UV coordinates have seams."),
+    click.option(
         "--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces."
     ),
     click.option("--strict", is_flag=True, help="Refuse triangles without area instead of opening them."),
@@ -132,6 +139,9 @@ def method_keywords(params: Mapping[str, Any], ending: str) -> dict[str, Any]:
     general = {name: params[name] for name in ("repair", "strict", "solver", "charts")}
     if general["charts"] is None:
         general["charts"] = "atlas" if ending in TEXTURED and not params["paper"] else "one"
+    general["sharp_angle"] = params["sharp_angle"]
+    if params["keep_seams"]:
+        general["seams"] = "input"
     if params["paper"]:
         from ..options import PAPER
 
