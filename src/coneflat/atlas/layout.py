@@ -76,12 +76,12 @@ class Seams:
         """Return which of the edges have both sides in given charts."""
         return np.flatnonzero(np.isin(self.charts, charts).all(axis=1))
 
-    def coinciding(self, layout: Layout, chosen: IntArray, tolerance: float) -> IntArray:
+    def coinciding(self, places: NDArray[np.complex128], chosen: IntArray, tolerance: float) -> IntArray:
         """Return pairs of points (k, 2) at the ends of chosen edges whose sides lie on each other.
 
-        tolerance: relative to the length of the edge.
+        places: of all points. tolerance: relative to the length of the edge.
         """
-        here, there = layout.places[self.here[chosen]], layout.places[self.there[chosen]]
+        here, there = places[self.here[chosen]], places[self.there[chosen]]
         gap = np.abs(here - there).max(axis=1, initial=0.0)
         same = gap <= tolerance * np.abs(here[:, 1] - here[:, 0])
         return np.stack([self.here[chosen][same].ravel(), self.there[chosen][same].ravel()], axis=1)

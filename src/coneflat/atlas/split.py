@@ -47,8 +47,9 @@ def split_overlaps(
 
 def as_disk(points: FloatArray, corners: IntArray) -> TriangleMesh:
     """Return triangles of the plane as a mesh of their own, opened where they touch in a point only."""
-    used, faces = np.unique(corners, return_inverse=True)
-    pinched = TriangleMesh(points[used], faces.reshape(-1, 3))
+    is_used = np.zeros(len(points), dtype=bool)
+    is_used[corners] = True
+    pinched = TriangleMesh(points[is_used], (np.cumsum(is_used) - 1)[corners])
     inside = pinched.edge_halfedges[~pinched.is_boundary_edge]
     count, fans = corner_fans(pinched.faces, *inside.T)
     vertices = np.empty((count, 2))
