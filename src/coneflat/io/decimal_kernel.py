@@ -32,7 +32,7 @@ ZERO, NINE, PLUS, MINUS, POINT, LETTER_E, BLANK = (ord(letter) for letter in "09
 @compiled
 def scaled(x: float, rest: float, exponent: int, powers: FloatArray) -> tuple[float, float]:
     """Return (x + rest) * 10^exponent as the sum of two doubles."""
-    high, low = powers[exponent + LARGEST_POWER]
+    high, low = powers[exponent + LARGEST_POWER, 0], powers[exponent + LARGEST_POWER, 1]
     product = x * high
     t = SPLITTER * x
     x1 = t - (t - x)
@@ -67,8 +67,11 @@ def to_decimal(value: float, powers: FloatArray) -> tuple[int, int]:
     if not 1e-60 < value < 1e60:
         return 0, 0
     size = math.floor(math.log10(value))
+    # The logarithm may round to the wrong side.
     if powers[size + LARGEST_POWER, 0] > value:
         size -= 1
+    elif powers[size + 1 + LARGEST_POWER, 0] <= value:
+        size += 1
     for count in (15, 16, 17):
         exponent = size + 1 - count
         product, rest = scaled(value, 0.0, -exponent, powers)

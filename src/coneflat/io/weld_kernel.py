@@ -30,7 +30,7 @@ def number_rows(rows: IntArray, table: NDArray[np.int32]) -> tuple[IntArray, Int
     number = np.empty(len(rows), np.int64)
     count = 0
     for i in range(len(rows)):
-        a, b, c = rows[i]
+        a, b, c = rows[i, 0], rows[i, 1], rows[i, 2]
         key = np.uint64(0)
         for value in (a, b, c):
             key = (key ^ np.uint64(value)) * GOLDEN
