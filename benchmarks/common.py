@@ -5,7 +5,10 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
+
+import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 MODELS = ROOT.parent / "shared" / "meshes"
@@ -28,6 +31,38 @@ def meshes(names: list[str], largest: int) -> Iterator[tuple[str, TriangleMesh]]
         while len(faces) <= largest:
             yield name, check_mesh(vertices, faces).mesh
             vertices, faces = shapes.subdivide(vertices, faces)
+
+
+def cases(names: list[str], largest: int) -> Iterator[tuple[str, int]]:
+    """Yield models and how often they are split."""
+    for name in ("sphere", *names):
+        if name != "sphere" and not list(MODELS.glob(f"{name}.*")):
+            continue
+        count, rounds = len(model(name, 0)[1]), 0
+        while count <= largest:
+            yield name, rounds
+            count, rounds = 4 * count, rounds + 1
+
+
+def model(name: str, rounds: int) -> tuple[np.ndarray, np.ndarray]:
+    if name == "sphere":
+        vertices, faces = shapes.sphere(5)
+    else:
+        source = read_mesh(next(iter(sorted(MODELS.glob(f"{name}.*")))))
+        vertices, faces = source.vertices, source.corners.reshape(-1, 3)
+    for _ in range(rounds):
+        vertices, faces = shapes.subdivide(vertices, faces)
+    return vertices, faces
+
+
+def peak_memory() -> float:
+    """Return the largest memory of this process so far, MB; nan where it cannot be told."""
+    if find_spec("resource") is None:
+        return float("nan")
+    import resource
+
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
 
 
 def best_time(run: Callable[[], object], runs: int) -> float:

@@ -14,14 +14,14 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from importlib.util import find_spec
 
 import numpy as np
-from common import MODELS, best_time, shapes
+from common import best_time, cases, model, peak_memory, shapes
 from scipy.sparse import csc_matrix
 
-from coneflat import Flattening, cotangent_laplacian, cotangents, edge_lengths, flatten, read_mesh
+from coneflat import Flattening, cotangent_laplacian, cotangents, edge_lengths, flatten
 from coneflat.solver import factorize, solving
 from coneflat.solver.ladder import best_for
 
@@ -54,28 +54,6 @@ def main() -> None:
     print_peers([row for row in rows if row["peers"]])
 
 
-def cases(names: list[str], largest: int) -> Iterator[tuple[str, int]]:
-    """Yield models and how often they are split."""
-    for name in ("sphere", *names):
-        if name != "sphere" and not list(MODELS.glob(f"{name}.*")):
-            continue
-        count, rounds = len(model(name, 0)[1]), 0
-        while count <= largest:
-            yield name, rounds
-            count, rounds = 4 * count, rounds + 1
-
-
-def model(name: str, rounds: int) -> tuple[np.ndarray, np.ndarray]:
-    if name == "sphere":
-        vertices, faces = shapes.sphere(5)
-    else:
-        source = read_mesh(next(iter(sorted(MODELS.glob(f"{name}.*")))))
-        vertices, faces = source.vertices, source.corners.reshape(-1, 3)
-    for _ in range(rounds):
-        vertices, faces = shapes.subdivide(vertices, faces)
-    return vertices, faces
-
-
 def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
     """Return the row of a mesh."""
     vertices, faces = model(name, rounds)
@@ -105,16 +83,6 @@ def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
         "memory": peak_memory(),
         "peers": peers(vertices, faces, best) if len(faces) <= largest_of_peers else {},
     }
-
-
-def peak_memory() -> float:
-    """Return the largest memory of this process so far, MB; nan where it cannot be told."""
-    if find_spec("resource") is None:
-        return float("nan")
-    import resource
-
-    unit = 1 if sys.platform == "darwin" else 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
 
 
 def peers(vertices: np.ndarray, faces: np.ndarray, result: Flattening) -> dict[str, float]:

@@ -6,9 +6,13 @@ makes the first flattening of an installation wait for half a minute. The build 
 
 from __future__ import annotations
 
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
 import numpy as np
 
 from ._arrays import FloatArray, IntArray
+from .io import read_mesh
 from .pipeline import flatten
 from .sample import sample_path
 
@@ -17,7 +21,8 @@ TAU = 2 * np.pi
 
 def compile_kernels() -> None:
     """Flatten small meshes of every kind, so that every kernel that flattening uses is compiled."""
-    flatten(sample_path(), charts="atlas")
+    with TemporaryDirectory() as folder:
+        read_mesh(flatten(sample_path(), charts="atlas").save(Path(folder) / "flat.obj"), weld=True)
     flatten(sample_path(), cones="greedy", metric="linear")
     for mesh in (_tube(closed=True), _tube(closed=False)):
         flatten(*mesh)

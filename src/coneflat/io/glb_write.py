@@ -52,7 +52,7 @@ def write_glb(result: Flattening, stream: IO[bytes]) -> None:
 
 def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return (n, 3) unit normals, each the mean of its triangles' by area; (0, 0, 1) where there is none."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    a, b, c = (np.take(vertices, faces[:, k], axis=0) for k in range(3))
     by_face = np.cross(b - a, c - a)
     total = np.stack(
         [np.bincount(faces.reshape(-1), np.repeat(by_face[:, k], 3), len(vertices)) for k in range(3)], axis=1

@@ -23,6 +23,7 @@ class MeshFile:
         corners: (c,) vertex index of every polygon corner, polygon after polygon.
         offsets: (p + 1,) polygon i owns corners[offsets[i]:offsets[i + 1]].
         welded: how many vertices were merged because they lay at the same position.
+        unwelded: (c,) what `corners` was before vertices were merged; None where none were.
         obj: the text of an OBJ file, from which the output keeps groups, materials and comments.
         properties: what the file says of every vertex besides its position, by name, each (n,): `quality` or
             `red` of a PLY file, say. Colours are 0 to 1.
@@ -34,6 +35,7 @@ class MeshFile:
     corners: IntArray
     offsets: IntArray
     welded: int = 0
+    unwelded: IntArray | None = None
     obj: ObjText | None = None
     properties: Mapping[str, FloatArray] = field(default_factory=dict)
     texture: IntArray | None = None

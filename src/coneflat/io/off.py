@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
+from .._arrays import FloatArray, IntArray
 from ..errors import MeshFileError
 from .raw import RawMesh
-from .text import first_unreadable, parse_indices, parse_points, shown
+from .text import TextBlock, same_width, text_blocks
 
 # Texture coordinates, colours and normals follow the position, so that they can be passed over; "4" and
 # "n" change what the position itself is.
 _HEADER = re.compile(rb"(ST)?(C)?(N)?(4)?(n)?OFF\b", re.IGNORECASE)
+_LINE = re.compile(rb"([^\r\n]*)(?:\r\n|[\r\n]|\Z)")
 
 
 def parse_off(path: Path, content: bytes) -> RawMesh:
@@ -23,59 +25,52 @@ def parse_off(path: Path, content: bytes) -> RawMesh:
     Raises:
         MeshFileError: the file is not OFF, is shorter than its header promises, or has text for a number.
     """
-    numbered = [(i + 1, line.partition(b"#")[0].strip()) for i, line in enumerate(content.splitlines())]
-    rows = [(i, line) for i, line in numbered if line]
-    if not rows:
-        raise MeshFileError(f"{path} is not an OFF file: it has nothing but comments")
-    vertex_count, face_count, rows = _header(path, rows)
+    vertex_count, face_count, begin = _header(path, content)
+    points: list[FloatArray] = [np.empty((0, 3))]
+    sizes: list[IntArray] = [np.empty(0, np.int64)]
+    corners: list[IntArray] = [np.empty(0, np.int64)]
+    lines = 0
+    for block in text_blocks(path, content, begin):
+        rows = np.flatnonzero(block.counts)
+        of_vertices, of_faces = np.clip(
+            [vertex_count - lines, vertex_count + face_count - lines], 0, len(rows)
+        )
+        points.append(block.words(rows[:of_vertices]).points())
+        new_sizes, new_corners = _polygons(block, rows[of_vertices:of_faces])
+        sizes.append(new_sizes)
+        corners.append(new_corners)
+        lines += len(rows)
+    if lines < vertex_count:
+        raise MeshFileError(f"{path} ends after {lines} of the {vertex_count} vertices it promises")
+    if lines < vertex_count + face_count:
+        held = lines - vertex_count
+        raise MeshFileError(f"{path} ends after {held} of the {face_count} faces it promises")
+    vertices = np.ascontiguousarray(same_width(points)[:, :3])
+    return RawMesh(vertices, np.concatenate(corners), np.concatenate([[0], *sizes]).cumsum())
 
-    if len(rows) < vertex_count:
-        raise MeshFileError(f"{path} ends after {len(rows)} of the {vertex_count} vertices it promises")
-    vertex_rows = rows[:vertex_count]
-    face_rows = rows[vertex_count : vertex_count + face_count]
-    if len(face_rows) < face_count:
-        raise MeshFileError(f"{path} ends after {len(face_rows)} of the {face_count} faces it promises")
 
-    def bad_vertex(i: int, reason: str) -> NoReturn:
-        raise MeshFileError(f"{path}, line {vertex_rows[i][0]}: {reason}")
-
-    def bad_face(i: int, reason: str) -> NoReturn:
-        raise MeshFileError(f"{path}, line {face_rows[i][0]}: {reason}")
-
-    vertices = np.ascontiguousarray(
-        parse_points([line + b"\n" for _, line in vertex_rows], bad_vertex)[:, :3]
-    )
-    if not face_rows:
-        return RawMesh(vertices, np.empty(0, np.int64), np.zeros(1, np.int64))
-
-    lines = [line for _, line in face_rows]
-    first_words = [line.split(None, 1)[0] for line in lines]
-    try:
-        sizes = np.array(first_words, dtype=np.int64)
-    except (ValueError, OverflowError):
-        i = first_unreadable(first_words, np.int64)
-        bad_face(i, f"{shown(first_words[i])} is not a number of corners")
+def _polygons(block: TextBlock, rows: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the sizes and the corners of the polygons in some lines."""
+    sizes = block.words(rows, stop=1).integers("a number of corners")
     # What follows the corners is a colour, which need not be of whole numbers.
-    trimmed = [
-        line if len(words) == size + 1 else b" ".join(words[: max(size, 0) + 1])
-        for line, size, words in zip(lines, sizes.tolist(), map(bytes.split, lines), strict=True)
-    ]
-    if b"/" in b"".join(trimmed):
-        bad_face(next(i for i, line in enumerate(trimmed) if b"/" in line), "'/' is not part of a number")
-    counts, numbers, _ = parse_indices([line + b"\n" for line in trimmed], bad_face)
-    short = (counts - 1 != sizes) | (sizes < 3)
+    words = block.words(rows, first=1, stop=1 + np.maximum(sizes, 0))
+    corners = words.integers()
+    short = (words.counts != sizes) | (sizes < 3)
     if short.any():
         i = int(np.argmax(short))
+        reason = f"a face of {sizes[i]} corners names {words.counts[i]} vertices"
         if sizes[i] < 3:
-            bad_face(i, f"a face needs at least 3 corners, but has {sizes[i]}")
-        bad_face(i, f"a face of {sizes[i]} corners names {counts[i] - 1} vertices")
-    starts = np.cumsum(counts) - counts
-    return RawMesh(vertices, np.delete(numbers, starts), np.concatenate(([0], np.cumsum(sizes))))
+            reason = f"a face needs at least 3 corners, but has {sizes[i]}"
+        block.fail(int(rows[i]), reason)
+    return sizes, corners
 
 
-def _header(path: Path, rows: list[tuple[int, bytes]]) -> tuple[int, int, list[tuple[int, bytes]]]:
-    """Return the counts of vertices and faces, and the lines behind them."""
-    number, first = rows[0]
+def _header(path: Path, content: bytes) -> tuple[int, int, int]:
+    """Return the counts of vertices and faces, and where the lines behind them begin."""
+    lines = _filled_lines(content)
+    number, first, end = next(lines, (0, b"", 0))
+    if not first:
+        raise MeshFileError(f"{path} is not an OFF file: it has nothing but comments")
     keyword = _HEADER.match(first)
     if keyword:
         if keyword.group(4) or keyword.group(5):
@@ -83,10 +78,8 @@ def _header(path: Path, rows: list[tuple[int, bytes]]) -> tuple[int, int, list[t
         first = first[keyword.end() :].strip()
         if first.upper().startswith(b"BINARY"):
             raise MeshFileError(f"{path} is a binary OFF file, which is not supported; convert it to text")
-    rows = rows[1:]
-    if not first and rows:
-        number, first = rows[0]
-        rows = rows[1:]
+    if not first:
+        number, first, end = next(lines, (number, first, end))
     words = first.split()
     try:
         vertex_count, face_count = int(words[0]), int(words[1])
@@ -96,4 +89,12 @@ def _header(path: Path, rows: list[tuple[int, bytes]]) -> tuple[int, int, list[t
         ) from None
     if vertex_count < 0 or face_count < 0:
         raise MeshFileError(f"{path}, line {number}: a number of vertices or faces is negative")
-    return vertex_count, face_count, rows
+    return vertex_count, face_count, end
+
+
+def _filled_lines(content: bytes) -> Iterator[tuple[int, bytes, int]]:
+    """Yield the number, the text without comment and the end of each line that has any."""
+    for number, line in enumerate(_LINE.finditer(content), 1):
+        text = line[1].partition(b"#")[0].strip()
+        if text:
+            yield number, text, line.end()

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import re
 import struct
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -13,7 +13,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..errors import EmptyMeshError, MeshFileError
 from .raw import COLOURS, RawMesh
-from .text import first_unreadable, shown
+from .text import text_blocks
 
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -55,7 +55,7 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
     if form == "ascii":
         # As an array of doubles the text is read by the same code as the binary forms; doubles hold every
         # index a file can have.
-        content, start, order = _text_values(path, content, start).tobytes(), 0, "<"
+        content, start, order = _text_values(path, content, start), 0, "<"
         elements = [_as_doubles(element) for element in elements]
     else:
         order = "<" if form == "binary_little_endian" else ">"
@@ -67,7 +67,7 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
         wanted = _wanted(path, element)
         try:
             columns, start = _decode(content, start, element, wanted, order)
-        except (_EndOfFile, struct.error) as error:
+        except (_EndOfFile, IndexError, struct.error) as error:
             raise MeshFileError(
                 f"{path} ends before the {element.length} {element.name} elements its header promises"
             ) from error
@@ -176,7 +176,7 @@ def _decode(
                     columns.append(np.full(element.length, lengths[i], dtype=np.int64))
                 columns.append(rows[f"p{i}"].reshape(-1))
             return columns, stop
-    if not lists:
+    if not lists or element.length > len(content):
         raise _EndOfFile
     return _decode_ragged(content, start, element, wanted, order)
 
@@ -206,43 +206,67 @@ def _decode_ragged(
     content: bytes, start: int, element: _Element, wanted: list[int], order: str
 ) -> tuple[list[Column], int]:
     """Return what `_decode` does, of an element whose lists differ in length."""
-    sizes = [np.dtype(p.kind).itemsize for p in element.properties]
-    counters = [struct.Struct(order + _STRUCT[p.count]) if p.count else None for p in element.properties]
-    places: list[list[int]] = [[] for _ in sizes]
-    lengths: list[list[int]] = [[] for _ in sizes]
-    for _ in range(element.length):
-        for i, counter in enumerate(counters):
-            length = 1
-            if counter is not None:
-                length = _length(counter.unpack_from(content, start)[0])
-                start += counter.size
-            places[i].append(start)
-            lengths[i].append(length)
-            start += length * sizes[i]
-        if start > len(content):
-            raise _EndOfFile
     codes = np.frombuffer(content, np.uint8)
+
+    def read(places: IntArray, kind: str) -> Column:
+        every = np.lib.stride_tricks.sliding_window_view(codes, np.dtype(kind).itemsize)
+        return every[places].reshape(-1).view(order + kind)
+
+    rows = np.fromiter(_row_starts(content, start, element, order), np.int64, element.length + 1)
+    if rows[-1] > len(content):
+        raise _EndOfFile
+    places: IntArray = rows[:-1]
     columns: list[Column] = []
-    for i in wanted:
-        counts = np.array(lengths[i], dtype=np.int64)
-        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        first = np.repeat(np.array(places[i], dtype=np.int64), counts) + within * sizes[i]
-        kind = np.dtype(order + element.properties[i].kind)
-        items = codes[first[:, None] + np.arange(sizes[i])].reshape(-1).view(kind)
-        columns += [counts, items] if counters[i] else [items]
-    return columns, start
+    for i, p in enumerate(element.properties):
+        size = np.dtype(p.kind).itemsize
+        lengths: IntArray = np.ones(element.length, np.int64)
+        if p.count:
+            lengths = read(places, p.count).astype(np.int64)
+            places = places + np.dtype(p.count).itemsize
+        if i in wanted:
+            within = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+            items = read(np.repeat(places, lengths) + within * size, p.kind)
+            columns += [lengths, items] if p.count else [items]
+        places = places + lengths * size
+    return columns, int(rows[-1])
 
 
-def _text_values(path: Path, content: bytes, start: int) -> FloatArray:
-    """Return all numbers of a text body."""
-    words = content[start:].split()
-    try:
-        return np.array(words, dtype="<f8")
-    except ValueError as error:
-        bad = words[first_unreadable(words, float)]
-        before = re.split(rb"(?<!\S)" + re.escape(bad) + rb"(?!\S)", content[start:], maxsplit=1)[0]
-        line = len(content[:start].splitlines()) + before.count(b"\n") + 1
-        raise MeshFileError(f"{path}, line {line}: {shown(bad)} is not a number") from error
+def _row_starts(content: bytes, start: int, element: _Element, order: str) -> Iterator[int]:
+    """Yield where each row of an element begins, and where the last ends."""
+    lists: list[tuple[int, Callable[[int], int], int, int]] = []
+    before = 0  # bytes since the last list
+    for p in element.properties:
+        size = np.dtype(p.kind).itemsize
+        if p.count:
+            lists.append(
+                (before, _length_reader(content, order + _STRUCT[p.count]), np.dtype(p.count).itemsize, size)
+            )
+            before = 0
+        else:
+            before += size
+    for _ in range(element.length):
+        yield start
+        for skipped, length, width, size in lists:
+            start += skipped
+            start += width + size * length(start)
+        start += before
+    yield start
+
+
+def _length_reader(content: bytes, form: str) -> Callable[[int], int]:
+    """Return what reads the length of a list at a place."""
+    if form[-1] == "B":  # as in most files, and sooner had
+        return content.__getitem__
+    unpack = struct.Struct(form).unpack_from
+    return lambda place: _length(unpack(content, place)[0])
+
+
+def _text_values(path: Path, content: bytes, start: int) -> bytes:
+    """Return all numbers of a text body, as little-endian doubles."""
+    blocks = text_blocks(path, content, start, comments=False)
+    return b"".join(
+        [block.words(np.arange(len(block.counts))).floats().astype("<f8").tobytes() for block in blocks]
+    )
 
 
 def _as_doubles(element: _Element) -> _Element:
@@ -255,8 +279,8 @@ def _as_doubles(element: _Element) -> _Element:
 
 def _whole(path: Path, corners: Column) -> IntArray:
     """Return corners as integers, which in a text they need not be."""
-    numbers = corners.astype(np.int64)
-    if np.any(numbers != corners):
+    numbers = corners.astype(np.int64, copy=False)
+    if corners.dtype.kind == "f" and np.any(numbers != corners):
         odd = corners[np.argmax(numbers != corners)]
         raise MeshFileError(f"{path}: a face names vertex {odd}, which is not a whole number")
     return numbers

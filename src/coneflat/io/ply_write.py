@@ -45,5 +45,5 @@ def write_ply(result: Flattening, stream: IO[bytes]) -> None:
         "end_header",
     ]
     stream.write(("\n".join(header) + "\n").encode("ascii"))
-    stream.write(vertices.tobytes())
-    stream.write(faces.tobytes())
+    stream.write(vertices.data)
+    stream.write(faces.data)

@@ -7,6 +7,7 @@ import numpy as np
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import DegenerateFaceError, FaceIndexError
 from .ngons import triangulate_ngons
+from .raw import first_bad_corner
 
 #: Part of a quad's area below which one of its halves counts as empty or turned over: far above the
 #: rounding of a collinear corner (about 1e-16), far below any triangle worth having.
@@ -30,7 +31,8 @@ def triangulate(vertices: FloatArray, corners: IntArray, offsets: IntArray) -> t
         offsets: (p + 1,) polygon i owns corners[offsets[i]:offsets[i + 1]].
 
     Returns:
-        (m, 3) vertex indices, in the order of the polygons; (m, 3) index into `corners` of the same.
+        (m, 3) vertex indices, in the order of the polygons; a view of `corners` if all are triangles. (m, 3)
+        index into `corners` of the same.
 
     Raises:
         DegenerateFaceError: a polygon has fewer than 3 corners.
@@ -41,6 +43,8 @@ def triangulate(vertices: FloatArray, corners: IntArray, offsets: IntArray) -> t
     sizes = np.diff(offsets)
     _check(len(vertices), corners, offsets, sizes)
 
+    if len(corners) == 3 * len(sizes):
+        return corners.reshape(-1, 3), np.arange(len(corners)).reshape(-1, 3)
     first_triangle = np.cumsum(sizes - 2) - (sizes - 2)
     face_corners = np.empty((int((sizes - 2).sum()), 3), dtype=np.int64)
 
@@ -73,8 +77,11 @@ def is_polygon_side(face_corners: IntArray, offsets: IntArray) -> BoolArray:
         face_corners: (m, 3) polygon corner at each triangle corner.
         offsets: (p + 1,) where the corners of each polygon begin.
     """
+    sizes = np.diff(offsets)
+    if np.all(sizes == 3):
+        return np.ones(face_corners.shape, dtype=bool)
     polygon = np.searchsorted(offsets, face_corners[:, 0], side="right") - 1
-    sizes = np.diff(offsets)[polygon][:, None]
+    sizes = sizes[polygon][:, None]
     steps = np.abs(face_corners - np.roll(face_corners, -1, axis=1))
     return np.asarray((steps == 1) | (steps == sizes - 1))
 
@@ -83,9 +90,8 @@ def _check(vertex_count: int, corners: IntArray, offsets: IntArray, sizes: IntAr
     if np.any(sizes < 3):
         i = int(np.argmax(sizes < 3))
         raise DegenerateFaceError(f"face {i} has {sizes[i]} corners, but a face needs at least 3")
-    bad = (corners < 0) | (corners >= vertex_count)
-    if bad.any():
-        c = int(np.argmax(bad))
+    c = first_bad_corner(corners, vertex_count)
+    if c is not None:
         i = int(np.searchsorted(offsets, c, side="right")) - 1
         raise FaceIndexError(f"face {i} names vertex {corners[c]}, but there are {vertex_count} vertices")
 

@@ -53,7 +53,7 @@ def read_bytes(path: Path) -> bytes:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise MeshFileError(f"{path} cannot be read: {reason}") from error
-    if not content.strip():
+    if not content or content.isspace():
         raise EmptyMeshError(f"{path} is empty")
     return content
 
@@ -73,13 +73,19 @@ def check_corners(path: Path, mesh: RawMesh) -> None:
     if sizes.min() < 3:
         i = int(np.argmax(sizes < 3))
         raise MeshFileError(f"{path}: face {i} has {sizes[i]} corners, but a face needs at least 3")
-    bad = (mesh.corners < 0) | (mesh.corners >= count)
-    if bad.any():
-        c = int(np.argmax(bad))
+    c = first_bad_corner(mesh.corners, count)
+    if c is not None:
         i = int(np.searchsorted(mesh.offsets, c, side="right")) - 1
         raise FaceIndexError(
             f"{path}: face {i} names vertex {mesh.corners[c]}, but there are {count} vertices, from 0 on"
         )
+
+
+def first_bad_corner(corners: IntArray, vertex_count: int) -> int | None:
+    """Return the first of (c,) corners that names no vertex, if any does."""
+    if corners.min(initial=0) >= 0 and corners.max(initial=-1) < vertex_count:
+        return None
+    return int(np.argmax((corners < 0) | (corners >= vertex_count)))
 
 
 def triangle_offsets(count: int) -> IntArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -68,10 +69,22 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
         raise MeshFileError(
             f"{path} is not a readable {ending[1:].upper()} file: {reason or type(error).__name__}"
         ) from error
-    vertices, corners, welded, properties = mesh.vertices, mesh.corners, 0, mesh.properties
-    if ending in _WELDED_BY_DEFAULT if weld is None else weld:
-        kept, merged = weld_vertices(vertices)
-        welded = len(vertices) - len(kept)
-        vertices, corners = vertices[kept], merged[corners]
-        properties = {name: values[kept] for name, values in properties.items()}
-    return MeshFile(path, vertices, corners, mesh.offsets, welded, mesh.obj, properties)
+    whole = MeshFile(
+        path, mesh.vertices, mesh.corners, mesh.offsets, obj=mesh.obj, properties=mesh.properties
+    )
+    return _welded(whole) if (ending in _WELDED_BY_DEFAULT if weld is None else weld) else whole
+
+
+def _welded(mesh: MeshFile) -> MeshFile:
+    """Return a mesh with vertices at the same position merged."""
+    kept, merged = weld_vertices(mesh.vertices)
+    if len(kept) == len(mesh.vertices):
+        return mesh
+    return replace(
+        mesh,
+        vertices=mesh.vertices[kept],
+        corners=merged[mesh.corners],
+        welded=len(mesh.vertices) - len(kept),
+        unwelded=mesh.corners,
+        properties={name: values[kept] for name, values in mesh.properties.items()},
+    )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
+from .._arrays import FloatArray
 from ..errors import EmptyMeshError, MeshFileError
 from .raw import RawMesh, triangle_offsets
-from .text import parse_points
+from .text import text_blocks
 
 _HEADER_BYTES = 84
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -25,7 +25,7 @@ def parse_stl(path: Path, content: bytes) -> RawMesh:
     """
     promised = int.from_bytes(content[80:84], "little") if len(content) >= _HEADER_BYTES else -1
     needed = _HEADER_BYTES + promised * _TRIANGLE.itemsize
-    is_text = content.lstrip()[:5].lower() == b"solid"
+    is_text = re.match(rb"\s*solid", content, re.IGNORECASE) is not None
     # Binary files may begin with "solid" too, so an exact fit decides before the first word does.
     if promised >= 0 and (len(content) == needed or (len(content) > needed and not is_text)):
         triangles = np.frombuffer(content, _TRIANGLE, promised, _HEADER_BYTES)
@@ -42,18 +42,15 @@ def parse_stl(path: Path, content: bytes) -> RawMesh:
     return RawMesh(points, np.arange(len(points), dtype=np.int64), triangle_offsets(len(points) // 3))
 
 
-def _text_points(path: Path, content: bytes) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def _text_points(path: Path, content: bytes) -> FloatArray:
     """Return (3m, 3) the corners of m triangles."""
-    lines = content.lower().splitlines()
-    stripped = [line.lstrip() for line in lines]
-    rows = [i for i, line in enumerate(stripped) if line.startswith(b"vertex")]
-    facets = sum(line.startswith(b"facet") for line in stripped)
     if not re.search(rb"(?m)^\s*endsolid", content[-4096:].lower()):
         raise MeshFileError(f"{path} ends early: the last line of an STL text, 'endsolid', is missing")
-    if len(rows) != 3 * facets:
-        raise MeshFileError(f"{path} has {facets} facets but {len(rows)} vertices; three each are needed")
-
-    def bad_vertex(i: int, reason: str) -> NoReturn:
-        raise MeshFileError(f"{path}, line {rows[i] + 1}: {reason}")
-
-    return parse_points([stripped[i][len(b"vertex") :] + b"\n" for i in rows], bad_vertex)
+    facets, points = 0, []
+    for block in text_blocks(path, content):
+        facets += len(block.beginning_with(b"facet"))
+        points.append(block.words(block.beginning_with(b"vertex"), first=1).points()[:, :3])
+    vertices = np.concatenate(points)
+    if len(vertices) != 3 * facets:
+        raise MeshFileError(f"{path} has {facets} facets but {len(vertices)} vertices; three each are needed")
+    return vertices

@@ -32,8 +32,21 @@ class SplitMesh(NamedTuple):
 
 def split_at_seams(result: Flattening) -> SplitMesh:
     """Return the mesh of a result, split; in the order of its vertices, those without a face left out."""
-    pairs = result.faces.astype(np.int64) * len(result.uv) + result.uv_faces
-    kept, faces = np.unique(pairs.reshape(-1), return_inverse=True)
-    own, point = np.divmod(kept, len(result.uv))
+    own, point, faces = _pairs(result.faces.reshape(-1), result.uv_faces.reshape(-1), len(result.uv))
     origin = own if result.vertex_origin is None else result.vertex_origin[own]
     return SplitMesh(result.vertices[own], result.uv[point], faces.reshape(-1, 3), own, origin)
+
+
+def _pairs(vertices: IntArray, points: IntArray, point_count: int) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the vertices and the points of all different pairs, in order, and the number of every pair."""
+    vertex_of = np.full(point_count, -1, dtype=np.int64)
+    vertex_of[points] = vertices
+    if np.array_equal(vertex_of[points], vertices):
+        # Each point has one vertex, as in all layouts of our own: they are fewer than the pairs, and sooner sorted.
+        used = np.flatnonzero(vertex_of >= 0)
+        point = used[np.argsort(vertex_of[used], kind="stable")]
+        number = np.empty(point_count, dtype=np.int64)
+        number[point] = np.arange(len(point))
+        return vertex_of[point], point, number[points]
+    pairs, number = np.unique(vertices * point_count + points, return_inverse=True)
+    return *np.divmod(pairs, point_count), number.reshape(-1)

@@ -1,0 +1,261 @@
+"""Large files: text in blocks, decimals by compiled code, positions merged by hashing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapes
+
+from coneflat import flatten
+from coneflat.errors import ConeflatError, FaceIndexError, MeshFileError
+from coneflat.io import decimals, obj_write, read_mesh, text, write_flattening
+from coneflat.io.decimals import lines_of, read_many
+from coneflat.io.uv_split import split_at_seams
+from coneflat.io.weld import weld
+
+OBJ = (
+    b"\xef\xbb\xbf# C:\\models\\\r\no thing\r\nv 0 0 0\r\n  v 1 0.5 \\\r\n 1e-3 # a \\ b\r\nv 1 1 -0\r\nvt 0 0\r\n"
+    b"vt 1 1\r\nvn 0 0 1\r\n\tf 1/1 2/2 3/1 # first\r\ng one\r\nl 1/1 2/2 # 1/1\r\nf -3//-1 \\\r\n -2//1 -1\r\n"
+    b"v .5 2 nan\r\ng two\r\nvt 2 2\r\nusemtl red\r\nf 4/1/1 3/ 2// 1/2/\r\n# end"
+)
+OFF = (
+    b"COFF # points\r4 3 0\r\r0 0 0 1 0 0\r1 0 0 1 0 0 # red\r\r1 1 0.125 1 0 0\r0 1 0 1 0 0\r"
+    b"3 0 1 2 0.5 0.5 0.5\r# quad\r4 0 1 2 3\r3 3 2 0 red\r"
+)
+PLY = (
+    b"ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n"
+    b"property uchar red\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    b"0 0 0 9\n1 0 0 9\n1 1 -0.0 9\n0 1 1e-300 255\n3 0 1 2\n4 0 1 2 3\n"
+)
+STL = (
+    b"solid vertex facet\nFACET normal 0 0 1\n outer loop\n  Vertex 0 0 0\n\tVERTEX 1 0 0\n vertex 1 1 1e0\n"
+    b" endloop\nendfacet\nfacet\nvertex 1 1 1\nvertex 1 0 0\nvertex 2 2 2\nendfacet\nendsolid vertex\n"
+)
+NOT_PLAIN = [
+    "", "1 2", "x", "1e", "1e+", "1-2", "--1", "1..2", ".", "e5", "+", "nan", "inf", "1_0", "0x1", "1e5x", "1\x002",
+    "9007199254740993", "1234567890123456789", "1e300", "1e-320", "1e99999999999999999999",
+]  # fmt: skip
+TEXTS = {".obj": OBJ, ".off": OFF, ".ply": PLY, ".stl": STL}
+
+
+def written(folder, name, content):
+    path = folder / name
+    path.write_bytes(content)
+    return path
+
+
+@pytest.fixture(params=[1, 17, 100])
+def small_blocks(request, monkeypatch):
+    """Blocks of a line or some, and compiled code for every number."""
+    monkeypatch.setattr(text, "BLOCK_BYTES", request.param)
+    monkeypatch.setattr(text, "MANY", 1)
+
+
+class TestBlocks:
+    @pytest.fixture
+    def whole(self, tmp_path):
+        """Read before any test makes the blocks small."""
+        return {
+            name: read_mesh(written(tmp_path, "whole" + name, content)) for name, content in TEXTS.items()
+        }
+
+    @pytest.mark.parametrize("ending", TEXTS)
+    def test_of_any_size_give_the_same(self, tmp_path, whole, small_blocks, ending):
+        mesh, expected = read_mesh(tmp_path / ("whole" + ending)), whole[ending]
+        for name in ("vertices", "corners", "offsets"):
+            assert getattr(mesh, name).tobytes() == getattr(expected, name).tobytes(), name
+        assert mesh.welded == expected.welded
+        assert mesh.properties.keys() == expected.properties.keys()
+        if ending == ".obj":
+            assert mesh.obj.gaps == {place: gap for place, gap in expected.obj.gaps.items() if gap}
+            np.testing.assert_array_equal(mesh.obj.normals, expected.obj.normals)
+            assert mesh.obj.newline == b"\r\n"
+
+    def test_obj_is_read_as_meant(self, whole):
+        mesh = whole[".obj"]
+        np.testing.assert_array_equal(mesh.vertices, [[0, 0, 0], [1, 0.5, 1e-3], [1, 1, 0], [0.5, 2, np.nan]])
+        assert mesh.corners.tolist() == [0, 1, 2, 0, 1, 2, 3, 2, 1, 0]
+        assert mesh.obj.normals.tolist() == [0, 0, 0, -1, 1, 0, 1, 0, 0, 0]
+        assert mesh.obj.gaps[1] == b"# first\r\ng one\r\nl 1 2 # 1/1\r\n"
+        assert mesh.obj.gaps[2] == b"v .5 2 nan\r\ng two\r\nusemtl red\r\n"
+        assert b"vt" not in b"".join(mesh.obj.gaps.values())
+
+    @pytest.mark.parametrize(
+        ("ending", "old", "new", "message"),
+        [
+            (".obj", b"f 4/1/1", b"f x/1/1", "line 19: 'x/1/1' is not a number"),
+            (".obj", b"f 4/1/1", b"f 5/1/1", "line 19: a face names vertex 5"),
+            (".obj", b"v .5 2", b"v .5.2 2", "line 15: '.5.2' is not a number"),
+            (".obj", b"-2//1 -1", b"-2//1 -9", "line 13: a face names vertex -9"),
+            (".off", b"3 3 2 0", b"3 3 2 0x0", "line 12: '0x0' is not a number"),
+            (".off", b"3 3 2 0", b"3.0 3 2 0", "line 12: '3.0' is not a number of corners"),
+            (".off", b"3 3 2 0", b"3 3 2", "line 12: 'red' is not a number"),
+            (".off", b"1 1 0.125", b"1 1 0_125", "line 7: '0_125' is not a number"),
+            (".ply", b"4 0 1 2 3", b"4 0 1 2 #", "line 16: '#' is not a number"),
+            (".stl", b"vertex 2 2 2", b"vertex 2 2 2x", "line 12: '2x' is not a number"),
+            (".stl", b"vertex 2 2 2", b"vertex2 2 2 2", "2 facets but 5 vertices"),
+        ],
+    )
+    def test_bad_words_are_named_with_their_lines(self, tmp_path, small_blocks, ending, old, new, message):
+        assert old in TEXTS[ending]
+        with pytest.raises((MeshFileError, FaceIndexError)) as caught:
+            read_mesh(written(tmp_path, "bad" + ending, TEXTS[ending].replace(old, new)))
+        assert message in str(caught.value)
+
+    def test_numbers_of_points_may_differ(self, tmp_path, small_blocks):
+        body = b"v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 %s\nf 1 2 3\n"
+        assert "red" in read_mesh(written(tmp_path, "a.obj", body % b"0 1 0")).properties
+        mesh = read_mesh(written(tmp_path, "b.obj", body % b""))
+        assert mesh.vertices.shape == (3, 3)
+        assert not mesh.properties
+
+
+class TestDecimals:
+    @staticmethod
+    def samples():
+        rng = np.random.default_rng(5)
+        bits = rng.integers(0, 2**63, 90_000).view(np.float64)
+        return {
+            "uniform": rng.random(30_000),
+            "of six digits": np.round(rng.normal(size=30_000), 6),
+            "single": rng.normal(size=30_000).astype(np.float32).astype(np.float64),
+            "of all sizes": bits[(bits > 1e-59) & (bits < 1e59)][:15_000] * rng.choice([-1, 1], 15_000),
+            "whole": rng.integers(-(10**7), 10**7, 30_000).astype(np.float64),
+            "special": np.tile(
+                [0.0, -0.0, 1e16, 1e15, 9999999999999998.0, 1e-4, 9.9e-5, 1e22, 0.1, 2 / 3], 3000
+            ),
+        }
+
+    def test_are_as_python_has_them(self):
+        for name, numbers in self.samples().items():
+            rows = numbers.reshape(-1, 3)
+            lines = ("v %r %r %r\n" * len(rows)) % tuple(numbers.tolist())
+            if name != "of all sizes":
+                assert b"".join(lines_of(b"v", rows, b"\n")) == lines.encode(), name
+            for form in (lines.replace("v", " "), " ".join(f"{number:.8e}" for number in numbers)):
+                read = read_many((form + "\n").encode(), len(numbers))
+                expected = np.array([float(word) for word in form.split()])
+                assert read is None or read.tobytes() == expected.tobytes(), name
+                # Rounding is in doubt for numbers of many digits before the point, if at all.
+                assert read is not None or name == "of all sizes"
+
+    def test_are_read_as_written(self):
+        """Among numbers of all sizes there are some of which others write a digit less."""
+        numbers = self.samples()["of all sizes"]
+        powers_of_two = np.ldexp(1.0, np.arange(-190, 190))
+        for values in (numbers, powers_of_two, np.nextafter(powers_of_two, 0)):
+            words = b"".join(lines_of(b"", values[:, None], b"\n")).split()
+            assert np.array([float(word) for word in words]).tobytes() == values.tobytes()
+            assert max(map(len, words)) <= 24
+
+    @pytest.mark.parametrize("odd", [np.nan, np.inf, -np.inf, 5e-324, 1e300, -1e-70])
+    def test_odd_numbers_are_written_too(self, odd):
+        rows = np.array([[0.1, 1.0], [odd, 2.0]])
+        expected = f"vt 0.1 1.0\r\nvt {odd!r} 2.0\r\n"
+        assert b"".join(lines_of(b"vt", rows, b"\r\n")) == expected.encode()
+
+    @pytest.mark.parametrize(
+        "word",
+        [
+            "1",
+            "+1",
+            "-1.",
+            ".5",
+            "-.5e1",
+            "5E+3",
+            "00012.5",
+            "1e-70",
+            "0e5",
+            "-0",
+            "-0.0",
+            "123456789012345678",
+        ],
+    )
+    def test_plain_words(self, word):
+        numbers = read_many(f"\t{word} \r\n".encode(), 1)
+        assert numbers.tobytes() == np.array([float(word)]).tobytes()
+
+    @pytest.mark.parametrize("word", NOT_PLAIN)
+    def test_all_else_is_left_to_others(self, word):
+        assert read_many((word + "\n").encode(), 1) is None
+
+    def test_a_number_in_doubt_is_read_all_the_same(self, tmp_path, monkeypatch):
+        monkeypatch.setattr(text, "MANY", 1)
+        body = b"v 9007199254740993 1e-320 1e300\nv 1 0 0\nv 0 1 inf\nf 1 2 3\n"
+        mesh = read_mesh(written(tmp_path, "odd.obj", body))
+        assert mesh.vertices.tolist() == [[9007199254740992.0, 1e-320, 1e300], [1, 0, 0], [0, 1, np.inf]]
+
+
+class TestPly:
+    def test_lists_of_different_lengths(self, tmp_path):
+        header = (
+            "ply\nformat binary_big_endian 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
+            "property float z\nelement face 3\nproperty uchar flag\nproperty list short double weights\n"
+            "property list int ushort vertex_index\nproperty short mark\nend_header\n"
+        )
+        points = np.arange(15, dtype=">f4")
+        faces = [([], [0, 1, 2]), ([0.5], [1, 2, 3, 4]), ([1.5, 2.5, 3.5], [4, 3, 2])]
+        body = b"".join(
+            b"\x07" + np.array([len(w)], ">i2").tobytes() + np.array(w, ">f8").tobytes()
+            + np.array([len(c)], ">i4").tobytes() + np.array(c, ">u2").tobytes() + b"\x00\x01"
+            for w, c in faces
+        )  # fmt: skip
+        content = header.encode() + points.tobytes() + body
+        mesh = read_mesh(written(tmp_path, "lists.ply", content))
+        assert mesh.offsets.tolist() == [0, 3, 7, 10]
+        assert mesh.corners.tolist() == [0, 1, 2, 1, 2, 3, 4, 4, 3, 2]
+        for cut in range(len(header), len(content)):
+            with pytest.raises(ConeflatError):
+                read_mesh(written(tmp_path, "cut.ply", content[:cut]))
+
+    def test_more_promised_than_there_could_be(self, tmp_path):
+        header = PLY.replace(b"face 2", b"face 2000000000000000")
+        with pytest.raises(MeshFileError, match="ends before the 2000000000000000 face elements"):
+            read_mesh(written(tmp_path, "long.ply", header))
+
+
+def test_welding_agrees_with_sorting():
+    rng = np.random.default_rng(3)
+    points = (
+        rng.integers(-3, 4, (5000, 3)) * np.array([0.25, 1e-30, 1e30]) * rng.choice([-1.0, 1.0], (5000, 3))
+    )
+    points[::97, 1] = np.nan
+    kept, merged = weld(points)
+    distinct, first, number = np.unique(
+        (points + 0.0).view(np.int64), axis=0, return_index=True, return_inverse=True
+    )
+    assert len(kept) == len(distinct) < 400
+    np.testing.assert_array_equal(kept, np.sort(first))
+    np.testing.assert_array_equal(kept[merged], first[number.ravel()])
+    assert all(len(part) == 0 for part in weld(np.empty((0, 3))))
+
+
+@pytest.fixture(scope="module")
+def flat():
+    return flatten(*shapes.sphere(2))
+
+
+class TestWriting:
+    def test_faces_at_a_time_do_not_matter(self, flat, tmp_path, monkeypatch):
+        whole = write_flattening(flat, tmp_path / "whole.obj").read_bytes()
+        monkeypatch.setattr(obj_write, "_FACES", 7)
+        monkeypatch.setattr(decimals, "_ROWS", 5)
+        assert write_flattening(flat, tmp_path / "parts.obj").read_bytes() == whole
+        assert whole.count(b"\n") == len(flat.vertices) + len(flat.uv) + len(flat.faces)
+        again = read_mesh(tmp_path / "parts.obj")
+        assert again.vertices.tobytes() == flat.vertices.tobytes()
+        np.testing.assert_array_equal(again.corners.reshape(-1, 3), flat.faces)
+
+    def test_points_of_several_vertices_are_split_as_those_of_one(self, flat):
+        """The pairs of vertex and point are the same, whether or not two vertices share a point."""
+        shared = replace(flat, uv_faces=flat.uv_faces % 50)
+        for result in (flat, shared):
+            split = split_at_seams(result)
+            pairs = {*zip(result.faces.ravel().tolist(), result.uv_faces.ravel().tolist(), strict=True)}
+            point_of = {tuple(point): i for i, point in enumerate(result.uv.tolist())}
+            points = [point_of[tuple(point)] for point in split.uv.tolist()]
+            assert [*zip(split.own.tolist(), points, strict=True)] == sorted(pairs)
+            np.testing.assert_array_equal(split.own[split.faces], result.faces)
+            np.testing.assert_array_equal(split.uv[split.faces], result.uv[result.uv_faces])
