@@ -35,7 +35,7 @@ def main() -> None:
     }
     methods |= {name: call for name, call in (("xatlas", xatlas), ("uvunwrap", uvunwrap)) if find_spec(name)}
     print(
-        "| model | triangles | method | charts | seam length | QC | area std | flipped | overlapping pairs | packed | s |"
+        "| model | triangles | method | charts | seam length | QC | area std | flipped | overlaps | packed | s |"
     )
     print("| --- " * 11 + "|")
     flatten(*shapes.sphere(2), charts="atlas")
@@ -53,9 +53,8 @@ def main() -> None:
             print(row(name, mesh, method, found, packed, seconds), flush=True)
     for method, values in sums.items():
         charts, length, qc, std, packed = np.mean(values, axis=0)
-        print(
-            f"| mean of {len(values)} | | {method} | {charts:.1f} | {length:.2f} | {qc:.4f} | {std:.3f} | | | {packed:.2f} | |"
-        )
+        means = f"{charts:.1f} | {length:.2f} | {qc:.4f} | {std:.3f} | | | {packed:.2f} | |"
+        print(f"| mean of {len(values)} | | {method} | {means}")
 
 
 def models(names: list[str], largest: int) -> list[tuple[str, TriangleMesh]]:

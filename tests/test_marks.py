@@ -121,3 +121,29 @@ class TestPolyhedra:
         assert result.distortion.seam_length == pytest.approx(
             3 / np.sqrt(3 * 2 * shape[0] * np.sin(np.pi / shape[0])), rel=1e-6
         )
+
+
+@pytest.mark.parametrize("ending", ["obj", "glb"])
+def test_seams_of_the_input_are_kept(tmp_path, ending):
+    vertices, faces = shapes.sphere(2)
+    first = coneflat.flatten(vertices, faces, charts="atlas")
+    path = first.save(tmp_path / f"first.{ending}")
+    again = coneflat.flatten(path, seams="input")
+    # As sets of positions: a GLB has a vertex for every place.
+    assert len(again.seams) == len(first.seams)
+    middles = [np.sort(r.vertices[r.seams].mean(axis=1), axis=0) for r in (first, again)]
+    assert np.allclose(*middles, atol=1e-6)
+    assert again.distortion.charts == 1
+    assert len(again.cones) <= len(first.cones)
+
+
+def test_relative_texture_indices(tmp_path):
+    """Of two quads that share an edge, the second repeats the UVs of the first there, or has its own."""
+    head = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\n"
+    first = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/-4 2/-3 3/-2 4/-1\n"
+    joined = "vt 2 0\nvt 2 1\nf 2/-5 5/-2 6/-1 3/-4\n"
+    apart = "vt 0 0\nvt 0 1\nvt 2 0\nvt 2 1\nf 2/-4 5/-2 6/-1 3/-3\n"
+    for second, count in ((joined, 0), (apart, 1)):
+        path = tmp_path / "quads.obj"
+        path.write_text(head + first + second)
+        assert len(coneflat.flatten(path, seams="input").seams) == count

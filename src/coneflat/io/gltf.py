@@ -52,7 +52,10 @@ def parse_gltf(path: Path, content: bytes) -> RawMesh:
     joined = np.concatenate(faces)
     if not len(joined):
         raise EmptyMeshError(f"{path} has no faces")
-    return RawMesh(np.concatenate(vertices), joined.reshape(-1), triangle_offsets(len(joined)))
+    corners = joined.reshape(-1)
+    # A vertex is repeated wherever its UVs differ.
+    texture = corners if b"TEXCOORD_0" in content else None
+    return RawMesh(np.concatenate(vertices), corners, triangle_offsets(len(joined)), texture=texture)
 
 
 def _placement(nodes: dict[str, dict[str, Any]], frame: str) -> FloatArray:

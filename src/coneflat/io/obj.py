@@ -66,17 +66,23 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
     sizes: list[IntArray] = []
     corners: list[IntArray] = []
     normals: list[IntArray | None] = []
+    textures: list[IntArray | None] = []
     gaps: defaultdict[int, list[bytes]] = defaultdict(list)
-    vertex_count = face_count = 0
+    vertex_count = face_count = uv_count = 0
     for block in text_blocks(path, content, continued=True):
         kinds = _KINDS[block.heads()]
         points.append(block.words(np.flatnonzero(kinds == _VERTEX), first=1).points())
-        counts, given, normal = _faces(block, kinds)
+        counts, given, texture, normal = _faces(block, kinds)
         above = vertex_count + np.cumsum(kinds == _VERTEX)[kinds == _FACE]
         # A negative number counts back from the vertices that stand above the face.
         corners.append(np.where(given < 0, np.repeat(above, counts) + given, given - 1))
         sizes.append(counts)
         normals.append(normal)
+        if texture is not None:
+            above = uv_count + np.cumsum(kinds == _TEXTURE)[kinds == _FACE]
+            texture = np.where(texture < 0, np.repeat(above, counts) + texture, texture - 1)
+        textures.append(texture)
+        uv_count += int(np.count_nonzero(kinds == _TEXTURE))
         for polygon, text in _texts(block, kinds, newline):
             gaps[face_count + polygon].append(text)
         vertex_count += len(points[-1])
@@ -94,17 +100,20 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
         offsets=np.concatenate([[0], *sizes]).cumsum(),
         obj=ObjText(
             gaps={polygon: b"".join(texts) for polygon, texts in gaps.items()},
-            normals=_all_normals(normals, corners),
+            normals=_of_all_corners(normals, corners),
             newline=newline,
         ),
         properties=dict(colours),
+        texture=_of_all_corners(textures, corners),
     )
     _check_corners(path, content, mesh)
     return mesh
 
 
-def _faces(block: TextBlock, kinds: NDArray[np.uint8]) -> tuple[IntArray, IntArray, IntArray | None]:
-    """Return (p,) sizes of the polygons in a block, (c,) the vertex numbers and the normals of their corners."""
+def _faces(
+    block: TextBlock, kinds: NDArray[np.uint8]
+) -> tuple[IntArray, IntArray, IntArray | None, IntArray | None]:
+    """Return (p,) sizes of a block's polygons, (c,) vertex numbers, UVs and normals of their corners."""
     rows = np.flatnonzero(kinds == _FACE)
     words = block.words(rows, first=1)
     if len(rows) and words.counts.min() < 3:
@@ -134,8 +143,8 @@ def _texts(block: TextBlock, kinds: NDArray[np.uint8], newline: bytes) -> Iterat
         yield int(polygons[runs[i]]), text
 
 
-def _all_normals(blocks: list[IntArray | None], corners: list[IntArray]) -> IntArray | None:
-    """Return the normals of all blocks, 0 where there is none; None where no block has one."""
+def _of_all_corners(blocks: list[IntArray | None], corners: list[IntArray]) -> IntArray | None:
+    """Return the numbers of all blocks, 0 for blocks without; None where no block has some."""
     if all(block is None for block in blocks):
         return None
     return np.concatenate(

@@ -24,7 +24,7 @@ COLOURS = ("red", "green", "blue")
 class RawMesh(NamedTuple):
     """The content of a mesh file: (n, 3) vertices, (c,) corners, (p + 1,) offsets, and what else it has.
 
-    That is an OBJ file's text, and numbers that it gives each vertex, by name.
+    That is an OBJ file's text, numbers that it gives each vertex, by name, and (c,) a number for each corner's UVs.
     """
 
     vertices: FloatArray
@@ -32,6 +32,7 @@ class RawMesh(NamedTuple):
     offsets: IntArray
     obj: ObjText | None = None
     properties: Mapping[str, FloatArray] = MappingProxyType({})
+    texture: IntArray | None = None
 
 
 def read_bytes(path: Path) -> bytes:

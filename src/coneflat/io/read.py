@@ -70,7 +70,13 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
             f"{path} is not a readable {ending[1:].upper()} file: {reason or type(error).__name__}"
         ) from error
     whole = MeshFile(
-        path, mesh.vertices, mesh.corners, mesh.offsets, obj=mesh.obj, properties=mesh.properties
+        path,
+        mesh.vertices,
+        mesh.corners,
+        mesh.offsets,
+        obj=mesh.obj,
+        properties=mesh.properties,
+        texture=mesh.texture,
     )
     return _welded(whole) if (ending in _WELDED_BY_DEFAULT if weld is None else weld) else whole
 

@@ -187,18 +187,18 @@ class Words:
         numbers = _numbers(self._text, int(self.counts.sum()), np.int64)
         return self._blame(_INTEGER, what) if numbers is None else numbers
 
-    def corners(self) -> tuple[IntArray, IntArray | None]:
+    def corners(self) -> tuple[IntArray, IntArray | None, IntArray | None]:
         """Return the parts of words `v`, `v/vt`, `v//vn` or `v/vt/vn`.
 
         Returns:
-            (c,) the `v` of every word; (c,) the `vn` of every word, 0 where there is none, or None where no
-            word has one.
+            (c,) the `v` of every word; (c,) the `vt` and `vn` of every word, 0 where there is none, each None
+            where no word has one.
 
         Raises:
             MeshFileError: a word is not of these forms.
         """
         if b"/" not in self._text:
-            return self.integers(), None
+            return self.integers(), None, None
         codes = np.frombuffer(self._text, np.uint8)
         slashes = np.flatnonzero(codes == _SLASH)
         parts = np.diff(np.searchsorted(slashes, _word_starts(codes)), append=len(slashes)) + 1
@@ -214,10 +214,10 @@ class Words:
         if numbers is None or parts.max() > 3:
             self._blame(_CORNER)
         first = np.cumsum(parts) - parts
-        if not np.any(parts == 3):
-            return numbers[first], None
-        normals = np.where(parts == 3, numbers[np.minimum(first + 2, len(numbers) - 1)], 0)
-        return numbers[first], normals
+        texture, normals = (
+            np.where(parts > i, numbers[np.minimum(first + i, len(numbers) - 1)], 0) for i in (1, 2)
+        )
+        return numbers[first], texture if texture.any() else None, normals if normals.any() else None
 
     def _blame(self, form: re.Pattern[bytes], what: str = "a number") -> NoReturn:
         """Raise MeshFileError for the first word that has not a form."""
