@@ -1,0 +1,148 @@
+"""How charts lie in the plane: the best angles to turn them to."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from .._arrays import FloatArray
+from ..errors import OptionError
+from .charts import Charts, read_charts
+from .outline import Outlines
+
+if TYPE_CHECKING:
+    ComplexArray = NDArray[np.complex128]
+
+QUARTER = np.pi / 2
+# Areas that differ by so little, relatively, are the same but for rounding.
+SAME = 1e-9
+
+
+def orient_charts(
+    corner_uv: ArrayLike,
+    chart_of_triangle: ArrayLike | None = None,
+    *,
+    corners: ArrayLike | None = None,
+    up: ArrayLike | None = None,
+) -> FloatArray:
+    """Return (m, 3, 2) charts that lie straight, each turned about the origin and otherwise as it was.
+
+    The rectangle of least area around a chart is parallel to the axes. Without an up direction its long side
+    lies along u and the heavier half of the chart below; with one, of the four ways the chart stands in the one
+    in which the surface rises the most along v.
+
+    Args:
+        corner_uv: (m, 3, 2) the plane's point of every triangle corner, of any number of meshes.
+        chart_of_triangle: (m,) a number from 0 for each triangle; None for one chart.
+        corners: (m, 3, 3) the triangle corners in space; needed for an up direction.
+        up: (3,) the direction in space that should be v.
+
+    Raises:
+        ArrayShapeError, NonFiniteError: arrays do not fit, or are not finite.
+        OptionError: a chart is mirrored, or `up` is no direction, or is given without `corners`.
+    """
+    charts = read_charts(corner_uv, chart_of_triangle)
+    angles = straight_angles(charts, charts.outlines())
+    if up is not None:
+        rise = _mean_rise(charts, corners, up) * np.exp(1j * angles)
+        angles += QUARTER * np.round((QUARTER - np.angle(rise)) / QUARTER)
+    return charts.moved(np.exp(1j * angles))
+
+
+def straight_angles(charts: Charts, outlines: Outlines) -> FloatArray:
+    """Return (k,) the angle that lays each chart straight, its heavier half below."""
+    angles = np.array([straight_angle(outlines.points(c)) for c in range(charts.count)])
+    turned = outlines.times(np.exp(1j * angles)).sides.imag.ravel()
+    start = 2 * outlines.start[:-1]
+    middle = (np.minimum.reduceat(turned, start) + np.maximum.reduceat(turned, start)) / 2
+    height = (charts.corners * np.exp(1j * angles)[charts.chart][:, None]).imag.mean(axis=1)
+    top_heavy = charts.sums(charts.areas * (height - middle[charts.chart])) > 0
+    return angles + np.where(top_heavy, np.pi, 0.0)
+
+
+def straight_angle(points: ComplexArray) -> float:
+    """Return the angle that turns the rectangle of least area around points straight, its long side along u.
+
+    One side of it lies along a side of the convex hull (Freeman and Shapira 1975).
+    """
+    hull = convex_hull(points)
+    directions = np.angle(np.roll(hull, -1) - hull)
+    width, height = _extents(hull, directions)
+    area, longer = width * height, np.maximum(width, height)
+    # Of rectangles of equal area, as around many quadrilaterals, the longest.
+    best = int(np.where(area <= area.min() * (1 + SAME), longer, 0.0).argmax())
+    return float(-directions[best] + (QUARTER if height[best] > width[best] else 0.0))
+
+
+def square_angle(points: ComplexArray) -> float:
+    """Return the angle that turns the smallest square around points straight.
+
+    Between two angles at which the points that touch its sides change, width and height are cosines, whose larger
+    is smallest at an end, or where they are equal.
+    """
+    hull = convex_hull(points)
+    ends = np.unique(np.mod(np.angle(np.roll(hull, -1) - hull), QUARTER))
+    middle = (ends + np.append(ends[1:], ends[0] + QUARTER)) / 2
+    across, along = _spans(hull, middle), _spans(hull, middle + QUARTER)
+    # (across . (cos, sin) = along . (-sin, cos))
+    equal = np.arctan2(along.imag - across.real, across.imag + along.real)
+    angles = np.concatenate([ends, equal])
+    width, height = _extents(hull, angles)
+    return float(-angles[np.maximum(width, height).argmin()])
+
+
+def convex_hull(points: ComplexArray) -> ComplexArray:
+    """Return the corners of the convex hull, counterclockwise; the two ends if the points lie on a line."""
+    points = np.unique(points)
+    if len(points) < 3:
+        return points
+    try:
+        return points[ConvexHull(np.column_stack([points.real, points.imag])).vertices]
+    except QhullError:
+        return points[[0, -1]]
+
+
+def _spans(hull: ComplexArray, angles: FloatArray) -> ComplexArray:
+    """Return the vector from the hull's last corner to its first in each direction."""
+    sides = np.roll(hull, -1) - hull
+    start = np.angle(sides[0])
+    # Corner i + 1 is the farthest in directions between those a quarter turn before side i and side i + 1.
+    directions = np.maximum.accumulate(np.mod(np.angle(sides) - start, 2 * np.pi))
+    directions[0] = 0.0
+
+    def farthest(angle: FloatArray) -> ComplexArray:
+        after = np.searchsorted(directions, np.mod(angle + QUARTER - start, 2 * np.pi), side="right")
+        return hull[after % len(hull)]
+
+    return farthest(angles) - farthest(angles + np.pi)
+
+
+def _extents(hull: ComplexArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the hull's extents along directions and across them."""
+    way = np.exp(1j * angles)
+    width = (np.conj(way) * _spans(hull, angles)).real
+    height = (np.conj(1j * way) * _spans(hull, angles + QUARTER)).real
+    return width, height
+
+
+def _mean_rise(charts: Charts, corners: ArrayLike | None, up: ArrayLike) -> ComplexArray:
+    """Return (k,) the mean gradient of the height over the plane of each chart, times its area.
+
+    The gradient is constant on a triangle; times its area it is a sum over the sides without a division.
+    """
+    direction = np.asarray(up, dtype=np.float64)
+    if direction.shape != (3,) or not np.isfinite(direction).all() or not direction.any():
+        raise OptionError(f"up must be a direction, three numbers that are not all 0, not {up!r}")
+    if corners is None:
+        raise OptionError("an up direction needs the corners of the triangles in space")
+    positions = np.asarray(corners, dtype=np.float64)
+    if positions.shape != (*charts.corners.shape, 3):
+        raise OptionError(f"corners have shape {positions.shape}, not {(*charts.corners.shape, 3)}")
+    height = positions @ (direction / np.abs(direction).max())
+    opposite = charts.corners[:, [2, 0, 1]] - charts.corners[:, [1, 2, 0]]
+    rise = 0.5j * (height * opposite).sum(axis=1)
+    total: ComplexArray = charts.sums(rise.real) + 1j * charts.sums(rise.imag)
+    return total

@@ -1,0 +1,72 @@
+"""Outlines of charts: the sides of their triangles that no other triangle cancels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import BoolArray, IntArray
+from ..mesh import NEXT
+
+
+@dataclass(frozen=True, eq=False)
+class Outlines:
+    """The outlines of k charts.
+
+    Attributes:
+        sides: (s, 2) start and end of each side as complex numbers, in the order of the charts.
+        start: (k + 1,) the first side of each chart.
+    """
+
+    sides: NDArray[np.complex128]
+    start: IntArray
+
+    def __len__(self) -> int:
+        return len(self.start) - 1
+
+    def times(self, factors: NDArray[np.complex128]) -> Outlines:
+        """Return the outlines turned and scaled, each by its complex factor."""
+        return Outlines(self.sides * np.repeat(factors, np.diff(self.start))[:, None], self.start)
+
+    def points(self, chart: int) -> NDArray[np.complex128]:
+        """Return the ends of the sides of a chart."""
+        return self.sides[self.start[chart] : self.start[chart + 1]].ravel()
+
+
+def find_outlines(
+    corners: NDArray[np.complex128], flipped: BoolArray, chart: IntArray, count: int
+) -> Outlines:
+    """Return the outlines of charts; how often one winds around a point is how many triangles cover it.
+
+    Sides that run there and back between the same points cancel; what is left of interior ones, where the two
+    copies of a point differ by rounding, does no harm. Triangles upside down are turned over, so that what they
+    cover counts, too.
+
+    Args:
+        corners: (m, 3) of the triangles.
+        flipped: (m,) True for triangles upside down.
+        chart: (m,) chart of each triangle, below `count`. Every chart has a triangle.
+    """
+    corners = corners + 0.0  # no -0.0: it has other bits
+    corners[flipped] = corners[flipped][:, [0, 2, 1]]
+    kept = _uncancelled(corners, chart).reshape(-1, 3)
+    # A chart all of whose sides cancel has no area: all its sides stand for it.
+    kept |= (np.bincount(chart, weights=kept.any(axis=1), minlength=count) == 0)[chart][:, None]
+    triangle, corner = np.nonzero(kept)
+    order = np.argsort(chart[triangle], kind="stable")
+    triangle, corner = triangle[order], corner[order]
+    sides = np.stack([corners[triangle, corner], corners[triangle, NEXT[corner]]], axis=1)
+    return Outlines(sides, np.searchsorted(chart[triangle], np.arange(count + 1)))
+
+
+def _uncancelled(corners: NDArray[np.complex128], chart: IntArray) -> BoolArray:
+    """Return (3m,) False for sides that run as often one way as the other between their ends, all in one chart."""
+    from .outline_kernel import match_sides
+
+    table = np.full(2 ** int(np.ceil(np.log2(2 * corners.size))), -1, dtype=np.int32)
+    same, ways = np.empty((2, corners.size), dtype=np.int32)
+    match_sides(np.ascontiguousarray(corners).view(np.uint64).reshape(-1, 2), chart, table, same, ways)
+    kept: BoolArray = ways[same] != 0
+    return kept

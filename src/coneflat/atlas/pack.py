@@ -1,0 +1,164 @@
+"""Charts packed into a texture."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import FloatArray, IntArray
+from ..errors import ArrayShapeError, NonFiniteError, OptionError
+from .charts import Charts, read_charts
+from .orient import square_angle, straight_angles
+from .outline import Outlines
+from .search import Packing, pack
+
+ROTATIONS = ("any", "quarter", "none")
+# Angles that a chart is tried at, for so many charts at most; more than that fill each other's gaps in quarter turns.
+TURNS = ((20, 16), (100, 8))
+QUARTERS = 4
+TILES_IN_A_ROW = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Packed:
+    """k charts in a texture.
+
+    Attributes:
+        corner_uv: (m, 3, 2) the point of every triangle corner, in [0, 1]^2; tile i of several is
+            [i % 10, i % 10 + 1] x [i // 10, i // 10 + 1], which is UDIM 1001 + i.
+        scale: UV units per unit of length on the surface, the same for all charts; if no areas were given, per unit of
+            the charts as given.
+        efficiency: area of the charts over that of the tiles. What a chart covers twice counts twice.
+        tile_of_chart: (k,) from 0.
+        angle_of_chart: (k,) that each chart was turned by, radians.
+    """
+
+    corner_uv: FloatArray
+    scale: float
+    efficiency: float
+    tile_of_chart: IntArray
+    angle_of_chart: FloatArray
+
+
+def pack_charts(
+    corner_uv: ArrayLike,
+    chart_of_triangle: ArrayLike | None = None,
+    areas: ArrayLike | None = None,
+    *,
+    resolution: int = 1024,
+    padding: float = 2.0,
+    margin: float | None = None,
+    rotate: str = "any",
+    tiles: int = 1,
+) -> Packed:
+    """Pack charts into a square texture as large as they go, or into several of one scale (UDIM tiles).
+
+    Every chart is turned, moved and scaled, and nothing else. Charts keep their order; those of several meshes
+    may be packed together.
+
+    Args:
+        corner_uv: (m, 3, 2) points of the triangle corners, each chart anywhere in the plane.
+        chart_of_triangle: (m,) a number from 0 for each triangle; None for one chart.
+        areas: (m,) of the triangles on the surface, so that every chart is scaled to the same area per area of
+            surface; None to keep the scales that charts have to each other.
+        resolution: texels along a side of the texture.
+        padding: texels between charts, at least.
+        margin: texels between charts and the border of the texture, at least; None for as many as `padding`.
+        rotate: "any" turns charts so that they fill the texture best, "quarter" so that each lies straight, its
+            long side along u or v, "none" leaves them as they are, see `orient_charts`.
+        tiles: number of textures to distribute charts over. A chart is not cut, so the largest limits the scale.
+
+    Raises:
+        ArrayShapeError, NonFiniteError: arrays do not fit, or are not finite.
+        OptionError: charts are not numbered from 0 without gaps, one is mirrored, an option makes no sense, or so
+            much padding leaves no room for charts.
+    """
+    charts = read_charts(corner_uv, chart_of_triangle)
+    margin = padding if margin is None else margin
+    _check(resolution, padding, margin, rotate, tiles)
+    density = np.ones(charts.count) if areas is None else _densities(charts, areas)
+    outlines = charts.outlines()
+    frame = density * (1.0 if rotate == "none" else np.exp(1j * straight_angles(charts, outlines)))
+    outlines = outlines.times(frame)
+    room = 1.0 - 2.0 * margin / resolution
+    if charts.count == 1:
+        packing = _alone(outlines, rotate)
+    else:
+        sizes = charts.sums(charts.areas) * density**2
+        order = np.lexsort((np.arange(charts.count), -sizes))
+        turns = _turns(charts.count, rotate)
+        angles = np.tile(np.arange(turns) * (2 * np.pi / turns), (charts.count, 1))
+        gap = padding / resolution / room
+        packing = pack(outlines, order, angles, gap, min(tiles, charts.count), refine=turns > QUARTERS)
+
+    scale = room / (packing.side or 1.0)
+    factors = scale * frame * np.exp(1j * packing.angle)
+    border = (1 + 1j) * margin / resolution
+    uv = np.clip(charts.moved(factors, packing.shift * scale + border), 0.0, 1.0)
+    corner = np.stack([packing.tile % TILES_IN_A_ROW, packing.tile // TILES_IN_A_ROW], axis=1)
+    return Packed(
+        corner_uv=uv + corner[charts.chart][:, None],
+        scale=scale,
+        efficiency=float(np.abs(charts.areas * np.abs(factors[charts.chart]) ** 2).sum()) / tiles,
+        tile_of_chart=packing.tile,
+        angle_of_chart=np.angle(factors),
+    )
+
+
+def _densities(charts: Charts, areas: ArrayLike) -> FloatArray:
+    """Return (k,) what each chart is scaled by, so that its area is that of the surface.
+
+    Lines and points, and charts of no area on the surface, are scaled as the others are together.
+    """
+    surface = np.asarray(areas, dtype=np.float64)
+    if surface.shape != charts.chart.shape:
+        raise ArrayShapeError(
+            f"areas have shape {surface.shape}, not {charts.chart.shape}: one for each triangle"
+        )
+    if not np.isfinite(surface).all() or (surface < 0).any():
+        raise NonFiniteError(
+            f"{np.count_nonzero(~(np.isfinite(surface) & (surface >= 0))):,} areas are negative or not finite"
+        )
+    on_surface, in_plane = charts.sums(surface), charts.sums(charts.areas)
+    scalable = charts.has_area & (on_surface > 0)
+    if not scalable.any():
+        return np.ones(charts.count)
+    together = on_surface[scalable].sum() / in_plane[scalable].sum()
+    densities: FloatArray = np.sqrt(
+        np.divide(on_surface, in_plane, out=np.full(charts.count, together), where=scalable)
+    )
+    return densities
+
+
+def _turns(count: int, rotate: str) -> int:
+    """Return how many angles charts are tried at."""
+    if rotate == "any":
+        return next((turns for most, turns in TURNS if count <= most), QUARTERS)
+    return QUARTERS if rotate == "quarter" else 1
+
+
+def _alone(outlines: Outlines, rotate: str) -> Packing:
+    """Return one chart in the middle of the smallest square around it."""
+    angle = square_angle(outlines.points(0)) if rotate == "any" else 0.0
+    points = outlines.points(0) * np.exp(1j * angle)
+    low, high = (complex(pick(points.real), pick(points.imag)) for pick in (np.min, np.max))
+    side = max((high - low).real, (high - low).imag)
+    shift = (side * (1 + 1j) - low - high) / 2
+    return Packing(side, np.array([angle]), np.array([shift]), np.zeros(1, dtype=np.int64))
+
+
+def _check(resolution: int, padding: float, margin: float, rotate: str, tiles: int) -> None:
+    for name, count in (("resolution", resolution), ("tiles", tiles)):
+        if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or count < 1:
+            raise OptionError(f"{name} must be a whole number from 1, not {count!r}")
+    for name, texels in (("padding", padding), ("margin", margin)):
+        is_number = isinstance(texels, (int, float, np.number)) and not isinstance(texels, bool)
+        if not is_number or not 0 <= texels < math.inf:
+            raise OptionError(f"{name} must be a number of texels, 0 or more, not {texels!r}")
+    if rotate not in ROTATIONS:
+        raise OptionError(f"unknown rotate {rotate!r}: choose from {', '.join(ROTATIONS)}")
+    if 2 * margin >= resolution:
+        raise OptionError(f"margins of {margin:g} texels leave nothing of a texture of {resolution} texels")

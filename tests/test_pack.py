@@ -1,0 +1,383 @@
+"""Charts in a texture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import hill, rotation
+
+import coneflat
+from coneflat.atlas import orient_charts, pack_charts
+from coneflat.atlas.charts import read_charts
+from coneflat.atlas.orient import square_angle, straight_angle
+from coneflat.errors import ArrayShapeError, NonFiniteError, OptionError
+
+
+def cross(u, v):
+    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+
+
+def signed_areas(corners):
+    return cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+
+
+def as_complex(corners):
+    return corners[..., 0] + 1j * corners[..., 1]
+
+
+def star(points: int, inner: float, size: float, seed: int = 0):
+    """A fan of triangles around the origin with an uneven rim."""
+    angle = np.pi * np.arange(2 * points) / points
+    radius = size * np.where(np.arange(2 * points) % 2, inner, 1.0)
+    radius *= np.random.default_rng(seed).uniform(0.7, 1.0, 2 * points)
+    rim = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+    return np.stack([np.zeros_like(rim), rim, np.roll(rim, -1, axis=0)], axis=1)
+
+
+def letter_l(size: float):
+    low = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]])
+    return size * np.concatenate([low, low + np.array([1, 0]), low + np.array([0, 1])]).astype(float)
+
+
+def ring(size: float, hole: float = 0.7, around: int = 24):
+    angle = 2 * np.pi * np.arange(around + 1) / around
+    inner, outer = (r * size * np.column_stack([np.cos(angle), np.sin(angle)]) for r in (hole, 1.0))
+    one = np.stack([inner[:-1], outer[:-1], outer[1:]], axis=1)
+    return np.concatenate([one, np.stack([inner[:-1], outer[1:], inner[1:]], axis=1)])
+
+
+def charts_of(*parts):
+    """Several charts as triangle corners, and the chart of each triangle."""
+    return np.concatenate(parts), np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+
+
+def a_few():
+    stars = star(5, 0.4, 1.0), star(7, 0.2, 0.7, 1), star(3, 0.6, 0.5, 2)
+    return charts_of(letter_l(0.3), *stars, letter_l(0.6) + 5, ring(0.8), letter_l(0.2))
+
+
+def without_symmetry():
+    return charts_of(*(star(3 + c % 4, 0.5, 1 + c % 3, c) for c in range(7)))
+
+
+def distance(one, two):
+    """The distance between two sets of triangles; 0 if any of them overlap."""
+    pairs = np.repeat(one, len(two), axis=0), np.tile(two, (len(one), 1, 1))
+    apart, best = np.zeros(len(pairs[0]), dtype=bool), np.inf
+    for first, second in (pairs, pairs[::-1]):
+        way = np.roll(first, -1, axis=1) - first
+        offset = second[:, None] - first[:, :, None]  # of each corner of one from each side of the other
+        apart |= (cross(way[:, :, None], offset) <= 0).all(axis=2).any(axis=1)
+        along = np.clip((offset * way[:, :, None]).sum(-1) / (way**2).sum(-1)[:, :, None], 0, 1)
+        best = min(best, np.linalg.norm(offset - along[..., None] * way[:, :, None], axis=-1).min())
+    return best if apart.all() else 0.0
+
+
+def least_distance(corners, chart):
+    parts = [corners[chart == c] for c in range(chart.max() + 1)]
+    return min(distance(a, b) for i, a in enumerate(parts) for b in parts[:i])
+
+
+def similarity(before, after):
+    """The factor of the similarity that takes one set of points to the other, and what it leaves, relatively."""
+    p, q = (as_complex(each).ravel() - as_complex(each).mean() for each in (before, after))
+    factor = np.vdot(p, q) / np.vdot(p, p)
+    return factor, np.abs(q - factor * p).max() / np.abs(q).max()
+
+
+@pytest.mark.parametrize("rotate", ["any", "quarter", "none"])
+@pytest.mark.parametrize(("resolution", "padding", "margin"), [(1024, 2, None), (256, 7.5, 3), (4096, 0, 0)])
+def test_charts_keep_their_distance(rotate, resolution, padding, margin):
+    corners, chart = a_few()
+    packed = pack_charts(corners, chart, resolution=resolution, padding=padding, margin=margin, rotate=rotate)
+    texels = packed.corner_uv * resolution
+    border = padding if margin is None else margin
+    assert texels.min() >= border - 1e-9
+    assert texels.max() <= resolution - border + 1e-9
+    if padding:
+        assert least_distance(texels, chart) >= padding * (1 - 1e-9)
+    else:
+        # Charts may touch then: those a hair smaller must not.
+        middle = np.stack([texels[chart == c].mean(axis=(0, 1)) for c in range(7)])[chart][:, None]
+        assert least_distance(middle + (texels - middle) * (1 - 1e-9), chart) > 0
+
+
+def test_the_distance_of_these_tests_sees_overlaps_and_gaps():
+    square = letter_l(1.0)[:2]
+    assert distance(square, square + np.array([1.25, 0])) == pytest.approx(0.25)
+    assert distance(square, square + np.array([4, 5])) == pytest.approx(5)
+    assert distance(square, square + np.array([0.9, 0.9])) == 0
+    assert distance(5 * square - 2, square) == 0  # one inside the other
+
+
+@pytest.mark.parametrize("rotate", ["any", "quarter", "none"])
+def test_charts_are_turned_moved_and_scaled_alike_and_nothing_else(rotate):
+    corners, chart = a_few()
+    packed = pack_charts(corners, chart, rotate=rotate)
+    for c in range(7):
+        factor, rest = similarity(corners[chart == c], packed.corner_uv[chart == c])
+        assert rest < 1e-12
+        assert abs(factor) == pytest.approx(packed.scale, rel=1e-12)
+        assert abs(np.exp(1j * packed.angle_of_chart[c]) - factor / abs(factor)) < 1e-12
+    if rotate == "none":
+        np.testing.assert_array_equal(packed.angle_of_chart, 0)
+    assert packed.efficiency == pytest.approx(signed_areas(packed.corner_uv).sum(), rel=1e-12)
+
+
+def test_density_is_uniform():
+    corners, chart = a_few()
+    areas = signed_areas(corners) * np.array([1.0, 9.0, 0.01, 4.0, 2.0, 1.0, 30.0])[chart]
+    packed = pack_charts(corners, chart, areas)
+    uv, surface = (np.bincount(chart, weights=each) for each in (signed_areas(packed.corner_uv), areas))
+    np.testing.assert_allclose(uv / surface, packed.scale**2, rtol=1e-12)
+    assert least_distance(packed.corner_uv * 1024, chart) >= 2 * (1 - 1e-9)
+
+
+def test_charts_without_area_are_scaled_as_the_others_are():
+    line = np.array([[[0, 0], [2, 0], [1, 0]]], dtype=float)
+    point = np.full((1, 3, 2), 7.0)
+    corners, chart = charts_of(letter_l(1.0), line, point, star(4, 0.5, 1.0), star(3, 0.5, 1.0))
+    areas = 4 * signed_areas(corners)
+    areas[chart == 1] = 5.0
+    areas[chart == 4] = 0.0
+    packed = pack_charts(corners, chart, areas)
+    length = np.linalg.norm(packed.corner_uv[chart == 1][0, 1] - packed.corner_uv[chart == 1][0, 0])
+    assert length == pytest.approx(2 * 2 * packed.scale, rel=1e-12)
+    factor, _ = similarity(corners[chart == 4], packed.corner_uv[chart == 4])
+    assert abs(factor) == pytest.approx(2 * packed.scale, rel=1e-12)
+    assert np.ptp(packed.corner_uv[chart == 2], axis=1).max() == 0
+    solid, number = np.unique(chart[(chart != 1) & (chart != 2)], return_inverse=True)
+    assert least_distance(packed.corner_uv[np.isin(chart, solid)] * 1024, number) >= 2 * (1 - 1e-9)
+
+
+def test_nothing_but_points_and_lines():
+    for corners in (np.zeros((4, 3, 2)), np.linspace(0, 1, 12).repeat(2).reshape(4, 3, 2)):
+        for chart in (None, np.arange(4)):
+            packed = pack_charts(corners, chart, np.zeros(4))
+            assert np.isfinite(packed.corner_uv).all()
+            assert packed.corner_uv.min() >= 0
+            assert packed.corner_uv.max() <= 1
+            assert packed.efficiency < 1e-15
+
+
+def test_small_charts_go_into_holes():
+    corners, chart = charts_of(ring(1.0, 0.8, 64), *(letter_l(0.25) for _ in range(4)))
+    packed = pack_charts(corners, chart)
+    middle = as_complex(packed.corner_uv[chart == 0]).mean()
+    inside = [np.abs(as_complex(packed.corner_uv[chart == c]) - middle).max() < 0.5 for c in range(1, 5)]
+    assert all(inside)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_one_chart_fills_the_smallest_square(seed):
+    corners = star(9, 0.3, 1.0, seed)
+    points = as_complex(corners).ravel()
+    angles = np.linspace(0, np.pi / 2, 20001)
+    turned = points * np.exp(1j * angles)[:, None]
+    side = np.maximum(np.ptp(turned.real, axis=1), np.ptp(turned.imag, axis=1)).min()
+    packed = pack_charts(corners, padding=0)
+    assert side * (1 - 1e-4) < 1 / packed.scale <= side * (1 + 1e-12)
+    assert np.ptp(packed.corner_uv, axis=(0, 1)).max() == pytest.approx(1, abs=1e-12)
+
+
+def test_a_square_on_its_corner_and_a_triangle_alone():
+    square = letter_l(1.0)[:2]
+    turned = square @ np.array([[1, 1], [-1, 1]]) / np.sqrt(2)
+    assert pack_charts(turned, padding=0).efficiency == pytest.approx(1, rel=1e-12)
+    # The largest equilateral triangle in a square has sides of sqrt(6) - sqrt(2).
+    triangle = np.array([[[0, 0], [1, 0], [0.5, 0.75**0.5]]])
+    packed = pack_charts(triangle, resolution=64, padding=0)
+    assert packed.scale == pytest.approx(6**0.5 - 2**0.5, rel=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 2.0])
+def test_straight_charts(angle):
+    rectangle = letter_l(1.0)[:2] * [3, 1]
+    points = as_complex(rectangle).ravel() * np.exp(1j * angle)
+    turned = points * np.exp(1j * straight_angle(points))
+    np.testing.assert_allclose([np.ptp(turned.real), np.ptp(turned.imag)], [3, 1], rtol=1e-12)
+    square = points * np.exp(1j * square_angle(points))
+    assert max(np.ptp(square.real), np.ptp(square.imag)) == pytest.approx(4 / 2**0.5, rel=1e-12)
+
+
+def test_straight_charts_have_the_least_rectangle():
+    points = as_complex(star(8, 0.5, 1.0, 3)).ravel()
+    turned = points * np.exp(1j * np.linspace(0, np.pi, 20001))[:, None]
+    least = (np.ptp(turned.real, axis=1) * np.ptp(turned.imag, axis=1)).min()
+    straight = points * np.exp(1j * straight_angle(points))
+    assert np.ptp(straight.real) * np.ptp(straight.imag) <= least * (1 + 1e-12)
+    assert np.ptp(straight.real) >= np.ptp(straight.imag)
+
+
+@pytest.mark.parametrize("quarters", range(4))
+def test_upright_charts_show_up_as_v(quarters):
+    """A wall with its long side up, however it was laid out, stands."""
+    vertices, faces = hill()
+    space = rotation()
+    wall = np.column_stack([vertices[:, 0], 0.2 * vertices[:, 2], 3 * vertices[:, 1]]) @ space.T
+    turn = np.exp(1j * (quarters * np.pi / 2 + 0.2))
+    uv = (vertices[:, 0] + 3j * vertices[:, 1]) * turn
+    corner_uv = np.stack([uv.real, uv.imag], axis=1)[faces]
+    laid = orient_charts(corner_uv, corners=wall[faces], up=space[:, 2])
+    assert np.abs(as_complex(laid) - as_complex(corner_uv) / turn).max() < 0.05
+    lying = orient_charts(corner_uv)
+    assert np.ptp(lying[..., 0]) > 2.5
+    assert np.ptp(laid[..., 1]) > 2.5
+
+
+def test_without_an_up_direction_the_heavier_half_is_below():
+    for turn in (1, -1):
+        laid = orient_charts(turn * letter_l(1.0))[..., 1]
+        weights = np.ones(6) / 6
+        assert weights @ laid.mean(axis=1) < (laid.min() + laid.max()) / 2
+
+
+def test_tiles():
+    corners, chart = charts_of(*(star(5, 0.5, 1.0, seed) for seed in range(24)))
+    one, many = pack_charts(corners, chart), pack_charts(corners, chart, tiles=12)
+    assert many.scale > 2.5 * one.scale
+    assert set(many.tile_of_chart.tolist()) == set(range(12))
+    tile = many.tile_of_chart[chart]
+    inside = many.corner_uv - np.stack([tile % 10, tile // 10], axis=1)[:, None]
+    assert inside.min() >= 2 / 1024 - 1e-12
+    assert inside.max() <= 1 - 2 / 1024 + 1e-12
+    assert least_distance(many.corner_uv * 1024, chart) >= 2 * (1 - 1e-9)
+    assert many.efficiency == pytest.approx(signed_areas(many.corner_uv).sum() / 12, rel=1e-12)
+
+
+def test_more_tiles_than_charts():
+    corners, chart = charts_of(letter_l(1.0), star(5, 0.5, 0.5))
+    packed = pack_charts(corners, chart, tiles=7)
+    assert sorted(packed.tile_of_chart.tolist()) == [0, 1]
+
+
+def test_many_charts():
+    rng = np.random.default_rng(5)
+    corners = rng.random((600, 3, 2)) * rng.uniform(0.2, 1.0, (600, 1, 1))
+    corners = np.where((signed_areas(corners) < 0)[:, None, None], corners[:, ::-1], corners)
+    packed = pack_charts(corners, np.arange(600), padding=1)
+    assert packed.efficiency > 0.4
+    # No texel belongs to two.
+    points = (np.stack(np.meshgrid(*[np.arange(1024)] * 2), axis=-1).reshape(-1, 2) + 0.5) / 1024
+    count = np.zeros(len(points), dtype=int).reshape(1024, 1024)
+    for triangle in packed.corner_uv:
+        low, high = (
+            np.floor(triangle.min(axis=0) * 1024).astype(int),
+            np.ceil(triangle.max(axis=0) * 1024).astype(int),
+        )
+        cells = np.s_[low[1] : high[1], low[0] : high[0]]
+        here = points.reshape(1024, 1024, 2)[cells]
+        sides = np.roll(triangle, -1, axis=0) - triangle
+        count[cells] += np.all(
+            [cross(side, here - start) > 0 for side, start in zip(sides, triangle, strict=True)], axis=0
+        )
+    assert count.max() == 1
+    assert count.sum() / 1024**2 == pytest.approx(packed.efficiency, rel=0.01)
+
+
+def test_the_same_again_and_in_any_order():
+    corners, chart = without_symmetry()
+    packed = pack_charts(corners, chart)
+    np.testing.assert_array_equal(packed.corner_uv, pack_charts(corners, chart).corner_uv)
+    order = np.random.default_rng(1).permutation(len(chart))
+    shuffled = pack_charts(corners[order][:, [1, 2, 0]], chart[order])
+    np.testing.assert_allclose(shuffled.corner_uv[:, [2, 0, 1]], packed.corner_uv[order], atol=1e-9)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
+def test_turned_and_scaled_before_makes_no_difference(factor):
+    corners, chart = without_symmetry()
+    turn = factor * np.array([[0.6, 0.8], [-0.8, 0.6]])
+    packed, again = pack_charts(corners, chart), pack_charts(corners @ turn + 3 * factor, chart)
+    assert again.scale * factor == pytest.approx(packed.scale, rel=1e-9)
+    np.testing.assert_allclose(again.corner_uv, packed.corner_uv, atol=1e-9)
+
+
+def test_the_winding_of_an_outline_is_what_triangles_cover():
+    """Of a strip that lies over itself, the sides between its triangles are no outline."""
+    angle = np.linspace(0, 2.5 * np.pi, 60)
+    inner, outer = np.exp(1j * angle), 1.5 * np.exp(1j * angle)
+    one = np.stack([inner[:-1], outer[:-1], outer[1:]], axis=1)
+    corners = np.concatenate([one, np.stack([inner[:-1], outer[1:], inner[1:]], axis=1)])
+    charts = read_charts(np.stack([corners.real, corners.imag], axis=2), None)
+    outlines = charts.outlines()
+    assert len(outlines.sides) == 2 * 59 + 2
+    start, end = outlines.sides.T
+    assert (np.conj(start) * end).imag.sum() / 2 == pytest.approx(charts.areas.sum(), rel=1e-12)
+    # Turned over, a triangle still covers what it does.
+    corners[10] = corners[10, ::-1]
+    charts = read_charts(np.stack([corners.real, corners.imag], axis=2), None)
+    start, end = charts.outlines().sides.T
+    assert (np.conj(start) * end).imag.sum() / 2 == pytest.approx(np.abs(charts.areas).sum(), rel=1e-12)
+
+
+def test_a_flattening(shared):
+    result = coneflat.flatten(shared("spot.obj"))
+    middle = result.corner_uv.mean(axis=1)
+    chart = (middle[:, 0] > 0.5) + 2 * (middle[:, 1] > 0.4)
+    sides = result.vertices[result.faces]
+    areas = np.linalg.norm(np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]), axis=1) / 2
+    packed = pack_charts(result.corner_uv, chart, areas)
+    assert packed.efficiency > 0.6
+    for c in range(4):
+        _, rest = similarity(result.corner_uv[chart == c], packed.corner_uv[chart == c])
+        assert rest < 1e-12
+
+
+def test_bad_input():
+    corners, chart = a_few()
+    for uv, error, said in (
+        (corners[..., 0], ArrayShapeError, r"\(\d+, 3\)"),
+        (corners[:0], ArrayShapeError, r"\(0, 3, 2\)"),
+        (np.where(chart[:, None, None] == 2, np.nan, corners), NonFiniteError, "14 triangles"),
+        (
+            np.where(chart[:, None, None] == 3, corners[..., ::-1], corners),
+            OptionError,
+            "1 of 7 charts .* 3 with area -",
+        ),
+    ):
+        with pytest.raises(error, match=said):
+            pack_charts(uv, chart if len(uv) else [])
+    for labels, error, said in (
+        (chart[1:], ArrayShapeError, "not one whole number"),
+        (chart * 1.0, ArrayShapeError, "float64"),
+        (chart * 2, OptionError, "7 different numbers from 0 to 12"),
+        (chart - 1, OptionError, "from -1 to 5"),
+    ):
+        with pytest.raises(error, match=said):
+            pack_charts(corners, labels)
+    with pytest.raises(ArrayShapeError, match=r"areas have shape \(3,\)"):
+        pack_charts(corners, chart, [1, 2, 3])
+    with pytest.raises(NonFiniteError, match="1 areas"):
+        pack_charts(corners, chart, np.where(np.arange(len(chart)) == 4, -1.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"resolution": 0}, "resolution must be .* not 0"),
+        ({"resolution": 10.5}, "resolution must be .* not 10.5"),
+        ({"padding": -1}, "padding must be .* not -1"),
+        ({"padding": "2"}, "padding must be .* not '2'"),
+        ({"margin": float("nan")}, "margin must be .* not nan"),
+        ({"tiles": 0}, "tiles must be .* not 0"),
+        ({"tiles": True}, "tiles must be .* not True"),
+        ({"rotate": "free"}, "'free': choose from any, quarter, none"),
+        ({"margin": 512}, "margins of 512 texels leave nothing of a texture of 1024"),
+        ({"padding": 600, "margin": 0}, "58.6 % .* between 7 charts"),
+    ],
+)
+def test_bad_options(options, said):
+    corners, chart = a_few()
+    with pytest.raises(OptionError, match=said):
+        pack_charts(corners, chart, **options)
+
+
+def test_bad_up():
+    corners, chart = a_few()
+    with pytest.raises(OptionError, match="not all 0"):
+        orient_charts(corners, chart, corners=np.zeros((*corners.shape[:2], 3)), up=(0, 0, 0))
+    with pytest.raises(OptionError, match="needs the corners"):
+        orient_charts(corners, chart, up=(0, 0, 1))
+    with pytest.raises(OptionError, match="shape"):
+        orient_charts(corners, chart, corners=np.zeros((2, 3, 3)), up=(0, 0, 1))
