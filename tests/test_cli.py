@@ -202,6 +202,27 @@ def test_help_lists_the_commands(tmp_path):
     assert run(cwd=tmp_path).returncode == 2
 
 
+def test_textures(model, tmp_path):
+    done = run(
+        "flatten", model, "-o", "out.npz", "--up=-y", "--padding", "8", "--resolution", "512", cwd=tmp_path
+    )
+    assert done.returncode == 0
+    with np.load(tmp_path / "out.npz") as arrays:
+        assert arrays["uv"].min() >= 8 / 512 - 1e-12
+        assert arrays["uv"].max() <= 1 - 8 / 512 + 1e-12
+    for words, message in (
+        (("--up", "north"), "no direction"),
+        (("--up", "0,0,0"), "not all 0"),
+        (("--padding", "-1"), "padding must be"),
+        (("--tiles", "0"), "tiles must be from 1"),
+        (("--resolution", "0"), "resolution must be from 1"),
+    ):
+        done = run("flatten", model, "-q", *words, cwd=tmp_path)
+        assert done.returncode == 2
+        assert message in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+
+
 def test_marked_seams(tmp_path):
     write_obj(tmp_path / "box.obj", *shapes.box(2))
     done = run(

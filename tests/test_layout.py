@@ -5,7 +5,6 @@ import pytest
 import shapes
 
 from coneflat import TriangleMesh, edge_lengths, errors, least_squares_layout
-from coneflat.layout import arrange
 from coneflat.layout.pieces import triangulations
 
 
@@ -39,22 +38,6 @@ def test_broken_triangle_is_laid_on_a_line():
     side = points[mesh.faces[1]]
     middle = (side[(long + 1) % 3] + side[(long + 2) % 3]) / 2
     np.testing.assert_allclose(side[long], middle, atol=1e-9)
-
-
-@pytest.mark.parametrize("count", [1, 2, 7, 40])
-def test_charts_do_not_overlap_and_fill_the_unit_square(count):
-    rng = np.random.default_rng(count)
-    charts = [rng.random((5, 2)) * rng.random(2) * 3 for _ in range(count)]
-    moved, scale = arrange(charts)
-    boxes = np.array([[chart.min(axis=0), chart.max(axis=0)] for chart in moved])
-    assert boxes.min() == 0
-    assert boxes.max() == pytest.approx(1)
-    for before, after in zip(charts, moved, strict=True):
-        np.testing.assert_allclose(np.ptp(after, axis=0), np.ptp(before, axis=0) * scale)
-    for i in range(count):
-        for j in range(i):
-            apart = (boxes[i, 0] > boxes[j, 1]) | (boxes[j, 0] > boxes[i, 1])
-            assert apart.any()
 
 
 def test_layout_without_finite_solution_is_refused():

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._arrays import FloatArray, IntArray
+from .atlas import Packed, orient_charts, pack_charts
 from .distortion import curvature_errors, measure
 from .figures import SolveFigures
-from .layout import arrange
 from .mesh import TriangleMesh
 from .numbering import result_numbering, turn_corners
 from .options import Options
@@ -41,10 +41,10 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     order = np.argsort(face_origin, kind="stable")
     faces = np.concatenate([ids[one.mesh.faces] for ids, one in zip(numbers, laid_out, strict=True)])[order]
 
-    with stages("layout"):
+    with stages("pack"):
         points, corners, chart = _all_charts(laid_out)
-        uv, scale = _arranged(points, corners, chart)
-        corners = corners[order]
+        corners, chart = corners[order], chart[order]
+        uv, packed = _packed(points, corners, chart, positions[faces], options)
 
     def spread(values: Sequence[FloatArray]) -> FloatArray:
         every = np.full(len(positions), np.nan)
@@ -73,7 +73,8 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         faces=faces,
         uv=uv,
         uv_faces=corners,
-        uv_scale=float(np.ldexp(scale, checked.exponent)),
+        uv_scale=float(np.ldexp(packed.scale, checked.exponent)),
+        packing_efficiency=packed.efficiency,
         cones=cones,
         curvatures=target[cones],
         log_scale=spread([one.log_scale for one in laid_out]),
@@ -105,15 +106,27 @@ def _all_charts(laid_out: Sequence[LaidOut]) -> tuple[FloatArray, IntArray, IntA
     return np.concatenate([one.points for one in laid_out]), np.concatenate(corners), np.concatenate(charts)
 
 
-def _arranged(points: FloatArray, corners: IntArray, chart: IntArray) -> tuple[FloatArray, float]:
-    """Return the points with the charts side by side in the unit square, and the scale."""
-    chart_of = np.empty(len(points), dtype=np.int64)
-    chart_of[corners] = chart[:, None]
-    members = np.split(np.argsort(chart_of, kind="stable"), np.cumsum(np.bincount(chart_of))[:-1])
-    placed, scale = arrange([points[some] for some in members])
+def _packed(
+    points: FloatArray, corners: IntArray, chart: IntArray, space: FloatArray, options: Options
+) -> tuple[FloatArray, Packed]:
+    """Return the points with the charts in their places in the texture, and what came of it.
+
+    space: (m, 3, 3) the triangles' corners on the model.
+    """
+    flat, rotate = points[corners], "any"
+    if options.up is not None:
+        flat, rotate = orient_charts(flat, chart, corners=space, up=options.up), "none"
+    packed = pack_charts(
+        flat,
+        chart,
+        resolution=options.resolution,
+        padding=options.padding,
+        tiles=options.tiles,
+        rotate=rotate,
+    )
     uv = np.empty_like(points)
-    uv[np.concatenate(members)] = np.concatenate(placed)
-    return uv, scale
+    uv[corners] = packed.corner_uv
+    return uv, packed
 
 
 def _number_vertices(

@@ -37,6 +37,7 @@ class Distortion:
         seam_motion_mismatch: how far the two sides of a seam are from one rigid motion of each other: the largest
             change of the rotation between them from one seam edge to the next, radians; where seams branch
             or end, and at cones, there is none to compare.
+        density_spread: of texels per length on the model, the quantile at 95% over that at 5%.
         overlap: part of the area that the layout covers that it covers more than once.
         overlapping_pairs: pairs of triangles with inner points in common, without rounding.
         curvature_error: ||target - K||_2 / n of the metric, in units of pi (Table 1 of the paper).
@@ -58,6 +59,7 @@ class Distortion:
     seam_mismatch: float
     seam_mismatch_max: float
     seam_motion_mismatch: float
+    density_spread: float
     overlap: float
     overlapping_pairs: int
     curvature_error: float = float("nan")
@@ -124,6 +126,7 @@ def measure(
         seam_mismatch=_mean(mismatches, seam_lengths) if len(seams) else 0.0,
         seam_mismatch_max=float(mismatches.max()) if len(seams) else 0.0,
         seam_motion_mismatch=_seam_motion_mismatch(mesh, corner_uv, seams, cones),
+        density_spread=_spread(log_scale[valid], weights),
         overlap=overlaps.fraction,
         overlapping_pairs=len(overlaps.pairs),
         curvature_error=curvature_error[0],
@@ -238,6 +241,10 @@ def _seam_motion_mismatch(
 
 def _mean(values: FloatArray, weights: FloatArray) -> float:
     return float((values * weights).sum() / weights.sum()) if len(values) else float("nan")
+
+
+def _spread(log_scale: FloatArray, weights: FloatArray) -> float:
+    return float(np.exp(_quantile(log_scale, weights, 0.95) - _quantile(log_scale, weights, 0.05)))
 
 
 def _quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:

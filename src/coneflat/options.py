@@ -76,6 +76,10 @@ class Options:
     strict: bool = False
     solver: str = "auto"
     charts: str = "one"
+    resolution: int = 1024
+    padding: float = 2.0
+    tiles: int = 1
+    up: tuple[float, float, float] | None = None
     seams: ArrayLike | str | None = None
     sharp_angle: float | None = None
     given_cones: Mapping[int, float | None] = field(init=False, default_factory=dict)
@@ -135,8 +139,30 @@ class Options:
                 if isinstance(getattr(self, name), Mapping):
                     raise OptionError(f"{noun}s are vertices alone, without curvatures: give a list of them")
                 object.__setattr__(self, name, tuple(_given_vertices(noun, getattr(self, name))))
+        self._check_texture()
         self._check_marks()
         self._check_pursuit()
+
+    def _check_texture(self) -> None:
+        """Check what says how charts are packed."""
+        for name, most in (("resolution", 2**16), ("tiles", 1000)):
+            value = _whole(name, getattr(self, name))
+            if not 1 <= value <= most:
+                raise OptionError(f"{name} must be from 1 to {most:,}, not {value:,}")
+            object.__setattr__(self, name, value)
+        padding = _number("padding", self.padding)
+        if not 0 <= padding < self.resolution / 4:
+            raise OptionError(
+                f"padding must be from 0 to a quarter of the resolution of {self.resolution:,}, not {padding:g}"
+            )
+        object.__setattr__(self, "padding", padding)
+        if self.up is not None:
+            up = np.asarray(self.up)
+            if up.shape != (3,) or up.dtype.kind not in "fiu" or not (np.isfinite(up).all() and up.any()):
+                raise OptionError(
+                    f"up must be a direction, three numbers that are not all 0, not {self.up!r}"
+                )
+            object.__setattr__(self, "up", tuple(up.astype(np.float64).tolist()))
 
     def _check_marks(self) -> None:
         """Check what names edges that are to be cut."""

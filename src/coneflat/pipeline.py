@@ -72,6 +72,10 @@ def flatten(
     charts: str = "one",
     seams: ArrayLike | str | None = None,
     sharp_angle: float | None = None,
+    resolution: int = 1024,
+    padding: float = 2.0,
+    tiles: int = 1,
+    up: tuple[float, float, float] | None = None,
     progress: Progress | None = None,
 ) -> Flattening:
     """Flatten a triangle mesh of any topology conformally, one disk per connected component.
@@ -124,6 +128,10 @@ def flatten(
         seams: edges to be cut in any case: (k, 2) pairs of vertices, or "input" for the seams of the file's own UVs.
             They act like a boundary; where they close curves, the mesh falls into several charts.
         sharp_angle: edges whose faces' normals differ by more than this are cut, too, radians.
+        resolution: texels along a side of the texture, for which there are
+        padding: texels between charts, and between them and the border, at least.
+        tiles: number of textures (UDIM) to distribute charts over.
+        up: direction of the model that is to be up in the texture; without one, charts lie as they fill it best.
         progress: called with the name of each stage and the fraction of triangles done.
 
     Raises:
@@ -159,6 +167,10 @@ def flatten(
         charts=charts,
         seams=seams,
         sharp_angle=sharp_angle,
+        resolution=resolution,
+        padding=padding,
+        tiles=tiles,
+        up=up,
     )
     stages = Stages(progress)
     with stages("check"):

@@ -31,6 +31,7 @@ MEASURES = (
     "seam_mismatch",
     "seam_mismatch_max",
     "seam_motion_mismatch",
+    "density_spread",
     "overlap",
     "overlapping_pairs",
 )
@@ -48,6 +49,7 @@ def as_dict(result: Flattening) -> dict[str, Any]:
         "solvers": list(result.solvers),
         "rotation_deviation": None if result.rotations is None else result.rotations.worst,
         "handle_deviations": None if result.rotations is None else result.rotations.handles,
+        "packing_efficiency": result.packing_efficiency,
         "uv_scale": result.uv_scale,
         "cone_vertices": result.cones.tolist(),
         "cone_curvatures": result.curvatures.tolist(),
@@ -147,6 +149,8 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
             f"of the area covered, covered twice; {plural(d.overlapping_pairs, 'pair')} of triangles",
         ),
         ("charts", f"{d.charts:,}", "pieces of the layout"),
+        ("packing", f"{result.packing_efficiency:.1%}", "of the texture is covered"),
+        ("texel density", f"{d.density_spread:.3f}", "its spread: the quantile at 95% over that at 5%"),
         ("seam length", f"{d.seam_length:.3f}", "over the square root of the area"),
         (
             "seam mismatch",

@@ -23,7 +23,8 @@ class Flattening:
         vertices: (n, 3) positions in model units; the input's own, or the repaired mesh's.
         faces: (m, 3) vertex indices, consistently oriented, in the input's order of faces; of a refinement, its
             triangles, in the order of the faces that they are parts of.
-        uv: (u, 2) points of the layout, in [0, 1]^2, all charts at one scale.
+        uv: (u, 2) points of the layout, in [0, 1]^2, all charts at one scale; of UDIM tiles, tile i is one of ten in a
+            row, [i % 10, i % 10 + 1] x [i // 10, i // 10 + 1].
         uv_faces: (m, 3) index into `uv` of every triangle corner.
         uv_scale: UV units per model unit; `uv / uv_scale` is the layout at the model's own scale.
         cones: (s,) cone vertices.
@@ -32,6 +33,7 @@ class Flattening:
             units; NaN at vertices without a face.
         curvature_residual: (n,) target minus curvature of the flat metric, radians; NaN likewise.
         seams: (k, 2) vertex pairs of the mesh edges that were cut.
+        packing_efficiency: area of the layout over that of the texture, or textures.
         distortion: the measures of Section 5 of the paper and their like.
         seconds: wall time of each stage.
         notes: what was done to the input, one sentence each.
@@ -56,6 +58,7 @@ class Flattening:
     log_scale: FloatArray
     curvature_residual: FloatArray
     seams: IntArray
+    packing_efficiency: float
     distortion: Distortion
     seconds: Mapping[str, float]
     notes: tuple[str, ...] = ()

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import click
 from click.core import ParameterSource
 
-from .search import PURSUIT_OPTIONS, Angle, as_keywords, search_options
+from .search import PURSUIT_OPTIONS, Angle, Direction, as_keywords, search_options
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -92,6 +92,25 @@ _AFTER_SEARCH = (
         "cuts where it must be, so that nothing overlaps.  [default: atlas for .obj and .glb, but one with --paper]",
     ),
     click.option(
+        "--resolution",
+        type=int,
+        default=1024,
+        show_default=True,
+        help="Texels along a side of the texture, for --padding.",
+    ),
+    click.option(
+        "--padding", type=float, default=2.0, show_default=True, help="Texels between charts, at least."
+    ),
+    click.option(
+        "--tiles", type=int, default=1, show_default=True, help="Textures (UDIM) to distribute charts over."
+    ),
+    click.option(
+        "--up",
+        type=Direction(),
+        metavar="DIRECTION",
+        help="What is up in the model is to be up in the texture: x, y, z, -z, or 0,1,0.",
+    ),
+    click.option(
         "--sharp-angle",
         type=Angle(),
         metavar="ANGLE",
@@ -139,6 +158,7 @@ def method_keywords(params: Mapping[str, Any], ending: str) -> dict[str, Any]:
     general = {name: params[name] for name in ("repair", "strict", "solver", "charts")}
     if general["charts"] is None:
         general["charts"] = "atlas" if ending in TEXTURED and not params["paper"] else "one"
+    general |= {name: params[name] for name in ("resolution", "padding", "tiles", "up")}
     general["sharp_angle"] = params["sharp_angle"]
     if params["keep_seams"]:
         general["seams"] = "input"

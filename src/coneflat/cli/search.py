@@ -43,6 +43,29 @@ class Angle(click.ParamType):  # type: ignore[type-arg]
             self.fail(str(error), param, ctx)
 
 
+class Direction(click.ParamType):  # type: ignore[type-arg]
+    """A direction in space such as z, -y or 0,0.5,1."""
+
+    name = "direction"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float]:
+        """Return its three coordinates."""
+        if isinstance(value, tuple):
+            return value
+        text = value.strip().lower()
+        axis = "xyz".find(text[-1:])
+        if axis >= 0 and text[:-1] in ("", "+", "-"):
+            length = -1.0 if text[0] == "-" else 1.0
+            return (length * (axis == 0), length * (axis == 1), length * (axis == 2))
+        try:
+            one, two, three = (float(word) for word in text.split(","))
+        except ValueError:
+            self.fail(f"{value!r} is no direction; write z, -y or 0,0.5,1", param, ctx)
+        return (one, two, three)
+
+
 _OPTIONS = (
     click.option(
         "--distortion",
