@@ -8,7 +8,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..geometry.intrinsic import halfedge_twins
-from ..mesh import TriangleMesh
+from ..mesh import TriangleMesh, sort_by_counting
 
 NOTHING = np.empty(0, dtype=np.int64)
 NO_COSTS = np.empty(0)
@@ -82,16 +82,15 @@ class OpenMesh:
     """
 
     def __init__(self, mesh: TriangleMesh, edge_costs: FloatArray, is_border: BoolArray) -> None:
-        from .search_kernel import sort_by_tail
-
         n, sides = len(mesh.vertices), 3 * len(mesh.faces)
         self.mesh, self.twin, self.tail = mesh, halfedge_twins(mesh), mesh.tails
         self.cost, self.cut = edge_costs[mesh.halfedge_edges], is_border[mesh.halfedge_edges]
         self.height = np.zeros(n)
         self.effort = 0
-        starts, count = np.zeros(n + 1, dtype=np.int64), int((self.twin >= 0).sum())
-        self.slots = np.empty(count, dtype=np.int64)
-        sort_by_tail(self.twin, self.tail, starts, self.slots)
+        glued = np.flatnonzero(self.twin >= 0)
+        self.slots = glued[sort_by_counting(self.tail[glued], n)]
+        starts, count = np.zeros(n + 1, dtype=np.int64), len(glued)
+        np.cumsum(np.bincount(self.tail[glued], minlength=n), out=starts[1:])
         self._slot_of = np.empty(sides, dtype=np.int64)
         self._slot_of[self.slots] = np.arange(count)
         self._enters = np.empty(count, dtype=np.int64)

@@ -66,20 +66,6 @@ def label_circles(
 
 
 @compiled
-def sort_by_tail(twin: IntArray, tail: IntArray, starts: IntArray, halfedges: IntArray) -> None:
-    """Sort the half-edges that have a twin by the vertex they leave; starts: (n + 1,) zeros, gets where each begins."""
-    for h in range(len(twin)):
-        if twin[h] >= 0:
-            starts[tail[h]] += 1
-    for v in range(1, len(starts)):
-        starts[v] += starts[v - 1]
-    for h in range(len(twin) - 1, -1, -1):
-        if twin[h] >= 0:
-            starts[tail[h]] -= 1
-            halfedges[starts[tail[h]]] = h
-
-
-@compiled
 def push(keys: FloatArray, items: IntArray, size: int, key: float, item: int) -> int:
     """Put an item on a binary heap and return its new size."""
     i = size
