@@ -38,7 +38,9 @@ def cut_open(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
         MetricError: the seams do not open the mesh to disks.
     """
     cut = open_along(mesh, seams)
-    sides = np.concatenate([mesh.edge_halfedges[seams].ravel(), mesh.edge_halfedges[mesh.is_boundary_edge, 0]])
+    sides = np.concatenate(
+        [mesh.edge_halfedges[seams].ravel(), mesh.edge_halfedges[mesh.is_boundary_edge, 0]]
+    )
     border, ends = np.unique([cut.mesh.tails[sides], cut.mesh.heads[sides]], return_inverse=True)
     loops, _ = label_components(len(border), *ends.reshape(2, -1))
     # Pieces all have borders, so there is one if there is one border.
@@ -70,19 +72,11 @@ def open_along(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
     order = np.lexsort((first, owner[first]))
     copies = np.ones(len(mesh.vertices), dtype=np.int64)
     copies[on_seam] = np.bincount(owner[first], minlength=len(copies))[on_seam]
-    start = np.cumsum(copies) - copies
+    origin = np.repeat(np.arange(len(copies)), copies)
     number = np.empty(len(fans), dtype=np.int64)
-    # In order the fans of a vertex follow one another, as its numbers do.
-    number[order] = np.repeat(start[on_seam], copies[on_seam]) + _count_runs(copies[on_seam])
-    faces = start[mesh.faces]
+    number[order] = np.flatnonzero(on_seam[origin])
+    faces = (np.cumsum(copies) - copies)[mesh.faces]
     corners = faces[is_near]
     corners[at_seam] = number[which]
     faces[is_near] = corners
-    origin = np.repeat(np.arange(len(copies)), copies)
     return CutMesh(TriangleMesh(mesh.vertices[origin], faces), origin)
-
-
-def _count_runs(lengths: IntArray) -> IntArray:
-    """Return 0, 1, ... for each of several runs, one after the other."""
-    counted: IntArray = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    return counted
