@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
-from ..errors import SeamError
+from ..errors import OptionError, SeamError
 from ..geometry.ties import tie_key
 from ..mesh import TriangleMesh
 from ..text import plural
@@ -23,6 +23,8 @@ from .straighten import BENDING, Straightener
 # Relative: on grids many paths are equally long, and rounding should not choose among them, lest the result
 # depend on the numbering. Far above rounding, far below what anyone would see in a seam.
 TIE_BREAK = 1e-7
+# With much more, one avoided edge that needs turns could cost more than two without.
+MOST_BENDING = 0.25
 
 
 def find_seams(
@@ -47,11 +49,14 @@ def find_seams(
         required: edges that are cut in any case; on the boundary they mean nothing.
         forbidden: edges that are not cut.
         bending: a seam that turns by a right angle at every vertex is taken for longer by this part of its length;
-            0 to 0.5. Of ways that are nearly equally short the straighter are preferred.
+            0 to 0.25. Of ways that are nearly equally short the straighter are preferred.
 
     Raises:
         SeamError: every set of seams needs forbidden edges; or edges are both required and forbidden.
+        OptionError: `bending` is none.
     """
+    if not 0 <= bending <= MOST_BENDING:
+        raise OptionError(f"bending must be a number from 0 to {MOST_BENDING:g}, not {bending:g}")
     is_required, is_forbidden = np.zeros((2, len(mesh.edges)), dtype=bool)
     is_required[required] = True
     is_required &= ~mesh.is_boundary_edge
@@ -69,7 +74,7 @@ def find_seams(
     if work.cut.any():
         shorten(work, fixed)
         if bending > 0:
-            Straightener(work, bending).straighten(fixed)
+            Straightener(work, float(bending)).straighten(fixed)
     seams = _as_slit(mesh, costs, work.cut[mesh.edge_halfedges[:, 0]] & ~mesh.is_boundary_edge)
     _refuse(seams & is_forbidden, "needed to open the mesh, but forbidden as seams")
     return np.flatnonzero(seams)

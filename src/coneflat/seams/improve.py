@@ -7,8 +7,6 @@ surfaces with handles, too: taking a path out of a loop leaves two borders, one 
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 
 from .._arrays import IntArray
@@ -19,7 +17,10 @@ from .reconnect import Reconnection
 # Relative: what is gained must be more than rounding makes.
 LEAST_GAIN = 1e-9
 # Searches end when they have reached so many times the vertices of the mesh, and so many more.
-EFFORT, SPARE_EFFORT = 4, 50_000
+EFFORT, SPARE_EFFORT = 5, 50_000
+# How many paths that follow one another are exchanged together, in the order in which that is tried. Where three fork
+# from a point, two take the third along.
+WINDOWS = 2, 1, 3
 
 
 def shorten(work: OpenMesh, fixed: Fixed) -> None:
@@ -30,16 +31,16 @@ def shorten(work: OpenMesh, fixed: Fixed) -> None:
         fixed: what the seams hold on to.
     """
     work.measure_heights()
-    rested: set[bytes] = set()
     enough = EFFORT * len(work.height) + SPARE_EFFORT
-    gained = True
-    while gained and work.effort < enough:
+    rested: set[bytes] = set()
+    # Pairs first, as they are worth most; again and again, until nothing is gained. Then others.
+    waiting = [*WINDOWS]
+    while waiting and work.effort < enough:
         seams = find_key_paths(work, fixed)
         loose = seams.loose()
         work.glue(seams.halfedges(loose))
-        gained = len(loose) > 0
         changed: set[int] = set()
-        for gone in () if loose else _exchanges(seams):
+        for gone in () if loose else _exchanges(seams, waiting[0]):
             name = _name(work, seams.halfedges(gone))
             if name in rested or not changed.isdisjoint(gone) or work.effort >= enough:
                 continue
@@ -51,29 +52,25 @@ def shorten(work: OpenMesh, fixed: Fixed) -> None:
             if found is not None:
                 rested.add(_name(work, found))
                 changed |= seams.touched_by(gone, found)
-                gained = True
+        if changed or loose:
+            waiting = [*WINDOWS]
+        else:
+            waiting.pop(0)
 
 
 def _name(work: OpenMesh, halfedges: IntArray) -> bytes:
     return np.sort(work.mesh.halfedge_edges[halfedges]).tobytes()
 
 
-def _exchanges(seams: KeyPaths) -> list[frozenset[int]]:
-    """Return sets of paths to exchange: what meets at a point, single ones, what meets at both ends of a path.
-
-    Of each kind the longest come first.
-    """
-    single = [(p,) for p in range(len(seams.paths))]
-    forks = {
-        vertex for vertex, paths in seams.at.items() if len(set(paths)) == 3 and not seams.fixed.holds(vertex)
-    }
-    double = [
-        (*seams.at[path.ends[0]], *seams.at[path.ends[1]])
-        for path in seams.paths
-        if path.ends[0] != path.ends[1] and forks.issuperset(path.ends)
+def _exchanges(seams: KeyPaths, count: int) -> list[frozenset[int]]:
+    """Return sets of so many paths that follow one another along the border, the longest first."""
+    windows = [
+        {curve[(i + k) % len(curve)] for k in range(count)}
+        for curve in seams.curves
+        for i in range(len(curve))
     ]
-    sets = {seams.with_loose_ends(set(gone)) for gone in itertools.chain(seams.neighbours, single, double)}
-    return sorted(sets, key=lambda gone: (len(gone) > 3, len(gone) == 1, -seams.cost(gone), sorted(gone)))
+    sets = {seams.with_loose_ends(window) for window in windows if len(window) == count}
+    return sorted(sets, key=lambda gone: (-seams.cost(gone), sorted(gone)))
 
 
 def _exchange(seams: KeyPaths, gone: frozenset[int]) -> tuple[IntArray | None, bool]:

@@ -70,14 +70,14 @@ class KeyPaths:
         fixed: what they hold on to.
         paths: the key paths.
         at: the paths that end at each vertex; loops twice.
-        neighbours: pairs of paths that follow one another along the border.
+        curves: for each border curve the paths along it, in order; most are there twice, with both sides.
     """
 
     work: OpenMesh
     fixed: Fixed
     paths: list[KeyPath]
     at: dict[int, list[int]]
-    neighbours: list[tuple[int, int]]
+    curves: list[list[int]]
 
     def cost(self, some: Iterable[int]) -> float:
         """Return what some of the paths cost."""
@@ -153,7 +153,7 @@ def find_key_paths(work: OpenMesh, fixed: Fixed) -> KeyPaths:
     is_key = (degree[tails] != 2) | fixed.cones[tails] | fixed.vertices[tails]
     paths: list[KeyPath] = []
     at: dict[int, list[int]] = {}
-    neighbours: list[tuple[int, int]] = []
+    curves: list[list[int]] = []
     by_first: dict[int, int] = {}
     for start, stop in itertools.pairwise(bounds):
         keys = np.flatnonzero(is_key[start:stop])
@@ -175,5 +175,5 @@ def find_key_paths(work: OpenMesh, fixed: Fixed) -> KeyPaths:
                 paths.append(path)
                 for vertex in path.ends:
                     at.setdefault(vertex, []).append(number)
-        neighbours += [(p, q) for p, q in zip(around, around[1:] + around[:1], strict=True) if p != q]
-    return KeyPaths(work, fixed, paths, at, neighbours)
+        curves.append(around)
+    return KeyPaths(work, fixed, paths, at, curves)

@@ -18,7 +18,7 @@ class Straightener:
 
     Args:
         work: open, every piece of it a disk.
-        bending: see BENDING; 0 to 0.5.
+        bending: see BENDING.
     """
 
     def __init__(self, work: OpenMesh, bending: float) -> None:
