@@ -8,7 +8,7 @@ import shapes
 
 import coneflat
 from coneflat import errors
-from coneflat.marks import dihedral_angles
+from coneflat.geometry.dihedral import dihedral_angles
 from coneflat.mesh import TriangleMesh
 
 

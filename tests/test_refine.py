@@ -315,9 +315,10 @@ def test_log_scale_at_crossings_is_bounded_by_convexity():
     assert (crossings.log_scale >= np.log(on_flat) - 1e-9).all()
 
 
-def unfolded(mesh, cones, refined):
+def unfolded(mesh, cones, refined, **choices):
     """The refined mesh in the plane, cut along edges of the input: cut faces, points, and the cut."""
-    seams = find_seams(mesh, cones, np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1))
+    costs = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
+    seams = find_seams(mesh, cones, costs, **choices)
     edges = refined.edges_on(seams)
     cut = cut_open(refined.mesh, edges).mesh
     on_cut = np.isin(refined.mesh.halfedge_edges, edges)
@@ -343,8 +344,9 @@ def test_vertices_have_the_places_that_undoing_the_flips_finds():
     mesh, cones, metric = with_cones(noisy(shapes.sphere(2), 0.05))
     refined = refine(mesh, metric)
     assert len(refined.crossing_edges)
-    seams, edges, cut, points = unfolded(mesh, cones, refined)
-    assert len(edges) == len(seams)  # so that both are cut along the same lines
+    # So that both are cut along the same lines.
+    seams, edges, cut, points = unfolded(mesh, cones, refined, forbidden=refined.crossing_edges)
+    assert len(edges) == len(seams)
     straight = straight_triangles(metric.triangulation, metric.flips)
     disk = cut_open(mesh, seams).mesh
     on_cut = np.isin(mesh.halfedge_edges, seams)

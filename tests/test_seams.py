@@ -1,3 +1,5 @@
+"""Seams open every surface to disks, as they are asked to."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -6,19 +8,21 @@ import shapes
 
 from coneflat import TriangleMesh, cut_open, errors, find_seams
 from coneflat.graph import MultiGraph
-from coneflat.seams.steiner import steiner_tree
+from coneflat.mesh import label_components
 
+NONE = np.array([], dtype=int)
 SURFACES = {
     "sphere": shapes.sphere(3),
     "torus": shapes.torus(),
     "disk": shapes.hill(),
     "annulus": shapes.annulus(),
     "genus 1": shapes.genus(1),
-    "genus 4": shapes.genus(4),
+    "genus 2": shapes.genus(2),
+    "genus 3": shapes.genus(3),
 }
 
 
-def edge_costs(mesh):
+def lengths_of(mesh):
     return np.linalg.norm(mesh.vertices[mesh.edges[:, 0]] - mesh.vertices[mesh.edges[:, 1]], axis=1)
 
 
@@ -38,65 +42,156 @@ def remove_faces(shape, count, seed):
     return vertices[used], index.reshape(-1, 3)
 
 
+def with_cones(shape, count, seed=0):
+    """A mesh and some of its inner vertices."""
+    mesh = TriangleMesh(*shape)
+    inside = np.flatnonzero(~mesh.is_boundary_vertex)
+    return mesh, np.random.default_rng(seed).choice(inside, count, replace=False)
+
+
+def assert_opened(mesh, seams, cones, required=NONE, pieces=1):
+    disk = cut_open(mesh, seams)
+    assert disk.pieces == pieces
+    assert disk.mesh.components[0] == disk.mesh.boundary_loops[0] == disk.mesh.euler_characteristic == pieces
+    assert not mesh.is_boundary_edge[seams].any()
+    assert np.isin(required, seams).all()
+    assert (np.diff(disk.origin) >= 0).all()
+    np.testing.assert_array_equal(disk.origin[disk.mesh.faces], mesh.faces)
+    on_border = np.zeros(len(mesh.vertices), dtype=bool)
+    on_border[disk.origin[disk.mesh.is_boundary_vertex]] = True
+    assert on_border[cones].all()
+    # Nothing dangles: a seam ends at cones, boundaries and what had to be cut.
+    ends, degree = np.unique(mesh.edges[seams], return_counts=True)
+    loose = ends[(degree == 1) & ~mesh.is_boundary_vertex[ends]]
+    assert set(loose.tolist()) <= {*cones.tolist(), *mesh.edges[required].ravel().tolist()}
+
+
 @pytest.mark.parametrize("name", SURFACES)
 @pytest.mark.parametrize("holes", [0, 1, 5])
 @pytest.mark.parametrize("cones", [0, 1, 2, 9])
 def test_seams_open_every_surface_to_a_disk(name, holes, cones):
     shape = remove_faces(SURFACES[name], holes, seed=holes) if holes else SURFACES[name]
-    mesh = TriangleMesh(*shape)
+    mesh, terminals = with_cones(shape, cones, seed=cones)
+    seams = find_seams(mesh, terminals, lengths_of(mesh))
     if name == "sphere" and holes == 0 and cones < 2:
-        return  # a point does not open a sphere
-    rng = np.random.default_rng(cones)
-    terminals = rng.choice(np.flatnonzero(~mesh.is_boundary_vertex), cones, replace=False)
-    seams = find_seams(mesh, terminals, edge_costs(mesh))
-    disk = cut_open(mesh, seams)
-    assert disk.mesh.euler_characteristic == 1
-    assert disk.mesh.boundary_loops[0] == 1
-    assert not mesh.is_boundary_edge[seams].any()
-    on_border = np.zeros(len(mesh.vertices), dtype=bool)
-    on_border[disk.origin[disk.mesh.is_boundary_vertex]] = True
-    assert on_border[terminals].all()
-    np.testing.assert_array_equal(disk.origin[disk.mesh.faces], mesh.faces)
-    # Nothing dangles: a seam ends at cones and boundaries only.
-    ends, degree = np.unique(mesh.edges[seams], return_counts=True)
-    loose = ends[(degree == 1) & ~mesh.is_boundary_vertex[ends]]
-    assert set(loose.tolist()) <= set(terminals.tolist())
+        assert len(seams) == 0  # a point does not open a sphere
+        return
+    assert_opened(mesh, seams, terminals)
 
 
-def test_seams_avoid_forbidden_edges():
-    mesh = TriangleMesh(*shapes.torus(30, 20))
-    # The second half of the faces share a diagonal each with the first.
-    count = len(mesh.faces) // 2
-    diagonal = np.zeros(len(mesh.edges), dtype=bool)
-    pairs = {tuple(sorted(face[[0, 2]])) for face in mesh.faces[:count].tolist() for face in [np.array(face)]}
-    for edge, ends in enumerate(mesh.edges.tolist()):
-        diagonal[edge] = tuple(ends) in pairs
-    assert diagonal.sum() == count
-    seams = find_seams(mesh, np.array([3, 100, 250]), edge_costs(mesh), diagonal)
-    assert not diagonal[seams].any()
+def test_a_slit_between_neighbours_is_two_edges_long():
+    # One edge has the same two vertices on both sides: a triangle mesh cannot be open there.
+    mesh = TriangleMesh(*shapes.tetrahedron())
+    cones = np.array([0, 1])
+    seams = find_seams(mesh, cones, lengths_of(mesh))
+    assert len(seams) == 2
     assert cut_open(mesh, seams).mesh.euler_characteristic == 1
-
-
-def test_torus_is_cut_along_short_loops():
-    mesh = TriangleMesh(*shapes.torus(60, 30))
-    seams = find_seams(mesh, np.array([], dtype=int), edge_costs(mesh))
-    # Once around the tube at its widest and once around the hole from there, as edges go.
-    assert edge_costs(mesh)[seams].sum() < 2 * np.pi * (1.6 + 0.6) * 1.1
+    edge = np.flatnonzero((mesh.edges == cones).all(axis=1))
+    with pytest.raises(errors.MetricError, match="leaves no disk"):
+        cut_open(mesh, edge)
 
 
 def test_wrong_seams_are_refused():
     mesh = TriangleMesh(*shapes.torus())
     with pytest.raises(errors.MetricError, match="leaves no disk"):
         cut_open(mesh, np.array([0]))
+    with pytest.raises(errors.MetricError, match="leaves no disk"):
+        cut_open(mesh, NONE)
 
 
-def test_steiner_tree_of_a_star_is_the_star():
-    # A hub with three arms of length 1 and terminals at their tips, joined by detours of length 1.9.
-    tails, heads = np.array([0, 0, 0, 1, 2, 3]), np.array([1, 2, 3, 2, 3, 1])
-    tree = steiner_tree(MultiGraph(4, tails, heads, np.array([1, 1, 1, 1.9, 1.9, 1.9])), np.array([1, 2, 3]))
-    assert len(tree.edges) == 2  # within twice of the best, 3
-    tree = steiner_tree(MultiGraph(4, tails, heads, np.array([1, 1, 1, 2.1, 2.1, 2.1])), np.array([1, 2, 3]))
-    assert tree.edges.tolist() == [0, 1, 2]
+def test_diagonals_are_avoided():
+    mesh = TriangleMesh(*shapes.torus(30, 20))
+    # Each of the second half of the faces shares a diagonal with one of the first.
+    diagonal = np.diff(mesh.edge_faces % (len(mesh.faces) // 2), axis=1)[:, 0] == 0
+    assert diagonal.sum() == len(mesh.faces) // 2
+    cones = np.array([3, 100, 250])
+    seams = find_seams(mesh, cones, lengths_of(mesh), diagonal)
+    assert not diagonal[seams].any()
+    assert_opened(mesh, seams, cones)
+    # Where a cone has nothing else around it, one of them is cut, but no more.
+    around = (mesh.edges == cones[0]).any(axis=1)
+    seams = find_seams(mesh, cones, lengths_of(mesh), diagonal | around)
+    assert (diagonal | around)[seams].sum() == 1
+
+
+class TestRequired:
+    def test_seams_between_parts_that_must_be_cut(self):
+        mesh, cones = with_cones(SURFACES["genus 2"], 3)
+        required = np.random.default_rng(1).choice(len(mesh.edges), 12, replace=False)
+        seams = find_seams(mesh, cones, lengths_of(mesh), required=required)
+        assert_opened(mesh, seams, cones, required)
+
+    def test_a_loop_around_a_handle_leaves_one_piece(self):
+        mesh, cones = with_cones(shapes.torus(40, 20), 2)
+        ring = np.flatnonzero((mesh.edges < 20).all(axis=1))
+        ring = ring[np.isin(np.diff(mesh.edges[ring], axis=1)[:, 0], (1, 19))]
+        assert len(ring) == 20
+        seams = find_seams(mesh, cones, lengths_of(mesh), required=ring)
+        assert_opened(mesh, seams, cones, ring)
+
+    def test_curves_that_part_the_surface_leave_pieces_that_are_disks_each(self):
+        mesh, cones = with_cones(SURFACES["genus 3"], 6)
+        middle = mesh.vertices[mesh.faces].mean(axis=1)
+        # Three slices; the planes go through the arms between the holes.
+        slab = np.digitize(middle[:, 1], [2.5, 4.5])
+        beside = slab[mesh.edge_faces]
+        required = np.flatnonzero(beside[:, 0] != beside[:, 1])
+        glued = beside[:, 0] == beside[:, 1]
+        pieces, _ = label_components(len(mesh.faces), *mesh.edge_faces[glued].T)
+        assert pieces > 2
+        seams = find_seams(mesh, cones, lengths_of(mesh), required=required)
+        assert_opened(mesh, seams, cones, required, pieces)
+
+    def test_single_edges_and_those_of_the_boundary(self):
+        mesh = TriangleMesh(*shapes.sphere(2))
+        seams = find_seams(mesh, NONE, lengths_of(mesh), required=np.array([7]))
+        assert 7 in seams
+        assert len(seams) == 2
+        assert cut_open(mesh, seams).pieces == 1
+        mesh, cones = with_cones(shapes.hill(), 2)
+        boundary = np.flatnonzero(mesh.is_boundary_edge)
+        np.testing.assert_array_equal(
+            find_seams(mesh, cones, lengths_of(mesh), required=boundary),
+            find_seams(mesh, cones, lengths_of(mesh)),
+        )
+
+
+class TestForbidden:
+    @pytest.mark.parametrize("name", ["sphere", "torus", "annulus", "genus 2"])
+    def test_seams_are_found_just_if_there_are_any(self, name):
+        # The surface minus all edges that may be cut and can be reached falls into disks just if some seams do.
+        outcomes = set()
+        for seed in range(16):
+            rng = np.random.default_rng(seed)
+            mesh, cones = with_cones(remove_faces(SURFACES[name], 1 + seed % 2, seed), 1 + seed % 4, seed)
+            inside = ~mesh.is_boundary_edge
+            forbidden = (rng.random(len(mesh.edges)) < rng.uniform(0.3, 0.8)) & inside
+            _, part = label_components(len(mesh.vertices), *mesh.edges[~forbidden].T)
+            parts = np.unique(part[np.concatenate([cones, np.flatnonzero(mesh.is_boundary_vertex)])])
+            reachable = ~forbidden & inside & (part[mesh.edges[:, 0]] == parts[0])
+            possible = len(parts) == 1
+            try:
+                cut_open(mesh, np.flatnonzero(reachable))
+            except errors.MetricError:
+                possible = False
+            outcomes.add(possible)
+            if possible:
+                seams = find_seams(mesh, cones, lengths_of(mesh), forbidden=np.flatnonzero(forbidden))
+                assert not forbidden[seams].any()
+                assert_opened(mesh, seams, cones)
+            else:
+                with pytest.raises(errors.SeamError, match="forbidden as seams"):
+                    find_seams(mesh, cones, lengths_of(mesh), forbidden=np.flatnonzero(forbidden))
+        assert outcomes == {False, True}
+
+    def test_the_count_of_edges_that_are_needed(self):
+        mesh, cones = with_cones(shapes.sphere(2), 3)
+        around = np.flatnonzero((mesh.edges == cones[0]).any(axis=1))
+        message = f"1 edge of {len(mesh.edges)} is needed to open the mesh, but forbidden as seams"
+        with pytest.raises(errors.SeamError, match=message):
+            find_seams(mesh, cones, lengths_of(mesh), forbidden=around)
+        with pytest.raises(errors.SeamError, match="2 edges of 480 are both required and forbidden as seams"):
+            find_seams(mesh, cones, lengths_of(mesh), required=around[:2], forbidden=around)
 
 
 def test_graph_prefers_the_cheaper_of_parallel_edges_and_ignores_loops():

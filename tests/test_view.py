@@ -12,7 +12,7 @@ from coneflat.errors import OptionError
 from coneflat.sample import sample_path
 from coneflat.view.camera import default_eye, fit_camera
 from coneflat.view.projection import render_mesh
-from coneflat.view.raster import FRAGMENTS_PER_CHUNK, barycentrics, rasterise
+from coneflat.view.raster import barycentrics, rasterise
 from coneflat.view.shading import checkerboard
 
 SQUARE = np.array([[0, 1, 2], [0, 2, 3]])
@@ -92,12 +92,6 @@ def test_a_triangulated_region_has_neither_gaps_nor_overlaps():
     apart = sum(rasterise(points, [face], 100, 100).covered.astype(int) for face in fan)
     assert apart.max() == 1
     assert np.array_equal(apart == 1, together)
-
-
-def test_pictures_larger_than_a_chunk_are_whole():
-    side = int(1.2 * np.sqrt(FRAGMENTS_PER_CHUNK))
-    square = np.array([[0, 0, 0], [side, 0, 0], [side, side, 0], [0, side, 0]])
-    assert rasterise(square, SQUARE, side, side).covered.all()
 
 
 def test_parts_outside_the_picture_and_flat_triangles_are_skipped():

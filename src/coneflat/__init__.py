@@ -42,6 +42,8 @@ _HOMES = {
     "ConeSolution": "cones",
     "scaled_lengths": "conformal.linear",
     "find_seams": "seams",
+    "edge_costs": "seams",
+    "visible_share": "geometry.visibility",
     "cut_open": "seams",
     "CutMesh": "seams",
     "least_squares_layout": "layout",
@@ -70,6 +72,7 @@ __all__ = [
     "cotangent_laplacian",
     "cotangents",
     "cut_open",
+    "edge_costs",
     "edge_lengths",
     "errors",
     "find_cones",
@@ -82,6 +85,7 @@ __all__ = [
     "read_mesh",
     "sample_path",
     "scaled_lengths",
+    "visible_share",
 ]
 
 if TYPE_CHECKING:
@@ -99,6 +103,7 @@ if TYPE_CHECKING:
         edge_lengths,
         mollify,
     )
+    from .geometry.visibility import visible_share
     from .io import MeshFile, read_mesh
     from .layout import least_squares_layout
     from .mesh import TriangleMesh
@@ -106,7 +111,7 @@ if TYPE_CHECKING:
     from .pipeline import flatten
     from .result import Flattening
     from .sample import sample_path
-    from .seams import CutMesh, cut_open, find_seams
+    from .seams import CutMesh, cut_open, edge_costs, find_seams
     from .validation import CheckedMesh, check_mesh
 
 

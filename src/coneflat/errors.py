@@ -50,6 +50,10 @@ class CurvatureError(ConeflatError, ValueError):
     """The curvatures asked for belong to no metric (Gauss-Bonnet, or a cone of 2 pi and more)."""
 
 
+class SeamError(ConeflatError, ValueError):
+    """The seams asked for cannot be had."""
+
+
 class MetricError(ConeflatError, ArithmeticError):
     """No usable flat metric or layout was found."""
 

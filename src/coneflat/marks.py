@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._arrays import BoolArray, FloatArray, IntArray, dots
+from ._arrays import BoolArray, IntArray
 from .errors import OptionError
+from .geometry.dihedral import dihedral_angles
 from .inputs import InputMesh
-from .mesh import TriangleMesh, end_corners
+from .mesh import end_corners
 from .numbering import turn_corners
 from .options import Options
 from .text import list_some, plural
@@ -27,18 +28,8 @@ def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh) -> Bo
     elif options.seams is not None:
         marked[_named(checked, np.asarray(options.seams))] = True
     if options.sharp_angle is not None:
-        marked |= dihedral_angles(mesh) > options.sharp_angle
+        marked |= np.abs(dihedral_angles(mesh)) > options.sharp_angle
     return marked & ~mesh.is_boundary_edge
-
-
-def dihedral_angles(mesh: TriangleMesh) -> FloatArray:
-    """Return (e,) the angle between the normals of the faces beside each edge, radians; 0 on the boundary."""
-    corners = mesh.vertices[mesh.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    one, two = normals[mesh.edge_faces[:, 0]], normals[mesh.edge_faces[:, 1]]
-    across = np.cross(one, two)
-    angles: FloatArray = np.arctan2(np.sqrt(dots(across, across)), dots(one, two))
-    return np.where(mesh.is_boundary_edge, 0.0, angles)
 
 
 def _named(checked: CheckedMesh, pairs: IntArray) -> IntArray:

@@ -4,11 +4,48 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, dots
 
 # Relative to the range of the values: far above what rounding makes of equal ones, far below what tells others
 # apart.
 EQUAL = 1e-9
+
+
+def _own_vectors(centred: FloatArray) -> tuple[FloatArray | None, FloatArray | None]:
+    """Return two unit vectors that turn with the shape, None for those that it is too symmetric to have.
+
+    Args:
+        centred: (n, 3) vertices relative to their centre, at most 1 from it.
+    """
+    squares = dots(centred, centred)
+    one, two = squares @ centred, squares**2 @ centred
+    across = np.cross(one, two)
+    lengths = np.linalg.norm(one), np.linalg.norm(two), np.linalg.norm(across)
+    # What rounding leaves of vectors that vanish means nothing.
+    has_one = lengths[0] > 1e-6 * len(centred)
+    has_across = lengths[2] > 1e-6 * max(lengths[0] * lengths[1], 1e-12 * len(centred) ** 2)
+    return one / lengths[0] if has_one else None, across / lengths[2] if has_across else None
+
+
+def _centred(vertices: FloatArray) -> FloatArray:
+    """Return (n, 3) vertices relative to their centre, the farthest at 1; or all at 0."""
+    centred = vertices - vertices.mean(axis=0)
+    size = float(np.sqrt(dots(centred, centred).max()))
+    return centred / size if size > 0 else centred
+
+
+def own_axes(vertices: FloatArray) -> FloatArray:
+    """Return three orthonormal axes, rows, that turn with the shape.
+
+    Those that it is too symmetric to have are taken from the coordinate axes.
+    """
+    axes: list[FloatArray] = []
+    for vector in (*_own_vectors(_centred(vertices)), *np.eye(3)):
+        if vector is not None and len(axes) < 2:
+            rest = vector - sum(axis * (axis @ vector) for axis in axes)
+            if np.linalg.norm(rest) > 0.5:
+                axes.append(rest / np.linalg.norm(rest))
+    return np.stack([axes[0], axes[1], np.cross(axes[0], axes[1])])
 
 
 def tie_key(vertices: FloatArray) -> FloatArray:
@@ -17,21 +54,13 @@ def tie_key(vertices: FloatArray) -> FloatArray:
     Distances from the centre alone would not tell mirror images apart. Two vectors that belong to the shape span its
     plane of mirror symmetry, if it has one, and their cross product tells the sides of it.
     """
-    centred = vertices - vertices.mean(axis=0)
-    size = float(np.sqrt((centred**2).sum(axis=1).max()))
-    if size == 0:
-        return np.zeros(len(vertices))
-    centred = centred / size
-    squares = (centred**2).sum(axis=1)
-    one, two = squares @ centred, squares**2 @ centred
-    across = np.cross(one, two)
-    lengths = np.linalg.norm(one), np.linalg.norm(two), np.linalg.norm(across)
-    key: FloatArray = squares.copy()
-    # A shape with more symmetry has no such vectors; what rounding leaves of them means nothing.
-    if lengths[0] > 1e-6 * len(vertices):
-        key += 0.3 * (centred @ one) / lengths[0]
-    if lengths[2] > 1e-6 * max(lengths[0] * lengths[1], 1e-12 * len(vertices) ** 2):
-        key += 0.1 * (centred @ across) / lengths[2]
+    centred = _centred(vertices)
+    one, across = _own_vectors(centred)
+    key: FloatArray = dots(centred, centred)
+    if one is not None:
+        key += 0.3 * (centred @ one)
+    if across is not None:
+        key += 0.1 * (centred @ across)
     # On symmetric shapes many vertices are alike. Which of them come first does not matter, but from there on the
     # others must follow alike: by their distances from the first, the second, the third.
     for weight in (0.05, 0.02, 0.01):

@@ -1,6 +1,7 @@
 """Where to cut: seams that open a surface to a disk with every cone on its border."""
 
+from .costs import edge_costs
 from .cut import CutMesh, cut_open, open_along
-from .graph import find_seams
+from .find import find_seams
 
-__all__ = ["CutMesh", "cut_open", "find_seams", "open_along"]
+__all__ = ["CutMesh", "cut_open", "edge_costs", "find_seams", "open_along"]

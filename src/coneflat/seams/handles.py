@@ -8,7 +8,6 @@ from .._arrays import FloatArray, IntArray
 from ..geometry.ties import tie_key
 from ..graph import MultiGraph
 from ..mesh import TriangleMesh
-from .graph import contract_loops
 
 
 def handle_loops(mesh: TriangleMesh) -> list[IntArray]:
@@ -31,13 +30,24 @@ def handle_loops(mesh: TriangleMesh) -> list[IntArray]:
     in_tree = np.zeros(len(inside), dtype=bool)
     in_tree[dual.edges_between(reached, before[reached])] = True
 
-    node_of, count, _ = contract_loops(mesh)
+    node_of = _contract_loops(mesh)
     left = np.flatnonzero(~in_tree)
     ends = node_of[mesh.edges[inside[left]]]
-    primal = MultiGraph(count, ends[:, 0], ends[:, 1], np.ones(len(left)))
+    primal = MultiGraph(len(node_of), ends[:, 0], ends[:, 1], np.ones(len(left)))
     closes = np.ones(len(left), dtype=bool)
     closes[primal.minimum_spanning_tree()] = False
     return [_loop(dual, across, before, edge) for edge in left[closes]]
+
+
+def _contract_loops(mesh: TriangleMesh) -> IntArray:
+    """Return (n,) a node for each vertex, the same for all of a boundary loop: its first."""
+    count, loop = mesh.boundary_loops
+    node_of = np.arange(len(mesh.vertices))
+    on_loop = np.flatnonzero(loop >= 0)
+    representative = np.full(count, len(mesh.vertices))
+    np.minimum.at(representative, loop[on_loop], on_loop)
+    node_of[on_loop] = representative[loop[on_loop]]
+    return node_of
 
 
 def _loop(dual: MultiGraph, across: IntArray, before: IntArray, edge: int) -> IntArray:

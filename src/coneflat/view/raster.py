@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import BoolArray, FloatArray, IntArray
-
-FRAGMENTS_PER_CHUNK = 2_000_000
-"""About how many covered pixels are held at once; bounds the memory, not the result."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,28 +40,13 @@ def rasterise(points: ArrayLike, faces: ArrayLike, width: int, height: int) -> C
         faces: (m, 3) vertex indices, of either orientation.
         width, height: size of the picture in pixels.
     """
-    points = np.asarray(points, dtype=np.float64)
-    faces = np.asarray(faces, dtype=np.int64)
-    face = np.full(width * height, -1, dtype=np.int64)
-    depth = np.full(width * height, np.inf)
-    corners = points[faces]
-    gradient = _depth_gradient(corners)
-    nearest, farthest = corners[:, :, 2].min(axis=1), corners[:, :, 2].max(axis=1)
-    for chunk in _chunks(corners, height):
-        pixel, owner = _fragments(corners[chunk], width, height)
-        owner += chunk.start
-        x, y = pixel % width + 0.5, pixel // width + 0.5
-        first = corners[owner, 0]
-        z = first[:, 2] + gradient[owner, 0] * (x - first[:, 0]) + gradient[owner, 1] * (y - first[:, 1])
-        # In a triangle seen nearly edge on the gradient is mostly rounding error.
-        z = np.clip(z, nearest[owner], farthest[owner])
-        nearer = z < depth[pixel]
-        pixel, owner, z = pixel[nearer], owner[nearer], z[nearer]
-        # Of repeated indices an assignment keeps the last, so the nearest must come last.
-        order = np.argsort(-z, kind="stable")
-        depth[pixel[order]] = z[order]
-        face[pixel[order]] = owner[order]
-    return Coverage(face.reshape(height, width), depth.reshape(height, width))
+    from ..geometry.raster_kernel import fill_nearest
+
+    face = np.full((height, width), -1, dtype=np.int64)
+    depth = np.full((height, width), np.inf)
+    points, faces = np.ascontiguousarray(points, np.float64), np.ascontiguousarray(faces, np.int64)
+    fill_nearest(points, faces, depth, face)
+    return Coverage(face, depth)
 
 
 def barycentrics(points: ArrayLike, faces: ArrayLike, coverage: Coverage) -> FloatArray:
@@ -92,66 +72,3 @@ def barycentrics(points: ArrayLike, faces: ArrayLike, coverage: Coverage) -> Flo
 
 def _cross(p: FloatArray, q: FloatArray) -> FloatArray:
     return np.asarray(p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0])
-
-
-def _depth_gradient(corners: FloatArray) -> FloatArray:
-    """Return the (m, 2) change of depth per pixel to the right and downwards; 0 seen edge on."""
-    p, q = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    total = _cross(p, q)
-    total = np.where(total == 0.0, np.inf, total)
-    right = (p[:, 2] * q[:, 1] - q[:, 2] * p[:, 1]) / total
-    down = (q[:, 2] * p[:, 0] - p[:, 2] * q[:, 0]) / total
-    return np.column_stack([right, down])
-
-
-def _chunks(corners: FloatArray, height: int) -> Iterator[slice]:
-    """Yield runs of faces whose bounding boxes hold about `FRAGMENTS_PER_CHUNK` pixels."""
-    if not len(corners):
-        return
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    extent = np.ceil(high[:, :2] - low[:, :2]) + 1.0
-    filled = np.cumsum(extent[:, 0] * np.minimum(extent[:, 1], height))
-    bounds = np.flatnonzero(np.diff(filled // FRAGMENTS_PER_CHUNK)) + 1
-    starts = [0, *bounds.tolist(), len(corners)]
-    for start, stop in pairwise(starts):
-        yield slice(start, stop)
-
-
-def _fragments(corners: FloatArray, width: int, height: int) -> tuple[IntArray, IntArray]:
-    """Return the pixels that the triangles cover, and for each the triangle (row in `corners`)."""
-    first = _first_centre(corners[:, :, 1].min(axis=1), height)
-    stop = _first_centre(corners[:, :, 1].max(axis=1), height)
-    owner, row = _expand(first, stop)
-    left, right = _crossings(corners[owner, :, :2], row.astype(np.float64) + 0.5)
-    span, column = _expand(_first_centre(left, width), _first_centre(right, width))
-    return row[span] * width + column, owner[span]
-
-
-def _crossings(corners: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the least and greatest x at which each triangle's outline crosses its scan line y."""
-    left = np.full(len(y), np.inf)
-    right = np.full(len(y), -np.inf)
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        p, q = corners[:, i], corners[:, j]
-        # From the upper end to the lower in every triangle: both faces of an edge then round alike.
-        down = (p[:, 1] <= q[:, 1])[:, None]
-        upper, lower = np.where(down, p, q), np.where(down, q, p)
-        crosses = (upper[:, 1] <= y) & (y < lower[:, 1])
-        drop = np.where(crosses, lower[:, 1] - upper[:, 1], 1.0)
-        x = upper[:, 0] + (y - upper[:, 1]) / drop * (lower[:, 0] - upper[:, 0])
-        left = np.where(crosses, np.minimum(left, x), left)
-        right = np.where(crosses, np.maximum(right, x), right)
-    return left, right
-
-
-def _first_centre(position: FloatArray, size: int) -> IntArray:
-    """Return the first pixel whose centre is at `position` or beyond, within [0, size]."""
-    return np.clip(np.ceil(position - 0.5), 0, size).astype(np.int64)
-
-
-def _expand(start: IntArray, stop: IntArray) -> tuple[IntArray, IntArray]:
-    """Return (i, k) for every i and every k in [start[i], stop[i])."""
-    count = np.maximum(stop - start, 0)
-    index = np.repeat(np.arange(len(start)), count)
-    offset = np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
-    return index, start[index] + offset

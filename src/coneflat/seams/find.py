@@ -1,0 +1,116 @@
+"""Seams of a connected mesh.
+
+Every boundary loop is a place that seams are tied to anywhere, as if it were contracted to a point. Loops and cones
+are connected by a tree; where there are handles, the shortest loops around them are cut as well. That opens the mesh
+to a disk. Then seams are exchanged for shorter and straighter ones.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..errors import OptionError, SeamError
+from ..geometry.ties import tie_key
+from ..mesh import TriangleMesh
+from ..text import plural
+from .first import connect_circles, handle_count, open_handles
+from .improve import shorten
+from .key_paths import Fixed
+from .open_mesh import NOTHING, OpenMesh
+from .straighten import BENDING, Straightener
+
+# Relative: on grids many paths are equally long, and rounding should not choose among them, lest the result
+# depend on the numbering. Far above rounding, far below what anyone would see in a seam.
+TIE_BREAK = 1e-7
+# With much more, one avoided edge that needs turns could cost more than two without.
+MOST_BENDING = 0.25
+
+
+def find_seams(
+    mesh: TriangleMesh,
+    cones: IntArray,
+    edge_costs: FloatArray,
+    is_avoided: BoolArray | None = None,
+    *,
+    required: IntArray = NOTHING,
+    forbidden: IntArray = NOTHING,
+    bending: float = BENDING,
+) -> IntArray:
+    """Return the edges (k,) to cut so that a connected mesh becomes a disk with all cones on its border.
+
+    Where required edges close curves that cut the mesh into pieces, every piece becomes a disk.
+
+    Args:
+        mesh: the mesh.
+        cones: (s,) vertices that the seams must reach.
+        edge_costs: (e,) positive; the length of each edge, say, or what `edge_costs` makes of it.
+        is_avoided: (e,) edges to cut only if nothing else serves, such as diagonals of polygons.
+        required: edges that are cut in any case; on the boundary they mean nothing.
+        forbidden: edges that are not cut.
+        bending: a seam that turns by a right angle at every vertex is taken for longer by this part of its length;
+            0 to 0.25. Of ways that are nearly equally short the straighter are preferred.
+
+    Raises:
+        SeamError: every set of seams needs forbidden edges; or edges are both required and forbidden.
+        OptionError: `bending` is none.
+    """
+    if not 0 <= bending <= MOST_BENDING:
+        raise OptionError(f"bending must be a number from 0 to {MOST_BENDING:g}, not {bending:g}")
+    is_required, is_forbidden = np.zeros((2, len(mesh.edges)), dtype=bool)
+    is_required[required] = True
+    is_required &= ~mesh.is_boundary_edge
+    is_forbidden[forbidden] = True
+    _refuse(is_required & is_forbidden, "both required and forbidden as seams")
+    key = tie_key(mesh.vertices)
+    costs = edge_costs * (1 + TIE_BREAK * key[mesh.edges].sum(axis=1))
+    for dear in (is_avoided, is_forbidden):
+        if dear is not None and dear.any():
+            costs = np.where(dear, costs + costs.sum(), costs)
+
+    work = OpenMesh(mesh, costs, mesh.is_boundary_edge | is_required)
+    fixed = _fixed(work, cones)
+    _open(work, fixed, int(np.argmax(key)))
+    if work.cut.any():
+        shorten(work, fixed)
+        if bending > 0:
+            Straightener(work, float(bending)).straighten(fixed)
+    seams = _as_slit(mesh, costs, work.cut[mesh.edge_halfedges[:, 0]] & ~mesh.is_boundary_edge)
+    _refuse(seams & is_forbidden, "needed to open the mesh, but forbidden as seams")
+    return np.flatnonzero(seams)
+
+
+def _refuse(edges: BoolArray, what: str) -> None:
+    count = int(edges.sum())
+    if count:
+        raise SeamError(f"{plural(count, 'edge')} of {len(edges):,} {'is' if count == 1 else 'are'} {what}")
+
+
+def _fixed(work: OpenMesh, cones: IntArray) -> Fixed:
+    """Return what the border is before there are seams, and the cones off it."""
+    on_border, is_cone = np.zeros((2, len(work.height)), dtype=bool)
+    on_border[work.tail[work.cut]] = on_border[work.mesh.heads[work.cut]] = True
+    is_cone[cones] = True
+    return Fixed(work.cut.copy(), on_border, is_cone & ~on_border)
+
+
+def _open(work: OpenMesh, fixed: Fixed, base: int) -> None:
+    """Cut a mesh to disks. Seams of a surface with handles meet at `base` if there is nothing else to meet at."""
+    points = np.flatnonzero(fixed.cones)
+    if not len(points) and not work.cut.any():
+        points = np.array([base])
+    connect_circles(work, work.label_circles(points))
+    # A point that is still alone had nothing to be connected to.
+    circles = work.label_circles(points)
+    if handle_count(work, circles):
+        open_handles(work, circles)
+
+
+def _as_slit(mesh: TriangleMesh, costs: FloatArray, seams: BoolArray) -> BoolArray:
+    """Return seams that a mesh can be cut along: a slit of one edge would have the same vertices on both sides."""
+    if seams.sum() != 1 or mesh.is_boundary_edge.any():
+        return seams
+    beside = np.isin(mesh.edges, mesh.edges[seams]).sum(axis=1) == 1
+    longer = seams.copy()
+    longer[np.argmin(np.where(beside, costs, np.inf))] = True
+    return longer

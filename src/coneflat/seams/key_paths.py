@@ -1,0 +1,179 @@
+"""Seams as a graph: key paths between cones, borders and the points where seams branch."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from .open_mesh import NOTHING, Circles, OpenMesh
+
+
+@dataclass(frozen=True, eq=False)
+class Fixed:
+    """What seams have to hold on to.
+
+    Attributes:
+        sides: (3m,) half-edges of the border that is there without them: boundaries, and edges that must be cut.
+        vertices: (n,) on that border.
+        cones: (n,) off that border.
+    """
+
+    sides: BoolArray
+    vertices: BoolArray
+    cones: BoolArray
+
+    def holds(self, vertex: int) -> bool:
+        """Return whether a seam may end at a vertex."""
+        return bool(self.vertices[vertex] or self.cones[vertex])
+
+
+@dataclass(frozen=True, eq=False)
+class KeyPath:
+    """A seam that does not branch.
+
+    Attributes:
+        halfedges: one side of each of its edges, in order.
+        ends: the vertices that it leads from and to.
+        cost: the sum over its edges.
+    """
+
+    halfedges: IntArray
+    ends: tuple[int, int]
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What falls apart when paths are taken away.
+
+    Attributes:
+        circles: of the border that is left.
+        ends: those that the paths had tied together, the longest last.
+        arms: (len(ends),) the cost of the path to each, 0 where several meet.
+    """
+
+    circles: Circles
+    ends: list[int]
+    arms: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class KeyPaths:
+    """All seams, and how they follow one another along the border.
+
+    Attributes:
+        work: the mesh that they open.
+        fixed: what they hold on to.
+        paths: the key paths.
+        at: the paths that end at each vertex; loops twice.
+        curves: for each border curve the paths along it, in order; most are there twice, with both sides.
+    """
+
+    work: OpenMesh
+    fixed: Fixed
+    paths: list[KeyPath]
+    at: dict[int, list[int]]
+    curves: list[list[int]]
+
+    def cost(self, some: Iterable[int]) -> float:
+        """Return what some of the paths cost."""
+        return sum(self.paths[p].cost for p in some)
+
+    def halfedges(self, some: Iterable[int]) -> IntArray:
+        """Return the half-edges of some of the paths, one for each edge."""
+        return np.concatenate([NOTHING, *(self.paths[p].halfedges for p in some)])
+
+    def with_loose_ends(self, gone: Collection[int]) -> frozenset[int]:
+        """Return paths to take away, with those that would then end nowhere."""
+        removed, waiting = set(gone), list(gone)
+        while waiting:
+            for vertex in self.paths[waiting.pop()].ends:
+                if not self.fixed.holds(vertex):
+                    left = [p for p in self.at[vertex] if p not in removed]
+                    if len(left) == 1:
+                        removed.add(left[0])
+                        waiting.append(left[0])
+        return frozenset(removed)
+
+    def loose(self) -> frozenset[int]:
+        """Return the paths that end nowhere."""
+        ends = [
+            paths[0] for vertex, paths in self.at.items() if len(paths) == 1 and not self.fixed.holds(vertex)
+        ]
+        return self.with_loose_ends(ends)
+
+    def touched_by(self, gone: Iterable[int], found: IntArray) -> set[int]:
+        """Return the paths that are others now that half-edges were found in the place of some of them."""
+        work = self.work
+        touched = np.zeros(len(work.height), dtype=bool)
+        touched[work.tail[found]] = touched[work.mesh.heads[found]] = True
+        touched[[vertex for p in gone for vertex in self.paths[p].ends]] = True
+        return {
+            p
+            for p, path in enumerate(self.paths)
+            if touched[path.ends[1]] or touched[work.tail[path.halfedges]].any()
+        }
+
+    def take_away(self, gone: frozenset[int]) -> Parts | None:
+        """Glue paths, and return what is to be tied together again; None if that is not just a matter of ties."""
+        work = self.work
+        work.glue(self.halfedges(gone))
+        ends = {vertex for p in gone for vertex in self.paths[p].ends}
+        cones = sorted(vertex for vertex in ends if self.fixed.cones[vertex])
+        circles = work.label_circles(np.array(cones, dtype=np.int64))
+        arms: dict[int, float] = {}
+        inner = set()
+        for p in gone:
+            path = self.paths[p]
+            for h, vertex in zip((path.halfedges[0], work.twin[path.halfedges[-1]]), path.ends, strict=True):
+                circle = int(circles.number[h])
+                if circle < 0:
+                    inner.add(vertex)
+                else:
+                    arms[circle] = 0.0 if circle in arms else path.cost
+        # Euler's formula: what is not a disk now has a handle if there are fewer circles, and ties do not open it.
+        if len(arms) < 2 or len(arms) != 1 + len(gone) - len(inner):
+            return None
+        order = sorted(arms, key=lambda circle: (len(circles.leaving(circle)), circle))
+        return Parts(circles, order, np.array([arms[circle] for circle in order]))
+
+
+def find_key_paths(work: OpenMesh, fixed: Fixed) -> KeyPaths:
+    """Return the seams of an open mesh as a graph."""
+    circles = work.label_circles(NOTHING)
+    on_border = work.cut[circles.around]
+    sides = circles.around[on_border]
+    bounds = np.concatenate([[0], np.cumsum(on_border)])[circles.starts].tolist()
+    tails = work.tail[sides]
+    degree = np.bincount(tails[~fixed.sides[sides]], minlength=len(work.height))
+    is_key = (degree[tails] != 2) | fixed.cones[tails] | fixed.vertices[tails]
+    paths: list[KeyPath] = []
+    at: dict[int, list[int]] = {}
+    curves: list[list[int]] = []
+    by_first: dict[int, int] = {}
+    for start, stop in itertools.pairwise(bounds):
+        keys = np.flatnonzero(is_key[start:stop])
+        curve = np.roll(sides[start:stop], -keys[0])
+        around = []
+        for i, j in itertools.pairwise([*(keys - keys[0]).tolist(), stop - start]):
+            first, back = int(curve[i]), int(work.twin[curve[j - 1]])
+            if fixed.sides[first]:
+                continue
+            number = by_first.get(first, len(paths))
+            around.append(number)
+            if number == len(paths):
+                by_first[back] = number
+                path = KeyPath(
+                    curve[i:j],
+                    (int(work.tail[first]), int(work.tail[back])),
+                    float(work.cost[curve[i:j]].sum()),
+                )
+                paths.append(path)
+                for vertex in path.ends:
+                    at.setdefault(vertex, []).append(number)
+        curves.append(around)
+    return KeyPaths(work, fixed, paths, at, curves)

@@ -1,0 +1,228 @@
+"""A mesh that is being cut open: its border, and the cheapest ways between parts of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..geometry.intrinsic import halfedge_twins
+from ..mesh import TriangleMesh, sort_by_counting
+
+NOTHING = np.empty(0, dtype=np.int64)
+NO_COSTS = np.empty(0)
+# What a search takes for the distance of vertices on the border.
+ON_BORDER = -1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Circles:
+    """The border curves of an open mesh, and single points: what seams are to tie together.
+
+    Attributes:
+        count: how many there are.
+        number: (3m,) the circle that each half-edge leaves, -1 off the border.
+        around: the half-edges that leave a circle, one circle after the other, in order.
+        starts: (count + 1,) where each begins in `around`.
+    """
+
+    count: int
+    number: IntArray
+    around: IntArray
+    starts: IntArray
+
+    def leaving(self, circle: int) -> IntArray:
+        """Return the half-edges that leave a circle, those of the border among them."""
+        return self.around[self.starts[circle] : self.starts[circle + 1]]
+
+
+@dataclass(eq=False)
+class Reach:
+    """What a search found; its arrays are used again.
+
+    Attributes:
+        distance: (n,) what the way to each vertex costs, infinite where the search did not get, -1 on the border.
+        before: (n,) the slot by which each was reached, -1 where the search began.
+        origin: (n,) the circle it was reached from, -1 if from a vertex off the border.
+        reached: (n,) the vertices reached come first.
+        count: how many were.
+        arrival: (count of circles,) what the way to each circle costs.
+        last: (count of circles,) the last slot of that way, -1 if there is none.
+    """
+
+    distance: FloatArray
+    before: IntArray
+    origin: IntArray
+    reached: IntArray
+    count: int = 0
+    arrival: FloatArray = field(default_factory=lambda: NO_COSTS)
+    last: IntArray = field(default_factory=lambda: NOTHING)
+
+    @property
+    def vertices(self) -> IntArray:
+        """The vertices reached off the border."""
+        return self.reached[: self.count]
+
+
+class OpenMesh:
+    """A mesh and what has been cut of it so far.
+
+    Slots are the half-edges that have a twin, sorted by the vertex that they leave.
+
+    Attributes:
+        mesh: the mesh.
+        twin: (3m,) the half-edge on the other side, also of those that are cut; -1 on the boundary of the mesh.
+        tail: (3m,) the vertex that each half-edge leaves.
+        cost: (3m,) what each half-edge costs as part of a seam.
+        cut: (3m,) True for half-edges of the border.
+        height: (n,) lower bounds of what the way from each vertex to the border costs.
+        slots: the half-edge of each slot.
+        effort: how many vertices have been reached by all searches together.
+    """
+
+    def __init__(self, mesh: TriangleMesh, edge_costs: FloatArray, is_border: BoolArray) -> None:
+        n, sides = len(mesh.vertices), 3 * len(mesh.faces)
+        self.mesh, self.twin, self.tail = mesh, halfedge_twins(mesh), mesh.tails
+        self.cost, self.cut = edge_costs[mesh.halfedge_edges], is_border[mesh.halfedge_edges]
+        self.height = np.zeros(n)
+        self.effort = 0
+        glued = np.flatnonzero(self.twin >= 0)
+        self.slots = glued[sort_by_counting(self.tail[glued], n)]
+        starts, count = np.zeros(n + 1, dtype=np.int64), len(glued)
+        np.cumsum(np.bincount(self.tail[glued], minlength=n), out=starts[1:])
+        self._slot_of = np.empty(sides, dtype=np.int64)
+        self._slot_of[self.slots] = np.arange(count)
+        self._enters = np.empty(count, dtype=np.int64)
+        self._graph = starts, self.tail[self.twin[self.slots]], self.cost[self.slots], self._enters
+        self._leaving = np.empty(n, dtype=np.int64)
+        self._leaving[self.tail] = np.arange(sides)
+        self._number, self._around = np.full(sides, -1, dtype=np.int64), np.empty(sides, dtype=np.int64)
+        self._labelled = NOTHING
+        # A slot is put on the heap twice at most: as a seed, and for the vertex it leads to.
+        self.heap = np.empty(2 * count + n), np.empty(2 * count + n, dtype=np.int64)
+        self._spare: list[Reach] = []
+
+    def label_circles(self, points: IntArray) -> Circles:
+        """Return the curves of the border, and the points that are not on it; those returned before are void."""
+        from .search_kernel import label_circles
+
+        self._number[self._labelled] = -1
+        sides = np.flatnonzero(self.cut)
+        starts = np.empty(len(sides) + len(points) + 1, dtype=np.int64)
+        labels = self._number, self._around, starts
+        count = label_circles(self.twin, self._leaving, self.cut, sides, points, *labels)
+        self._labelled = self._around[: starts[count]]
+        across = self.twin[self._labelled]
+        glued = across >= 0
+        self._enters[self._slot_of[across[glued]]] = self._number[self._labelled[glued]]
+        return Circles(count, self._number, self._labelled, starts[: count + 1])
+
+    def search(
+        self,
+        circles: Circles,
+        seeds: IntArray,
+        seed_costs: FloatArray,
+        inner: IntArray = NOTHING,
+        inner_costs: FloatArray = NO_COSTS,
+        *,
+        target: int = -1,
+        limit: float = np.inf,
+        farthest: float = np.inf,
+    ) -> Reach:
+        """Search along half-edges that leave circles, and from vertices off the border; see the kernel."""
+        reach = self._spare.pop() if self._spare else self._new_reach()
+        reach.arrival, reach.last = np.full(circles.count, np.inf), np.full(circles.count, -1, dtype=np.int64)
+        reach.distance[self.tail[circles.around]] = ON_BORDER
+        free = ~self.cut[seeds]
+        begin = self._slot_of[seeds[free]], seed_costs[free], circles.number[seeds[free]], inner, inner_costs
+        self._run(begin, self.height, (target, limit, farthest), reach)
+        self.effort += reach.count
+        return reach
+
+    def _new_reach(self) -> Reach:
+        n = len(self.height)
+        return Reach(np.full(n, np.inf), *np.empty((3, n), dtype=np.int64))
+
+    def _run(
+        self,
+        begin: tuple[IntArray, FloatArray, IntArray, IntArray, FloatArray],
+        height: FloatArray,
+        ends: tuple[int, float, float],
+        reach: Reach,
+    ) -> None:
+        from .search_kernel import search
+
+        starts, heads, costs, enters = self._graph
+        seeds, seed_costs, origins, inner, inner_costs = begin
+        target, limit, farthest = ends
+        keys, items = self.heap
+        reach.count = search(
+            starts,
+            heads,
+            costs,
+            enters,
+            seeds,
+            seed_costs,
+            origins,
+            inner,
+            inner_costs,
+            height,
+            target,
+            limit,
+            farthest,
+            reach.distance,
+            reach.before,
+            reach.origin,
+            reach.reached,
+            reach.arrival,
+            reach.last,
+            keys,
+            items,
+        )
+
+    def forget(self, circles: Circles, reach: Reach) -> None:
+        """Take back the arrays of a search that is no longer needed."""
+        reach.distance[reach.vertices] = np.inf
+        reach.distance[self.tail[circles.around]] = np.inf
+        self._spare.append(reach)
+
+    def way_over(self, reach: Reach, halfedge: int) -> list[int]:
+        """Return the half-edges of a way found, from the one over which it goes last back to the circle."""
+        return self.way(reach, int(self._slot_of[halfedge]))[0]
+
+    def way(self, reach: Reach, slot: int) -> tuple[list[int], int]:
+        """Return the half-edges of a way found, from its last slot back, and the vertex it begins at.
+
+        The vertex is -1 if the way begins at a circle.
+        """
+        way, v = [], -1
+        while slot >= 0:
+            h = int(self.slots[slot])
+            way.append(h)
+            v = int(self.tail[h])
+            if reach.distance[v] == ON_BORDER:
+                return way, -1
+            slot = int(reach.before[v])
+        return way, v
+
+    def cut_along(self, halfedges: IntArray) -> None:
+        """Cut edges, given by either half."""
+        self.cut[halfedges] = self.cut[self.twin[halfedges]] = True
+
+    def glue(self, halfedges: IntArray) -> None:
+        """Undo the cut of edges, given by either half."""
+        self.cut[halfedges] = self.cut[self.twin[halfedges]] = False
+
+    def measure_heights(self) -> None:
+        """Set the heights to the distance from the border."""
+        self.height = np.full(len(self.height), np.inf)
+        self.lower_heights(np.flatnonzero(self.cut))
+
+    def lower_heights(self, halfedges: IntArray) -> None:
+        """Lower the heights to the distance from half-edges that became part of the border."""
+        ends = np.unique([self.tail[halfedges], self.mesh.heads[halfedges]])
+        begin = NOTHING, NO_COSTS, NOTHING, ends, np.zeros(len(ends))
+        fresh = self._new_reach()
+        reach = Reach(self.height, fresh.before, fresh.origin, fresh.reached)
+        self._run(begin, np.zeros(len(self.height)), (-1, np.inf, np.inf), reach)
