@@ -147,3 +147,44 @@ def test_relative_texture_indices(tmp_path):
         path = tmp_path / "quads.obj"
         path.write_text(head + first + second)
         assert len(coneflat.flatten(path, seams="input").seams) == count
+
+
+class TestCosts:
+    def test_a_polyhedron_opens_along_its_edges(self):
+        vertices, faces = shapes.box(3)
+        result = coneflat.flatten(vertices, faces)
+        mesh = TriangleMesh(result.vertices, result.faces)
+        sharp = {tuple(pair) for pair in mesh.edges[dihedral_angles(mesh) > 1].tolist()}
+        assert seam_pairs(result) <= sharp
+
+    def test_forbidden_edges_are_not_cut(self):
+        vertices, faces = shapes.sphere(3, bumps=0.4, seed=5)
+        free = coneflat.flatten(vertices, faces)
+        barred = free.seams[: len(free.seams) // 2]
+        result = coneflat.flatten(vertices, faces, forbidden_seams=barred)
+        assert not {tuple(sorted(pair)) for pair in barred.tolist()} & seam_pairs(result)
+        assert result.distortion.seam_length > free.distortion.seam_length
+        with pytest.raises(errors.OptionError, match="no edge connects"):
+            coneflat.flatten(vertices, faces, forbidden_seams=[[0, 0]])
+
+    def test_seams_keep_off_what_weighs_more(self):
+        vertices, faces = shapes.sphere(3, bumps=0.4, seed=5)
+        free = coneflat.flatten(vertices, faces)
+        weights = np.ones(len(vertices))
+        inner = np.setdiff1d(free.seams, free.cones)
+        weights[inner] = 20.0
+        result = coneflat.flatten(vertices, faces, seam_weights=weights)
+        assert len(np.intersect1d(result.seams, inner)) < len(inner) / 2
+        with pytest.raises(errors.OptionError, match="seam weights must be"):
+            coneflat.flatten(vertices, faces, seam_weights=weights[1:])
+
+    def test_hidden_places_are_preferred(self):
+        vertices, faces = shapes.sphere(4, bumps=0.5, seed=2)
+        from coneflat.geometry.visibility import visible_share
+
+        share = visible_share(vertices, faces)
+        seen = [
+            share[coneflat.flatten(vertices, faces, distortion=0.1, hide_seams=hide).seams].mean()
+            for hide in (0.0, 3.0)
+        ]
+        assert seen[1] < seen[0]

@@ -26,14 +26,18 @@ def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh) -> Bo
     if isinstance(options.seams, str):
         marked |= _seams_of_input(checked, given)
     elif options.seams is not None:
-        marked[_named(checked, np.asarray(options.seams))] = True
+        marked[named_edges(checked, np.asarray(options.seams))] = True
     if options.sharp_angle is not None:
         marked |= np.abs(dihedral_angles(mesh)) > options.sharp_angle
     return marked & ~mesh.is_boundary_edge
 
 
-def _named(checked: CheckedMesh, pairs: IntArray) -> IntArray:
-    """Return the edges between pairs of the input's vertices."""
+def named_edges(checked: CheckedMesh, pairs: IntArray) -> IntArray:
+    """Return the edges between pairs (k, 2) of the input's vertices.
+
+    Raises:
+        OptionError: a pair of vertices is no edge.
+    """
     origin = checked.vertex_origin
     bound = int(origin.max()) + 1
     ends = np.sort(origin[checked.mesh.edges], axis=1)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ._arrays import IntArray
 from .errors import OptionError
 
 CONES = ("auto", "pursuit", "greedy", "none")
@@ -82,6 +83,10 @@ class Options:
     up: tuple[float, float, float] | None = None
     seams: ArrayLike | str | None = None
     sharp_angle: float | None = None
+    forbidden_seams: ArrayLike | None = None
+    creases: float = 0.0
+    hide_seams: float = 0.0
+    seam_weights: ArrayLike | str | None = None
     given_cones: Mapping[int, float | None] = field(init=False, default_factory=dict)
     corners: Mapping[int, float | None] = field(init=False, default_factory=dict)
 
@@ -166,17 +171,19 @@ class Options:
 
     def _check_marks(self) -> None:
         """Check what names edges that are to be cut."""
-        if isinstance(self.seams, str):
-            _choice("seams", self.seams, ("input",))
-        elif self.seams is not None:
-            pairs = np.asarray(list(self.seams) if isinstance(self.seams, (set, frozenset)) else self.seams)
-            if not pairs.size:
-                pairs = np.empty((0, 2), dtype=np.int64)
-            if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
-                raise OptionError(
-                    f"seams must be pairs of vertices (k, 2), not of shape {pairs.shape} and type {pairs.dtype}"
-                )
-            object.__setattr__(self, "seams", pairs.astype(np.int64))
+        for name in ("seams", "forbidden_seams"):
+            given = getattr(self, name)
+            if isinstance(given, str) and name == "seams":
+                _choice("seams", given, ("input",))
+            elif given is not None:
+                object.__setattr__(self, name, _pairs(name.replace("_", " "), given))
+        for name in ("creases", "hide_seams"):
+            strength = (
+                float(getattr(self, name)) if getattr(self, name) in (True, False) else getattr(self, name)
+            )
+            object.__setattr__(self, name, _number(name, strength))
+            if not 0 <= getattr(self, name) < math.inf:
+                raise OptionError(f"{name} must be a number from 0 up, not {strength:g}")
         if self.sharp_angle is not None:
             object.__setattr__(self, "sharp_angle", _number("sharp_angle", self.sharp_angle))
             if not 0 < _number("sharp_angle", self.sharp_angle) < math.pi:
@@ -248,8 +255,12 @@ class Options:
         for name, given in (("cones", values.pop("given_cones")), ("boundary", values.pop("corners"))):
             if not isinstance(values[name], str):
                 values[name] = given
-        if isinstance(self.seams, np.ndarray):
-            values["seams"] = self.seams.tolist()
+        for name in ("seams", "forbidden_seams"):
+            if isinstance(values[name], np.ndarray):
+                values[name] = values[name].tolist()
+        values["seam_weights"] = (
+            self.seam_weights if isinstance(self.seam_weights, (str, type(None))) else "given"
+        )
         values["weights"] = self.weights if isinstance(self.weights, (str, type(None))) else "given"
         return values
 
@@ -273,6 +284,18 @@ def _whole(name: str, value: object) -> int:
     if not number.is_integer() or abs(number) >= 2**62:
         raise OptionError(f"{name} must be a whole number, not {value!r}")
     return int(number)
+
+
+def _pairs(noun: str, given: object) -> IntArray:
+    """Return (k, 2) pairs of vertices."""
+    pairs = np.asarray(list(given) if isinstance(given, (set, frozenset)) else given)
+    if not pairs.size:
+        return np.empty((0, 2), dtype=np.int64)
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
+        raise OptionError(
+            f"{noun} must be pairs of vertices (k, 2), not of shape {pairs.shape} and type {pairs.dtype}"
+        )
+    return pairs.astype(np.int64)
 
 
 def _given_vertices(noun: str, vertices: object) -> dict[int, float | None]:

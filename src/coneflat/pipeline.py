@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import FloatArray, IntArray, dots
+from ._arrays import FloatArray, IntArray
 from .assemble import assemble
-from .atlas import Seams, injective_charts
 from .choose import DEARER, Surface, Turned, choose_cones, pursues
 from .cones import ConeSolution
 from .conformal.boundary import prescribed_boundary, straight_boundary
@@ -27,6 +26,7 @@ from .options import Boundary, Cones, Options
 from .prepare import Component, Prepared, prepare
 from .result import Flattening
 from .rotations import measure_rotations
+from .seaming import seam_costs, without_overlaps
 from .seams import cut_open, find_seams
 from .solver import solving
 from .stages import Progress, Stages
@@ -38,6 +38,8 @@ from .wishes import Wishes
 SEARCHES = 4
 # Radians by which a cone is off then: a full turn, less what rounding and untangled neighbours make.
 UNHELD = 1.0
+# A log scale that varies by less is constant.
+FLAT = 1e-9
 # The distortion asked for may be missed by so much, relatively, without a word.
 NARROWLY = 1e-3
 
@@ -72,6 +74,10 @@ def flatten(
     charts: str = "one",
     seams: ArrayLike | str | None = None,
     sharp_angle: float | None = None,
+    forbidden_seams: ArrayLike | None = None,
+    creases: float = 0.0,
+    hide_seams: float = 0.0,
+    seam_weights: ArrayLike | str | None = None,
     resolution: int = 1024,
     padding: float = 2.0,
     tiles: int = 1,
@@ -128,6 +134,12 @@ def flatten(
         seams: edges to be cut in any case: (k, 2) pairs of vertices, or "input" for the seams of the file's own UVs.
             They act like a boundary; where they close curves, the mesh falls into several charts.
         sharp_angle: edges whose faces' normals differ by more than this are cut, too, radians.
+        forbidden_seams: (k, 2) pairs of vertices between which the first cut must not run; what is cut later so that
+            nothing overlaps avoids them where it can.
+        creases: how much seams prefer sharp edges, 0 and up: at 1, one of 60 degrees and more costs a tenth of its
+            length.
+        hide_seams: how much they prefer what can hardly be seen, 0 and up: at 1, it costs a tenth of its length.
+        seam_weights: (n,) by which seams are dearer at each vertex, or the name of a property, as for `weights`.
         resolution: texels along a side of the texture, for which there are
         padding: texels between charts, and between them and the border, at least.
         tiles: number of textures (UDIM) to distribute charts over.
@@ -167,6 +179,10 @@ def flatten(
         charts=charts,
         seams=seams,
         sharp_angle=sharp_angle,
+        forbidden_seams=forbidden_seams,
+        creases=creases,
+        hide_seams=hide_seams,
+        seam_weights=seam_weights,
         resolution=resolution,
         padding=padding,
         tiles=tiles,
@@ -205,26 +221,11 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
         part = replace(part, wishes=part.wishes.without(unheld))
     if options.charts == "atlas":
         with stages("atlas", 1.0):
-            laid_out = _without_overlaps(laid_out)
+            laid_out = without_overlaps(laid_out, part, options)
     notes = _missed_distortion(laid_out, part, options)
     if options.metric == "exact":
         notes += shortfalls(laid_out, part.wishes.names)
     return replace(laid_out, notes=laid_out.notes + notes)
-
-
-def _without_overlaps(laid_out: LaidOut) -> LaidOut:
-    """Return the layout split, as little as can be, into charts that do not overlap themselves."""
-    mesh = laid_out.mesh
-    ends = mesh.vertices[mesh.edges]
-    lengths = np.sqrt(dots(ends[:, 1] - ends[:, 0], ends[:, 1] - ends[:, 0]))
-    charts = injective_charts(mesh, laid_out.points, laid_out.corners, lengths)
-    return replace(
-        laid_out,
-        points=charts.points,
-        corners=charts.corners,
-        chart=charts.chart,
-        seams=mesh.edges[Seams(mesh, charts).edges],
-    )
 
 
 def _missed_distortion(laid_out: LaidOut, part: Component, options: Options) -> tuple[str, ...]:
@@ -314,9 +315,11 @@ def _lay_out(
         metric = find_metric(surface, solution, part.wishes, options)
 
     with stages("cut", 0.85):
-        forbidden = np.zeros(len(mesh.edges), dtype=bool)
-        forbidden[mesh.halfedge_edges[part.is_diagonal.ravel()]] = True
-        seams = find_seams(mesh, solution.cones, part.lengths.ravel()[mesh.edge_halfedges[:, 0]], forbidden)
+        # What unfolds without distortion is a polyhedron, and opens along its edges.
+        is_polyhedron = np.ptp(solution.log_scale) < FLAT
+        marked = replace(options, creases=1.0) if is_polyhedron and not options.creases else options
+        costs, avoided, forbidden = seam_costs(part, marked)
+        seams = find_seams(mesh, solution.cones, costs, avoided, forbidden=np.flatnonzero(forbidden))
         disk = cut_open(mesh, seams).mesh
 
     with stages("layout", 0.95):

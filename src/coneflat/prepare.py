@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from ._arrays import BoolArray, FloatArray, IntArray
 from .geometry import edge_lengths, mollify
+from .geometry.visibility import visible_share
 from .inputs import InputMesh, as_input
-from .marks import marked_edges
+from .marks import marked_edges, named_edges
 from .mesh import TriangleMesh
 from .numbering import at_unit_size, turn_corners
 from .options import Options
@@ -29,7 +30,9 @@ class Component:
         mesh: the mesh.
         vertices, faces: (n,), (m,) those of the whole mesh; a vertex of a marked seam may be there several times.
         lengths: (m, 3) side lengths, with which every triangle has area.
-        is_diagonal: (m, 3) sides inside a polygon of the input, which should not be cut.
+        is_avoided: (m, 3) sides inside a polygon of the input, which should not be cut.
+        is_forbidden: (m, 3) sides that must not be cut.
+        visibility: (n,) what can be seen of each vertex, if that matters.
         wishes: what the user says of its vertices.
     """
 
@@ -37,7 +40,9 @@ class Component:
     vertices: IntArray
     faces: IntArray
     lengths: FloatArray
-    is_diagonal: BoolArray
+    is_avoided: BoolArray
+    is_forbidden: BoolArray
+    visibility: FloatArray | None
     wishes: Wishes
 
 
@@ -83,11 +88,27 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
         wishes.keep_off(checked.mesh.edges[marked])
         opened = open_along(checked.mesh, marked)
 
+    forbidden = np.zeros(len(checked.mesh.edges), dtype=bool)
+    if options.forbidden_seams is not None:
+        forbidden[named_edges(checked, np.asarray(options.forbidden_seams))] = True
+    seen = None
+    if options.hide_seams:
+        up = None if options.up is None else np.array(options.up)
+        seen = visible_share(checked.mesh.vertices, checked.mesh.faces, up)
+
     def components() -> Iterator[Component]:
         for part, vertices, part_faces in opened.mesh.split_components():
-            shape = lengths[part_faces], is_diagonal[part_faces]
             origin = opened.origin[vertices]
-            yield Component(part, origin, part_faces, *shape, wishes.within(origin))
+            yield Component(
+                part,
+                origin,
+                part_faces,
+                lengths[part_faces],
+                is_diagonal[part_faces],
+                forbidden[checked.mesh.halfedge_edges].reshape(-1, 3)[part_faces],
+                None if seen is None else seen[origin],
+                wishes.within(origin),
+            )
 
     notes = () if note is None else (note,)
     return Prepared(given, checked, notes, tuple(components()), checked.mesh.edges[marked])

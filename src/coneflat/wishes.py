@@ -50,6 +50,7 @@ class Wishes:
         required: vertices that are cones in any case of a search; their curvatures are NaN.
         is_allowed: (n,) whether a search may put a cone there.
         weights: (n,) importance of each vertex, or None.
+        seam_weights: (n,) by which seams are dearer, or None.
     """
 
     names: IntArray
@@ -58,6 +59,7 @@ class Wishes:
     required: VertexCurvatures
     is_allowed: BoolArray
     weights: FloatArray | None
+    seam_weights: FloatArray | None = None
 
     def without(self, vertices: IntArray) -> Wishes:
         """Return wishes that forbid cones at some vertices, too."""
@@ -82,6 +84,7 @@ class Wishes:
             self.required.within(component),
             self.is_allowed[component],
             None if self.weights is None else self.weights[component],
+            None if self.seam_weights is None else self.seam_weights[component],
         )
 
 
@@ -119,7 +122,10 @@ def locate_wishes(checked: CheckedMesh, options: Options, given: InputMesh) -> W
         _locate(checked, "corner", options.corners),
         required,
         is_allowed,
-        None if options.weights is None else _weights(options.weights, given)[names],
+        None if options.weights is None else _weights("weights", options.weights, given)[names],
+        None
+        if options.seam_weights is None
+        else _weights("seam weights", options.seam_weights, given)[names],
     )
 
 
@@ -146,7 +152,7 @@ def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) 
     return VertexCurvatures(found, curvatures)
 
 
-def _weights(weights: object, given: InputMesh) -> FloatArray:
+def _weights(noun: str, weights: object, given: InputMesh) -> FloatArray:
     """Return (n,) the importance of each vertex of the input."""
     count = len(np.asarray(given.vertices))
     if isinstance(weights, str):
@@ -154,17 +160,17 @@ def _weights(weights: object, given: InputMesh) -> FloatArray:
     try:
         values = np.asarray(weights, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise OptionError(f"weights must be numbers, one for each vertex: {error}") from error
+        raise OptionError(f"{noun} must be numbers, one for each vertex: {error}") from error
     if values.shape != (count,):
         raise OptionError(
-            f"weights must be {count:,} numbers, one for each vertex, not of shape {values.shape}"
+            f"{noun} must be {count:,} numbers, one for each vertex, not of shape {values.shape}"
         )
     if not np.isfinite(values).all():
         at = int(np.flatnonzero(~np.isfinite(values))[0])
-        raise OptionError(f"weights must be finite; that of vertex {at} is {values[at]:g}")
+        raise OptionError(f"{noun} must be finite; that of vertex {at} is {values[at]:g}")
     if not (values.min() >= 0 and values.max() > 0):
         raise OptionError(
-            f"weights must be 0 and up, not all 0; they are {values.min():g} to {values.max():g}"
+            f"{noun} must be 0 and up, not all 0; they are {values.min():g} to {values.max():g}"
         )
     return values
 

@@ -14,6 +14,8 @@ from .split import split_overlaps
 # Parts of the area that charts should have at least. Where the cheapest cuts leave several charts, dearer ones that
 # leave larger pieces may leave fewer.
 LEAST_PARTS = (0.0, 0.002, 0.01)
+# On larger meshes, triangles, only where there are slivers.
+LARGE = 50_000
 # Below this part of the area a chart is a sliver.
 SLIVER = 0.001
 
@@ -50,6 +52,6 @@ def injective_charts(
         slivers = int((sizes < SLIVER * sizes.sum()).sum())
         length = float(lengths[Seams(mesh, layout).edges].sum())
         found.append(((slivers, len(sizes), length), len(found), layout))
-        if len(sizes) == 1:
+        if len(sizes) == 1 or (not slivers and len(corners) > LARGE):
             break
     return min(found, key=lambda one: one[:2])[2]

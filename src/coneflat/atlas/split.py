@@ -50,6 +50,8 @@ def as_disk(points: FloatArray, corners: IntArray) -> TriangleMesh:
     is_used = np.zeros(len(points), dtype=bool)
     is_used[corners] = True
     pinched = TriangleMesh(points[is_used], (np.cumsum(is_used) - 1)[corners])
+    if np.count_nonzero(pinched.is_boundary_edge) == np.count_nonzero(pinched.is_boundary_vertex):
+        return pinched
     inside = pinched.edge_halfedges[~pinched.is_boundary_edge]
     count, fans = corner_fans(pinched.faces, *inside.T)
     vertices = np.empty((count, 2))

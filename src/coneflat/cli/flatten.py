@@ -44,6 +44,11 @@ from .search import place_options
     type=click.Path(path_type=Path),
     help="Cut the edges of a text file in any case, two vertices (from 0) on each line.",
 )
+@click.option(
+    "--forbidden-seams",
+    type=click.Path(path_type=Path),
+    help="Do not cut the edges of a text file, two vertices on each line.",
+)
 @click.option("--report", type=click.Path(path_type=Path), help="Write all measures to this JSON file.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @click.pass_context
@@ -56,6 +61,7 @@ def flatten(
     cones_file: Path | None,
     corner: tuple[str, ...],
     seams: Path | None,
+    forbidden_seams: Path | None,
     weld: bool | None,
     report: Path | None,
     quiet: bool,
@@ -86,6 +92,8 @@ def flatten(
                 "seams are those of a file or of the input: leave out --keep-seams", context
             )
         options["seams"] = read_pairs(seams)
+    if forbidden_seams is not None:
+        options["forbidden_seams"] = read_pairs(forbidden_seams)
     if corners:
         options["boundary"] = corners
     run(mesh, output, options, weld=weld, report=report, quiet=quiet)

@@ -116,6 +116,18 @@ _AFTER_SEARCH = (
         metavar="ANGLE",
         help="Cut edges at which the surface bends by more, 40deg say: CAD parts open there.",
     ),
+    click.option(
+        "--creases",
+        type=float,
+        default=0.0,
+        show_default=True,
+        help="How much seams prefer sharp edges: at 1, one of 60 degrees and more costs a tenth of its length.",
+    ),
+    click.option(
+        "--hide-seams",
+        is_flag=True,
+        help="Seams prefer what can hardly be seen: a tenth of the cost in deep folds and, with --up, below.",
+    ),
     click.option("--keep-seams", is_flag=True, help="Cut where the file's own UV coordinates have seams."),
     click.option(
         "--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces."
@@ -159,6 +171,7 @@ def method_keywords(params: Mapping[str, Any], ending: str) -> dict[str, Any]:
     if general["charts"] is None:
         general["charts"] = "atlas" if ending in TEXTURED and not params["paper"] else "one"
     general |= {name: params[name] for name in ("resolution", "padding", "tiles", "up")}
+    general |= {"creases": params["creases"], "hide_seams": float(params["hide_seams"])}
     general["sharp_angle"] = params["sharp_angle"]
     if params["keep_seams"]:
         general["seams"] = "input"
