@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from ._arrays import FloatArray, IntArray
+from .geometry.visibility import visible_share
 from .io import read_mesh
 from .pipeline import flatten
 from .sample import sample_path
@@ -28,6 +29,7 @@ def compile_kernels() -> None:
         flatten(*mesh)
         flatten(*mesh, cones="greedy", refine=True)
     flatten(*_tube(closed=True), quantum=np.pi / 2)
+    visible_share(*_tube(closed=True))
     flatten(*_tube(closed=False), boundary="disk", best_effort=True)
 
 
