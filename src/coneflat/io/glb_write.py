@@ -1,16 +1,34 @@
-"""Writing binary glTF, by trimesh's exporter."""
+"""Writing binary glTF."""
 
 from __future__ import annotations
 
-from typing import IO, TYPE_CHECKING
+import json
+import struct
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
+from ..errors import MeshFileError
 from .uv_split import split_at_seams
 
 if TYPE_CHECKING:
     from ..result import Flattening
+
+# Names and numbers of the glTF 2.0 specification.
+_COMPONENTS = {"f4": 5126, "u4": 5125}
+_SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
+_MOST_BYTES = 2**32 - 1
+_MATERIAL = {
+    "name": "coneflat",
+    "doubleSided": True,
+    "pbrMetallicRoughness": {
+        "baseColorFactor": [0.92, 0.92, 0.92, 1.0],
+        "metallicFactor": 0.0,
+        "roughnessFactor": 0.7,
+    },
+}
 
 
 def write_glb(result: Flattening, stream: IO[bytes]) -> None:
@@ -23,31 +41,65 @@ def write_glb(result: Flattening, stream: IO[bytes]) -> None:
     Args:
         result: what to write.
         stream: a binary file.
-    """
-    # trimesh takes about a second to import.
-    import trimesh
-    from trimesh.visual.material import PBRMaterial
-    from trimesh.visual.texture import TextureVisuals
 
+    Raises:
+        MeshFileError: it is larger than GLB can be.
+    """
     split = split_at_seams(result)
-    material = PBRMaterial(
-        name="coneflat",
-        baseColorFactor=[235, 235, 235, 255],
-        metallicFactor=0.0,
-        roughnessFactor=0.7,
-        doubleSided=True,
-    )
-    mesh = trimesh.Trimesh(
-        vertices=split.vertices,
-        faces=split.faces,
-        vertex_normals=_normals(result.vertices, result.faces)[split.own],
-        visual=TextureVisuals(uv=split.uv, material=material),
-        process=False,
-        validate=False,
-    )
-    mesh.vertex_attributes["_SOURCE_VERTEX"] = split.origin.astype(np.float32)
-    scene = trimesh.Scene({"flattened": mesh})
-    stream.write(scene.export(file_type="glb", include_normals=True))
+    arrays: list[NDArray[Any]] = [split.faces.reshape(-1).astype("<u4")]
+    attributes = {
+        "POSITION": split.vertices,
+        "NORMAL": _normals(result.vertices, result.faces)[split.own],
+        "TEXCOORD_0": split.uv * [1, -1] + [0, 1],
+        "_SOURCE_VERTEX": split.origin,
+    }
+    arrays += [values.astype("<f4") for values in attributes.values()]
+    header = _header(arrays, list(attributes))
+    size = sum(array.nbytes for array in arrays)
+    total = 12 + 8 + len(header) + 8 + size
+    if total > _MOST_BYTES:
+        raise MeshFileError(
+            f"the result takes {total:,} bytes as GLB, which holds 4 GB at most: choose .ply or .npz"
+        )
+    stream.write(struct.pack("<4sII I4s", b"glTF", 2, total, len(header), b"JSON"))
+    stream.write(header)
+    stream.write(struct.pack("<I4s", size, b"BIN\0"))
+    for array in arrays:
+        stream.write(array.data)
+
+
+def _header(arrays: list[NDArray[Any]], names: list[str]) -> bytes:
+    """Return the JSON of a scene of one mesh: the first of its arrays are the triangles, the second positions."""
+    lengths = [array.nbytes for array in arrays]
+    accessors: list[dict[str, Any]] = [
+        {
+            "bufferView": i,
+            "componentType": _COMPONENTS[array.dtype.str[1:]],
+            "count": len(array),
+            "type": _SHAPES[array.size // len(array)],
+        }
+        for i, array in enumerate(arrays)
+    ]
+    accessors[1] |= {"min": arrays[1].min(axis=0).tolist(), "max": arrays[1].max(axis=0).tolist()}
+    attributes = {name: i + 1 for i, name in enumerate(names)}
+    tree = {
+        "asset": {"version": "2.0", "generator": "coneflat"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": "flattened"}],
+        "meshes": [
+            {"name": "flattened", "primitives": [{"attributes": attributes, "indices": 0, "material": 0}]}
+        ],
+        "materials": [_MATERIAL],
+        "accessors": accessors,
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": sum(lengths[:i]), "byteLength": length}
+            for i, length in enumerate(lengths)
+        ],
+        "buffers": [{"byteLength": sum(lengths)}],
+    }
+    text = json.dumps(tree, separators=(",", ":")).encode("ascii")
+    return text + b" " * (-len(text) % 4)
 
 
 def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:

@@ -15,10 +15,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import IntArray
 from ..errors import EmptyMeshError, FaceIndexError
-from .raw import COLOURS, RawMesh, first_bad_corner
-from .text import TextBlock, newline_of, same_width, text_blocks
+from .growing import Growing
+from .raw import COLOURS, RawMesh, first_bad_corner, offsets_of
+from .text import TextBlock, newline_of, text_blocks
 
 _OTHER, _VERTEX, _FACE, _TEXTURE, _ELEMENT, _COMMENTED_FACE = range(6)
 #: By the first two characters of a line, as a 16-bit number, what it is.
@@ -62,49 +63,51 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
         FaceIndexError: a face names vertex 0 or one that does not exist.
     """
     newline = newline_of(content)
-    points: list[FloatArray] = []
-    sizes: list[IntArray] = []
-    corners: list[IntArray] = []
-    normals: list[IntArray | None] = []
-    textures: list[IntArray | None] = []
-    gaps: defaultdict[int, list[bytes]] = defaultdict(list)
-    vertex_count = face_count = uv_count = 0
+    vertices, colours = Growing(np.float64, 3), Growing(np.float64, 3)
+    corners, textures, normals, sizes = (Growing(np.int64) for _ in range(4))
+    uv_count = 0
+    gaps: defaultdict[int, bytearray] = defaultdict(bytearray)
     for block in text_blocks(path, content, continued=True):
         kinds = _KINDS[block.heads()]
-        points.append(block.words(np.flatnonzero(kinds == _VERTEX), first=1).points())
+        points = block.words(np.flatnonzero(kinds == _VERTEX), first=1).points()
         counts, given, texture, normal = _faces(block, kinds)
-        above = vertex_count + np.cumsum(kinds == _VERTEX)[kinds == _FACE]
-        # A negative number counts back from the vertices that stand above the face.
-        corners.append(np.where(given < 0, np.repeat(above, counts) + given, given - 1))
-        sizes.append(counts)
-        normals.append(normal)
-        if texture is not None:
-            above = uv_count + np.cumsum(kinds == _TEXTURE)[kinds == _FACE]
-            texture = np.where(texture < 0, np.repeat(above, counts) + texture, texture - 1)
-        textures.append(texture)
-        uv_count += int(np.count_nonzero(kinds == _TEXTURE))
+        above = len(vertices) + np.cumsum(kinds == _VERTEX)[kinds == _FACE]
         for polygon, text in _texts(block, kinds, newline):
-            gaps[face_count + polygon].append(text)
-        vertex_count += len(points[-1])
-        face_count += len(counts)
-    if not vertex_count:
+            gaps[len(sizes) + polygon] += text
+        vertices.add(points[:, :3])
+        # Many programs write a colour behind the position.
+        if points.shape[1] in (6, 7):
+            colours.add(points[:, 3:6])
+        sizes.add(counts)
+        if texture is not None:
+            beyond = uv_count + np.cumsum(kinds == _TEXTURE)[kinds == _FACE]
+            texture = np.where(texture < 0, np.repeat(beyond, counts) + texture, texture - 1)
+        uv_count += int(np.count_nonzero(kinds == _TEXTURE))
+        for known, found in ((textures, texture), (normals, normal)):
+            if found is not None:
+                known.add(np.zeros(len(corners) - len(known), np.int64))
+                known.add(found)
+        # A negative number counts back from the vertices that stand above the face.
+        corners.add(np.where(given < 0, np.repeat(above, counts) + given, given - 1))
+    if not len(vertices):
         raise EmptyMeshError(f"{path} has no vertices")
-    if not face_count:
+    if not len(sizes):
         raise EmptyMeshError(f"{path} has no faces")
-    coordinates = same_width(points)
-    # Many programs write a colour behind the position.
-    colours = zip(COLOURS, coordinates[:, 3:6].T, strict=True) if coordinates.shape[1] in (6, 7) else ()
+    for known in (textures, normals):
+        if len(known):
+            known.add(np.zeros(len(corners) - len(known), np.int64))
+    has_colours = len(colours) == len(vertices)
     mesh = RawMesh(
-        vertices=np.ascontiguousarray(coordinates[:, :3]),
-        corners=np.concatenate(corners),
-        offsets=np.concatenate([[0], *sizes]).cumsum(),
+        vertices=vertices.done(),
+        corners=corners.done(),
+        offsets=offsets_of(sizes.done()),
         obj=ObjText(
-            gaps={polygon: b"".join(texts) for polygon, texts in gaps.items()},
-            normals=_of_all_corners(normals, corners),
+            gaps={polygon: bytes(gaps.pop(polygon)) for polygon in list(gaps)},
+            normals=normals.done() if len(normals) else None,
             newline=newline,
         ),
-        properties=dict(colours),
-        texture=_of_all_corners(textures, corners),
+        properties=dict(zip(COLOURS, colours.done().T, strict=True)) if has_colours else {},
+        texture=textures.done() if len(textures) else None,
     )
     _check_corners(path, content, mesh)
     return mesh
@@ -141,15 +144,6 @@ def _texts(block: TextBlock, kinds: NDArray[np.uint8], newline: bytes) -> Iterat
         elif kind == _COMMENTED_FACE:
             text = text[text.index(b"#") :].rstrip(b"\r\n") + newline
         yield int(polygons[runs[i]]), text
-
-
-def _of_all_corners(blocks: list[IntArray | None], corners: list[IntArray]) -> IntArray | None:
-    """Return the numbers of all blocks, 0 for blocks without; None where no block has some."""
-    if all(block is None for block in blocks):
-        return None
-    return np.concatenate(
-        [np.zeros_like(c) if block is None else block for block, c in zip(blocks, corners, strict=True)]
-    )
 
 
 def _check_corners(path: Path, content: bytes, mesh: RawMesh) -> None:

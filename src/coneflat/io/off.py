@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import IntArray
 from ..errors import MeshFileError
-from .raw import RawMesh
-from .text import TextBlock, same_width, text_blocks
+from .growing import Growing
+from .raw import RawMesh, offsets_of
+from .text import TextBlock, text_blocks
 
 # Texture coordinates, colours and normals follow the position, so that they can be passed over; "4" and
 # "n" change what the position itself is.
@@ -26,27 +27,23 @@ def parse_off(path: Path, content: bytes) -> RawMesh:
         MeshFileError: the file is not OFF, is shorter than its header promises, or has text for a number.
     """
     vertex_count, face_count, begin = _header(path, content)
-    points: list[FloatArray] = [np.empty((0, 3))]
-    sizes: list[IntArray] = [np.empty(0, np.int64)]
-    corners: list[IntArray] = [np.empty(0, np.int64)]
+    vertices, sizes, corners = Growing(np.float64, 3), Growing(np.int64), Growing(np.int64)
     lines = 0
     for block in text_blocks(path, content, begin):
         rows = np.flatnonzero(block.counts)
         of_vertices, of_faces = np.clip(
             [vertex_count - lines, vertex_count + face_count - lines], 0, len(rows)
         )
-        points.append(block.words(rows[:of_vertices]).points())
-        new_sizes, new_corners = _polygons(block, rows[of_vertices:of_faces])
-        sizes.append(new_sizes)
-        corners.append(new_corners)
+        vertices.add(block.words(rows[:of_vertices]).points()[:, :3])
+        for whole, new in zip((sizes, corners), _polygons(block, rows[of_vertices:of_faces]), strict=True):
+            whole.add(new)
         lines += len(rows)
     if lines < vertex_count:
         raise MeshFileError(f"{path} ends after {lines} of the {vertex_count} vertices it promises")
     if lines < vertex_count + face_count:
         held = lines - vertex_count
         raise MeshFileError(f"{path} ends after {held} of the {face_count} faces it promises")
-    vertices = np.ascontiguousarray(same_width(points)[:, :3])
-    return RawMesh(vertices, np.concatenate(corners), np.concatenate([[0], *sizes]).cumsum())
+    return RawMesh(vertices.done(), corners.done(), offsets_of(sizes.done()))
 
 
 def _polygons(block: TextBlock, rows: IntArray) -> tuple[IntArray, IntArray]:

@@ -12,7 +12,8 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..errors import EmptyMeshError, MeshFileError
-from .raw import COLOURS, RawMesh
+from .growing import Growing
+from .raw import COLOURS, RawMesh, offsets_of
 from .text import text_blocks
 
 _TYPES = {
@@ -84,7 +85,7 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
         raise EmptyMeshError(f"{path} has no vertices")
     if polygons is None or not len(polygons[0]):
         raise EmptyMeshError(f"{path} has no faces")
-    return RawMesh(vertices, polygons[1], np.concatenate(([0], np.cumsum(polygons[0]))), None, properties)
+    return RawMesh(vertices, polygons[1], offsets_of(polygons[0]), None, properties)
 
 
 def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
@@ -263,10 +264,10 @@ def _length_reader(content: bytes, form: str) -> Callable[[int], int]:
 
 def _text_values(path: Path, content: bytes, start: int) -> bytes:
     """Return all numbers of a text body, as little-endian doubles."""
-    blocks = text_blocks(path, content, start, comments=False)
-    return b"".join(
-        [block.words(np.arange(len(block.counts))).floats().astype("<f8").tobytes() for block in blocks]
-    )
+    numbers = Growing(np.float64)
+    for block in text_blocks(path, content, start, comments=False):
+        numbers.add(block.words(np.arange(len(block.counts))).floats())
+    return numbers.done().astype("<f8", copy=False).tobytes()
 
 
 def _as_doubles(element: _Element) -> _Element:

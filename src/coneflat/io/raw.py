@@ -89,6 +89,13 @@ def first_bad_corner(corners: IntArray, vertex_count: int) -> int | None:
     return int(np.argmax((corners < 0) | (corners >= vertex_count)))
 
 
+def offsets_of(sizes: IntArray) -> IntArray:
+    """Return (p + 1,) the offsets of polygons of (p,) sizes."""
+    offsets = np.zeros(len(sizes) + 1, dtype=np.int64)
+    np.cumsum(sizes, out=offsets[1:])
+    return offsets
+
+
 def triangle_offsets(count: int) -> IntArray:
     """Return (count + 1,) the offsets of `count` triangles."""
     return np.arange(0, 3 * count + 1, 3, dtype=np.int64)

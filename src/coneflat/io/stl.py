@@ -9,6 +9,7 @@ import numpy as np
 
 from .._arrays import FloatArray
 from ..errors import EmptyMeshError, MeshFileError
+from .growing import Growing
 from .raw import RawMesh, triangle_offsets
 from .text import text_blocks
 
@@ -46,11 +47,10 @@ def _text_points(path: Path, content: bytes) -> FloatArray:
     """Return (3m, 3) the corners of m triangles."""
     if not re.search(rb"(?m)^\s*endsolid", content[-4096:].lower()):
         raise MeshFileError(f"{path} ends early: the last line of an STL text, 'endsolid', is missing")
-    facets, points = 0, []
+    facets, vertices = 0, Growing(np.float64, 3)
     for block in text_blocks(path, content):
         facets += len(block.beginning_with(b"facet"))
-        points.append(block.words(block.beginning_with(b"vertex"), first=1).points()[:, :3])
-    vertices = np.concatenate(points)
+        vertices.add(block.words(block.beginning_with(b"vertex"), first=1).points()[:, :3])
     if len(vertices) != 3 * facets:
         raise MeshFileError(f"{path} has {facets} facets but {len(vertices)} vertices; three each are needed")
-    return vertices
+    return vertices.done()

@@ -229,14 +229,6 @@ class Words:
         self._block.fail(int(row), f"{shown} is not {what}")
 
 
-def same_width(blocks: list[FloatArray]) -> FloatArray:
-    """Return rows of numbers as one array, of three columns unless all blocks have as many."""
-    filled = [block for block in blocks if len(block)] or blocks[:1]
-    widths = {block.shape[1] for block in filled}
-    width = widths.pop() if len(widths) == 1 else 3
-    return np.concatenate([block[:, :width] for block in filled])
-
-
 def _plain_lines(text: bytes, comments: bool, continued: bool) -> bytes:
     """Return lines with blanks for all that is no word, at the same places; each ends with one newline."""
     if text.startswith(_BOM):
