@@ -197,3 +197,28 @@ def cylinder(around: int = 24, along: int = 8, height: float = 3.0, caps: bool =
         rim = np.flatnonzero(points[:, 1] == level)
         lids.append(np.stack([rim, np.roll(rim, -1), np.full(around, len(vertices) + index)], axis=1))
     return np.concatenate([vertices, [[0, 0, 0], [0, 0, height]]]), np.concatenate([faces, *lids])
+
+
+def bottle(around: int = 48, along: int = 60):
+    """A bottle, open at its neck, with a hole in its side."""
+    points, faces = grid(around, along, wrap=(True, False))
+    up, angle = points[:, 1], 2 * np.pi * points[:, 0]
+    shoulder = np.clip((up - 0.6) / 0.2, 0, 1)
+    radius = 0.35 + 0.325 * (1 + np.cos(np.pi * shoulder))
+    side = np.stack([radius * np.cos(angle), radius * np.sin(angle), 3 * up], axis=1)
+    rim = np.flatnonzero(up == 0)
+    rings, floor, count = [rim], [], len(side)
+    for part in (0.75, 0.5, 0.25):
+        rings.append(count + np.arange(around))
+        floor.append(side[rim] * [part, part, 0])
+        count += around
+    lid = []
+    for outer, inner in zip(rings[:-1], rings[1:], strict=True):
+        lid += [
+            np.stack([outer, inner, np.roll(inner, -1)], 1),
+            np.stack([outer, np.roll(inner, -1), np.roll(outer, -1)], 1),
+        ]
+    lid.append(np.stack([rings[-1], np.full(around, count), np.roll(rings[-1], -1)], 1))
+    middle = side[faces].mean(axis=1)
+    kept = ~((np.abs(middle[:, 2] - 1) < 0.3) & (middle[:, 0] > 0.85))
+    return np.concatenate([side, *floor, [[0.0, 0.0, 0.0]]]), np.concatenate([faces[kept], *lid])
