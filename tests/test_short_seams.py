@@ -87,11 +87,25 @@ def test_the_search_never_makes_seams_longer_and_often_shorter(name, monkeypatch
         costs = lengths_of(mesh)
         seams = find_seams(mesh, cones, costs, bending=0)
         with monkeypatch.context() as patched:
-            patched.setattr(find, "shorten", lambda work, fixed: None)
+            patched.setattr(find, "shorten", lambda *_: None)
             first = find_seams(mesh, cones, costs, bending=0)
         gains.append(1 - costs[seams].sum() / costs[first].sum())
     assert min(gains) > -1e-6
     assert max(gains) > 0.005
+
+
+def test_searches_end_after_a_given_effort(monkeypatch):
+    mesh, cones = with_cones(shapes.sphere(4), 200)
+    costs = lengths_of(mesh)
+    totals = []
+    for spare in (0, 20_000, 10**9):
+        monkeypatch.setattr(find, "SHORTEN", 0)
+        monkeypatch.setattr(find, "STRAIGHTEN", 0)
+        monkeypatch.setattr(find, "SPARE", spare)
+        seams = find_seams(mesh, cones, costs)
+        assert cut_open(mesh, seams).pieces == 1
+        totals.append(costs[seams].sum())
+    assert totals[0] > 1.002 * totals[1] > 1.002**2 * totals[2]
 
 
 @pytest.mark.parametrize("name", ["genus 1", "genus 2", "genus 3"])

@@ -23,6 +23,9 @@ from .straighten import BENDING, Straightener
 # Relative: on grids many paths are equally long, and rounding should not choose among them, lest the result
 # depend on the numbering. Far above rounding, far below what anyone would see in a seam.
 TIE_BREAK = 1e-7
+# How often the whole mesh may be searched, all in all, until seams are short, and until they are straight; and so many
+# vertices more, which take little time. A dozen cones need no more, hundreds on a small mesh could go on for long.
+SHORTEN, STRAIGHTEN, SPARE = 6, 9, 50_000
 # With much more, one avoided edge that needs turns could cost more than two without.
 MOST_BENDING = 0.25
 
@@ -72,9 +75,9 @@ def find_seams(
     fixed = _fixed(work, cones)
     _open(work, fixed, int(np.argmax(key)))
     if work.cut.any():
-        shorten(work, fixed)
+        shorten(work, fixed, SHORTEN * len(mesh.vertices) + SPARE)
         if bending > 0:
-            Straightener(work, float(bending)).straighten(fixed)
+            Straightener(work, float(bending)).straighten(fixed, STRAIGHTEN * len(mesh.vertices) + SPARE)
     seams = _as_slit(mesh, costs, work.cut[mesh.edge_halfedges[:, 0]] & ~mesh.is_boundary_edge)
     _refuse(seams & is_forbidden, "needed to open the mesh, but forbidden as seams")
     return np.flatnonzero(seams)

@@ -16,22 +16,20 @@ from .reconnect import Reconnection
 
 # Relative: what is gained must be more than rounding makes.
 LEAST_GAIN = 1e-9
-# Searches end when they have reached so many times the vertices of the mesh, and so many more.
-EFFORT, SPARE_EFFORT = 5, 50_000
 # How many paths that follow one another are exchanged together, in the order in which that is tried. Where three fork
 # from a point, two take the third along.
 WINDOWS = 2, 1, 3
 
 
-def shorten(work: OpenMesh, fixed: Fixed) -> None:
+def shorten(work: OpenMesh, fixed: Fixed, enough: int) -> None:
     """Replace seams by shorter ones, in place, until nothing is gained.
 
     Args:
         work: open, every piece of it a disk.
         fixed: what the seams hold on to.
+        enough: the effort after which to stop.
     """
     work.measure_heights()
-    enough = EFFORT * len(work.height) + SPARE_EFFORT
     rested: set[bytes] = set()
     # Pairs first, as they are worth most; again and again, until nothing is gained. Then others.
     waiting = [*WINDOWS]
@@ -41,8 +39,10 @@ def shorten(work: OpenMesh, fixed: Fixed) -> None:
         work.glue(seams.halfedges(loose))
         changed: set[int] = set()
         for gone in () if loose else _exchanges(seams, waiting[0]):
+            if work.effort >= enough:
+                break
             name = _name(work, seams.halfedges(gone))
-            if name in rested or not changed.isdisjoint(gone) or work.effort >= enough:
+            if name in rested or not changed.isdisjoint(gone):
                 continue
             rested.add(name)
             found, tried = _exchange(seams, gone)

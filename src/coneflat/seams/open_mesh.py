@@ -78,7 +78,7 @@ class OpenMesh:
         cut: (3m,) True for half-edges of the border.
         height: (n,) lower bounds of what the way from each vertex to the border costs.
         slots: the half-edge of each slot.
-        effort: how many vertices have been reached by all searches together.
+        effort: what has been done so far, in vertices reached by searches; four half-edges of a border count as one.
     """
 
     def __init__(self, mesh: TriangleMesh, edge_costs: FloatArray, is_border: BoolArray) -> None:
@@ -113,6 +113,7 @@ class OpenMesh:
         labels = self._number, self._around, starts
         count = label_circles(self.twin, self._leaving, self.cut, sides, points, *labels)
         self._labelled = self._around[: starts[count]]
+        self.effort += len(self._labelled) // 4
         across = self.twin[self._labelled]
         glued = across >= 0
         self._enters[self._slot_of[across[glued]]] = self._number[self._labelled[glued]]

@@ -28,12 +28,12 @@ class Straightener:
         self.before, self.reached = np.empty((2, sides), dtype=np.int64)
         self.spokes, self.angles = np.empty(widest + 1, dtype=np.int64), np.empty(widest + 2)
 
-    def straighten(self, fixed: Fixed) -> None:
-        """Replace seams by straighter ones, each once, in place; the longest first."""
+    def straighten(self, fixed: Fixed, enough: int) -> None:
+        """Replace seams by straighter ones, each once, in place, up to an effort; the longest first."""
         seams = find_key_paths(self.work, fixed)
         changed: set[int] = set()
         for p in sorted(range(len(seams.paths)), key=lambda p: -seams.paths[p].cost):
-            if p not in changed and len(seams.paths[p].halfedges) > 1:
+            if self.work.effort < enough and p not in changed and len(seams.paths[p].halfedges) > 1:
                 found = self._replace(seams, p)
                 changed |= seams.touched_by([p], found)
 
