@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -213,7 +214,7 @@ def bottle(around: int = 48, along: int = 60):
         floor.append(side[rim] * [part, part, 0])
         count += around
     lid = []
-    for outer, inner in zip(rings[:-1], rings[1:], strict=True):
+    for outer, inner in pairwise(rings):
         lid += [
             np.stack([outer, inner, np.roll(inner, -1)], 1),
             np.stack([outer, np.roll(inner, -1), np.roll(outer, -1)], 1),

@@ -1,7 +1,7 @@
 """Pictures of atlases: `python tools/atlas_pictures.py FOLDER [MODEL:AXIS...]`.
 
-Writes atlas-shapes.png, the layouts of shapes that people complain about, and, of the models given with the axis that is up,
-atlas-models.png: each with a checkerboard on it, and its layout.
+Writes atlas-shapes.png, the layouts of shapes that people complain about, and atlas-models.png: of the models given,
+with the axis that is up, each with a checkerboard on it, and its layout.
 """
 
 from __future__ import annotations
