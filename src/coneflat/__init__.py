@@ -47,6 +47,14 @@ _HOMES = {
     "CutMesh": "seams",
     "least_squares_layout": "layout",
     "ConeflatError": "errors",
+    "make_figure": "view",
+    "save_figure": "view",
+    "draw_layout": "view",
+    "draw_checker": "view",
+    "draw_quality": "view",
+    "draw_cones": "view",
+    "draw_curvature": "view",
+    "draw_cone_curve": "view",
 }
 
 __all__ = [
@@ -71,6 +79,12 @@ __all__ = [
     "cotangent_laplacian",
     "cotangents",
     "cut_open",
+    "draw_checker",
+    "draw_cone_curve",
+    "draw_cones",
+    "draw_curvature",
+    "draw_layout",
+    "draw_quality",
     "edge_lengths",
     "errors",
     "find_cones",
@@ -78,11 +92,13 @@ __all__ = [
     "flatten",
     "greedy_cones",
     "least_squares_layout",
+    "make_figure",
     "measure",
     "mollify",
     "read_flattening",
     "read_mesh",
     "sample_path",
+    "save_figure",
     "scaled_lengths",
 ]
 
@@ -110,6 +126,16 @@ if TYPE_CHECKING:
     from .sample import sample_path
     from .seams import CutMesh, cut_open, find_seams
     from .validation import CheckedMesh, check_mesh
+    from .view import (
+        draw_checker,
+        draw_cone_curve,
+        draw_cones,
+        draw_curvature,
+        draw_layout,
+        draw_quality,
+        make_figure,
+        save_figure,
+    )
 
 
 def __getattr__(name: str) -> Any:

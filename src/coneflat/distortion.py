@@ -112,7 +112,7 @@ def measure(
         qc=qc,
         log_area_scale=log_scale,
         qc_mean=_mean(qc[valid], weights),
-        qc_p95=_quantile(qc[valid], weights, 0.95),
+        qc_p95=quantile(qc[valid], weights, 0.95),
         qc_max=float(qc[valid].max()) if len(weights) else float("nan"),
         area_std=float(np.sqrt(_mean((log_scale[valid] - mean_scale) ** 2, weights))),
         flipped=int(against.sum()),
@@ -240,7 +240,8 @@ def _mean(values: FloatArray, weights: FloatArray) -> float:
     return float((values * weights).sum() / weights.sum()) if len(values) else float("nan")
 
 
-def _quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
+def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
+    """Return the value below which lies a fraction of the weight; NaN of nothing."""
     if not len(values):
         return float("nan")
     order = np.argsort(values, kind="stable")

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
+from .texture import Texture
 from .uv_split import split_at_seams
 
 if TYPE_CHECKING:
     from ..result import Flattening
 
 
-def write_glb(result: Flattening, stream: IO[bytes]) -> None:
-    """Write a result as GLB, with a plain two-sided material.
+def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None = None) -> None:
+    """Write a result as GLB, with a two-sided material that is plain or has a texture.
 
     Every vertex has its UV as TEXCOORD_0 (whose v points down, as glTF has it), a normal of the uncut
     surface, and as _SOURCE_VERTEX the vertex of the input that it came from. All are 32-bit floats, the only
@@ -23,6 +24,7 @@ def write_glb(result: Flattening, stream: IO[bytes]) -> None:
     Args:
         result: what to write.
         stream: a binary file.
+        texture: the image of the material; None for a light grey.
     """
     # trimesh takes about a second to import.
     import trimesh
@@ -32,7 +34,7 @@ def write_glb(result: Flattening, stream: IO[bytes]) -> None:
     split = split_at_seams(result)
     material = PBRMaterial(
         name="coneflat",
-        baseColorFactor=[235, 235, 235, 255],
+        baseColorFactor=[235, 235, 235, 255] if texture is None else [255, 255, 255, 255],
         metallicFactor=0.0,
         roughnessFactor=0.7,
         doubleSided=True,
@@ -47,7 +49,16 @@ def write_glb(result: Flattening, stream: IO[bytes]) -> None:
     )
     mesh.vertex_attributes["_SOURCE_VERTEX"] = split.origin.astype(np.float32)
     scene = trimesh.Scene({"flattened": mesh})
-    stream.write(scene.export(file_type="glb", include_normals=True))
+
+    def embed(buffers: dict[Any, bytes], tree: dict[str, Any]) -> None:
+        # The exporter would encode the image anew, a JPEG with a loss.
+        if texture is not None:
+            tree["images"].append({"bufferView": len(buffers), "mimeType": texture.kind})
+            tree["textures"].append({"source": 0})
+            tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
+            buffers["texture"] = texture.content + bytes(-len(texture.content) % 4)
+
+    stream.write(scene.export(file_type="glb", include_normals=True, buffer_postprocessor=embed))
 
 
 def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from .._arrays import BoolArray, FloatArray, IntArray
 
-FRAGMENTS_PER_CHUNK = 2_000_000
-"""About how many covered pixels are held at once; bounds the memory, not the result."""
+FRAGMENTS_PER_CHUNK = 200_000
+"""About how many covered pixels are held at once: what caches hold. It does not change the result."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,8 @@ def rasterise(points: ArrayLike, faces: ArrayLike, width: int, height: int) -> C
         z = first[:, 2] + gradient[owner, 0] * (x - first[:, 0]) + gradient[owner, 1] * (y - first[:, 1])
         # In a triangle seen nearly edge on the gradient is mostly rounding error.
         z = np.clip(z, nearest[owner], farthest[owner])
-        nearer = z < depth[pixel]
+        # Of faces at one depth the first counts, as it does from chunk to chunk.
+        nearer = np.flatnonzero(z < depth[pixel])[::-1]
         pixel, owner, z = pixel[nearer], owner[nearer], z[nearer]
         # Of repeated indices an assignment keeps the last, so the nearest must come last.
         order = np.argsort(-z, kind="stable")
@@ -69,25 +70,28 @@ def rasterise(points: ArrayLike, faces: ArrayLike, width: int, height: int) -> C
     return Coverage(face.reshape(height, width), depth.reshape(height, width))
 
 
-def barycentrics(points: ArrayLike, faces: ArrayLike, coverage: Coverage) -> FloatArray:
-    """Return the (k, 3) barycentric coordinates of the covered pixels' centres, in row order."""
-    points = np.asarray(points, dtype=np.float64)
-    faces = np.asarray(faces, dtype=np.int64)
-    p, q, r = np.moveaxis(points[faces, :2], 1, 0)
-    total = _cross(q - p, r - p)
-    total = np.where(total == 0.0, np.inf, total)[:, None]  # edge on, covered by rounding only
-    # Per face once, per pixel a few products: pixels outnumber faces.
-    turn = np.array([1.0, -1.0])
-    slopes = np.ascontiguousarray((np.hstack([(r - p)[:, ::-1] * turn, (p - q)[:, ::-1] * turn]) / total).T)
-    row, column = np.nonzero(coverage.covered)
-    face = coverage.face[row, column]
-    x = column + 0.5 - np.take(np.ascontiguousarray(p[:, 0]), face)
-    y = row + 0.5 - np.take(np.ascontiguousarray(p[:, 1]), face)
-    weights = np.empty((len(face), 3))
-    weights[:, 1] = slopes[0][face] * x + slopes[1][face] * y
-    weights[:, 2] = slopes[2][face] * x + slopes[3][face] * y
-    weights[:, 0] = 1.0 - weights[:, 1] - weights[:, 2]
-    return weights
+class Barycentrics:
+    """Barycentric coordinates in projected triangles."""
+
+    def __init__(self, points: FloatArray, faces: IntArray) -> None:
+        """Take points (n, 2 or 3) of the picture and faces (m, 3)."""
+        p, q, r = np.moveaxis(points[faces, :2], 1, 0)
+        total = _cross(q - p, r - p)
+        total = np.where(total == 0.0, np.inf, total)[:, None]  # edge on, covered by rounding only
+        # Per face once, per pixel a few products: pixels outnumber faces.
+        turn = np.array([1.0, -1.0])
+        self._slopes = np.hstack([(r - p)[:, ::-1] * turn, (p - q)[:, ::-1] * turn]) / total
+        self._first = p
+
+    def of(self, face: IntArray, column: IntArray, row: IntArray) -> FloatArray:
+        """Return the (k, 3) coordinates of the centres of pixels (k,) in faces (k,)."""
+        slopes, first = self._slopes[face], self._first[face]
+        x, y = column + 0.5 - first[:, 0], row + 0.5 - first[:, 1]
+        weights = np.empty((len(face), 3))
+        weights[:, 1] = slopes[:, 0] * x + slopes[:, 1] * y
+        weights[:, 2] = slopes[:, 2] * x + slopes[:, 3] * y
+        weights[:, 0] = 1.0 - weights[:, 1] - weights[:, 2]
+        return weights
 
 
 def _cross(p: FloatArray, q: FloatArray) -> FloatArray:
