@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -223,3 +224,36 @@ def bottle(around: int = 48, along: int = 60):
     middle = side[faces].mean(axis=1)
     kept = ~((np.abs(middle[:, 2] - 1) < 0.3) & (middle[:, 0] > 0.85))
     return np.concatenate([side, *floor, [[0.0, 0.0, 0.0]]]), np.concatenate([faces[kept], *lid])
+
+
+def tube(around: int = 48, along: int = 12):
+    """A result: a cylinder about z, unrolled, with two points of the cut marked as cones."""
+    angle, z = np.meshgrid(np.arange(around + 1) / around, np.linspace(0.0, 1.0, along), indexing="ij")
+    uv = np.column_stack([angle.ravel(), z.ravel() / (2 * np.pi)])
+    corner = (np.arange(around)[:, None] * along + np.arange(along - 1)).ravel()
+    uv_faces = np.vstack(
+        [
+            np.column_stack([corner, corner + along, corner + along + 1]),
+            np.column_stack([corner, corner + along + 1, corner + 1]),
+        ]
+    )
+    turn = 2 * np.pi * angle[:-1].ravel()
+    vertices = np.column_stack([np.cos(turn), np.sin(turn), z[:-1].ravel()])
+    seams = np.column_stack([np.arange(along - 1), np.arange(1, along)])
+    faces = uv_faces % len(vertices)
+    qc = np.linspace(1.0, 1.2, len(faces))
+    qc[0] = np.nan
+    log_scale = np.full(len(faces), np.log(1 / (2 * np.pi)))
+    log_scale[0] = np.nan
+    return SimpleNamespace(
+        vertices=vertices,
+        faces=faces,
+        uv=uv,
+        uv_faces=uv_faces,
+        corner_uv=uv[uv_faces],
+        cones=np.array([0, along - 1]),
+        curvatures=np.array([1.0, -1.0]),
+        seams=seams,
+        distortion=SimpleNamespace(qc=qc, log_area_scale=log_scale, qc_mean=1.1, flipped=0, seam_length=0.4),
+        source=None,
+    )

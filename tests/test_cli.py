@@ -64,6 +64,13 @@ def test_other_formats(model, tmp_path, ending):
     assert (tmp_path / f"out.{ending}").stat().st_size > 1000
 
 
+def test_glb_with_a_texture(model, tmp_path):
+    pytest.importorskip("PIL")
+    done = run("flatten", model, "-q", "-o", "out.glb", "--texture", "checker", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert b"baseColorTexture" in (tmp_path / "out.glb").read_bytes()
+
+
 def test_paper_is_the_published_method(model, tmp_path):
     done = run("flatten", model, "--paper", "--report", "paper.json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -80,6 +87,9 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "-o", "x.fbx"], "'.fbx'"),
         (["model.obj", "-o", "missing/x.obj"], "missing"),
         (["model.obj", "--report", "missing/x.json"], "missing"),
+        (["model.obj", "--texture", "checker"], "only .glb files carry a texture"),
+        (["model.obj", "-o", "x.glb", "--texture", "none.png"], "none.png: there is no such file"),
+        (["model.obj", "-o", "x.glb", "--texture", "text.ply"], "text.ply is not a readable image"),
         (["model.obj", "-o", "model.obj"], "is the input and the output"),
         (["model.obj", "-o", "z.obj", "--report", "model.obj"], "is the input and the report"),
         (["model.obj", "-o", "z.obj", "--report", "./z.obj"], "is the output and the report"),

@@ -5,12 +5,18 @@ from __future__ import annotations
 import json
 import os
 import struct
+import sys
+from dataclasses import fields
+from io import BytesIO
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import shapes
 
-from coneflat.errors import MeshFileError, UnknownFormatError
+import coneflat
+from coneflat.checker import DARK_CELL, LIGHT_CELL, cell_side
+from coneflat.errors import ConeflatError, MeshFileError, OptionError, UnknownFormatError
 from coneflat.io import OUTPUT_FORMATS, atomic_write, check_output, read_mesh, triangulate, write_flattening
 
 OBJ = b"""\
@@ -229,6 +235,16 @@ def glb_parts(path):
     return tree, accessor
 
 
+def embedded_image(path, tree):
+    """Return the bytes of the image that the first material of a GLB file has as its texture."""
+    index = tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"]
+    view = tree["bufferViews"][tree["images"][tree["textures"][index]["source"]]["bufferView"]]
+    content = path.read_bytes()
+    length = struct.unpack_from("<I", content, 12)[0]
+    start = 28 + length + view["byteOffset"]
+    return content[start : start + view["byteLength"]]
+
+
 class TestSplitFormats:
     def test_ply_round_trip(self, bar, tmp_path):
         result = cut_bar(bar)
@@ -268,6 +284,59 @@ class TestSplitFormats:
         # The seam closes again when the file is read, since the positions agree.
         assert len(read_mesh(out).vertices) == 6
 
+    def test_glb_carries_a_checkerboard(self, tmp_path):
+        image = pytest.importorskip("PIL.Image")
+        result = coneflat.flatten(*shapes.hill())
+        tree, accessor = glb_parts(result.save(tmp_path / "out.glb", texture="checker"))
+        content = embedded_image(tmp_path / "out.glb", tree)
+        assert tree["images"][0]["mimeType"] == "image/png"
+        board = np.asarray(image.open(BytesIO(content)).convert("RGB")).astype(int)
+        assert len(content) < 20_000
+        assert board.shape[0] == board.shape[1] > 1000
+        # What a viewer looks up for some points of the surface is what the figures show there.
+        (primitive,) = tree["meshes"][0]["primitives"]
+        uv = accessor(primitive["attributes"]["TEXCOORD_0"])[accessor(primitive["indices"])[:, 0]]
+        column, row = np.minimum(uv * len(board), len(board) - 1).astype(int).T
+        cells = round(1 / cell_side(result.uv, result.uv_faces))
+        place = np.floor(np.stack([uv[:, 0], 1 - uv[:, 1]]) * cells)
+        inside = np.abs(uv * cells - np.round(uv * cells)).min(axis=1) > 0.02
+        expected = np.where((place.sum(axis=0) % 2 == 0)[:, None], LIGHT_CELL, DARK_CELL)
+        np.testing.assert_allclose(board[row, column][inside], 255 * expected[inside], atol=1)
+        assert inside.mean() > 0.8
+
+    @pytest.mark.parametrize(("ending", "kind"), [("png", "png"), ("jpg", "jpeg"), ("bmp", "png")])
+    def test_glb_carries_an_image(self, bar, tmp_path, ending, kind):
+        image = pytest.importorskip("PIL.Image")
+        colors = np.random.default_rng(3).integers(0, 256, (5, 7, 3), dtype=np.uint8)
+        source = tmp_path / f"wood.{ending}"
+        image.fromarray(colors).save(source)
+        out = write_flattening(cut_bar(bar), tmp_path / "out.glb", source)
+        tree, _ = glb_parts(out)
+        assert tree["images"][0]["mimeType"] == f"image/{kind}"
+        content = embedded_image(out, tree)
+        if ending != "bmp":
+            assert content.startswith(source.read_bytes())
+        shown = np.asarray(image.open(BytesIO(content)).convert("RGB"))
+        np.testing.assert_array_equal(shown, np.asarray(image.open(source)))
+        material = tree["materials"][0]["pbrMetallicRoughness"]
+        assert material["baseColorFactor"] == [1.0, 1.0, 1.0, 1.0]
+
+    def test_what_is_no_texture(self, bar, tmp_path, monkeypatch):
+        pytest.importorskip("PIL")
+        result = cut_bar(bar)
+        (tmp_path / "text.png").write_text("no image")
+        for path, texture, kind, message in (
+            ("out.obj", "checker", OptionError, "only .glb files carry a texture"),
+            ("out.glb", tmp_path / "none.png", MeshFileError, "there is no such file"),
+            ("out.glb", tmp_path / "text.png", MeshFileError, "text.png is not a readable image"),
+        ):
+            with pytest.raises(kind, match=message):
+                write_flattening(result, tmp_path / path, texture)
+        monkeypatch.setitem(sys.modules, "PIL", None)
+        with pytest.raises(OptionError, match=r'textures need Pillow: pip install "coneflat\[figures\]"'):
+            write_flattening(result, tmp_path / "out.glb", "checker")
+        assert not list(tmp_path.glob("out.*"))
+
     def test_npz_holds_every_array(self, bar, tmp_path):
         result = cut_bar(bar)
         out = write_flattening(result, tmp_path / "out.npz")
@@ -291,6 +360,57 @@ class TestSplitFormats:
             for name in names:
                 np.testing.assert_array_equal(arrays[name], getattr(result, name))
             assert json.loads(str(arrays["report"])) == result.report()
+
+
+@pytest.fixture(scope="module")
+def result():
+    return coneflat.flatten(*shapes.hill(), quantum=np.pi / 2)
+
+
+class TestReadingResults:
+    def test_a_result_comes_back(self, result, tmp_path):
+        again = coneflat.read_flattening(result.save(tmp_path / "out.npz"))
+        for field in fields(result):
+            one, other = getattr(result, field.name), getattr(again, field.name)
+            if isinstance(one, np.ndarray):
+                np.testing.assert_array_equal(one, other)
+        np.testing.assert_array_equal(again.distortion.qc, result.distortion.qc)
+        assert again.report() == result.report()
+
+    @pytest.mark.parametrize(
+        ("name", "value", "message"),
+        [
+            ("uv", None, "holds no UVs: 'uv' is missing"),
+            ("seams", None, "holds no result of coneflat: 'seams' is missing"),
+            ("uv", np.zeros((4, 3)), r"'uv' has the shape \(4, 3\)"),
+            ("uv_faces", np.array([[0, 1, 10**6]]), "'uv_faces' has indices beyond the"),
+            ("cones", np.zeros(9, dtype=int), "; 9 cones"),
+            ("vertices", "nan", "not finite"),
+            ("report", np.array("{}"), "not a readable NPZ file"),
+            ("report", np.array("[1"), "not a readable NPZ file"),
+        ],
+    )
+    def test_what_is_no_result(self, result, tmp_path, name, value, message):
+        with np.load(result.save(tmp_path / "out.npz")) as archive:
+            arrays = dict(archive)
+        if value is None:
+            del arrays[name]
+        elif isinstance(value, str):
+            arrays[name] = np.full_like(arrays[name], value)
+        else:
+            arrays[name] = value
+        np.savez(tmp_path / "bad.npz", **arrays)
+        with pytest.raises(MeshFileError, match=message) as caught:
+            coneflat.read_flattening(tmp_path / "bad.npz")
+        assert "\n" not in str(caught.value)
+
+    @pytest.mark.parametrize("content", [b"PK\x03\x04 broken", b"no archive", b""])
+    def test_damaged_files(self, tmp_path, content):
+        (tmp_path / "bad.npz").write_bytes(content)
+        with pytest.raises(ConeflatError, match=r"bad\.npz"):
+            coneflat.read_flattening(tmp_path / "bad.npz")
+        with pytest.raises(MeshFileError, match="no such file"):
+            coneflat.read_flattening(tmp_path / "none.npz")
 
 
 class TestTargets:

@@ -1,52 +1,21 @@
-"""Laws of the rasteriser, the camera and the demo figure."""
+"""Laws of the rasteriser, the camera and the pictures of meshes."""
 
 from __future__ import annotations
 
-import sys
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
+import shapes
+from shapes import tube
 
+from coneflat.checker import DARK_CELL, LIGHT_CELL
 from coneflat.errors import OptionError
 from coneflat.sample import sample_path
-from coneflat.view.camera import default_eye, fit_camera
+from coneflat.view.camera import eye_direction, fit_camera, view_aspect
 from coneflat.view.projection import render_mesh
-from coneflat.view.raster import barycentrics, rasterise
-from coneflat.view.shading import checkerboard
+from coneflat.view.raster import Barycentrics, rasterise
+from coneflat.view.shading import checkerboard, corner_normals
 
 SQUARE = np.array([[0, 1, 2], [0, 2, 3]])
-
-
-def tube(around=48, along=12):
-    """A cylinder about z with UVs cut along one line; its cones, if any, are at the cut's two ends."""
-    angle, z = np.meshgrid(np.arange(around + 1) / around, np.linspace(0.0, 1.0, along), indexing="ij")
-    uv = np.column_stack([angle.ravel(), z.ravel() / (2 * np.pi)])
-    corner = (np.arange(around)[:, None] * along + np.arange(along - 1)).ravel()
-    uv_faces = np.vstack(
-        [
-            np.column_stack([corner, corner + along, corner + along + 1]),
-            np.column_stack([corner, corner + along + 1, corner + 1]),
-        ]
-    )
-    turn = 2 * np.pi * angle[:-1].ravel()
-    vertices = np.column_stack([np.cos(turn), np.sin(turn), z[:-1].ravel()])
-    seams = np.column_stack([np.arange(along - 1), np.arange(1, along)])
-    faces = uv_faces % len(vertices)
-    qc = np.linspace(1.0, 1.2, len(faces))
-    qc[0] = np.nan
-    return SimpleNamespace(
-        vertices=vertices,
-        faces=faces,
-        uv=uv,
-        uv_faces=uv_faces,
-        corner_uv=uv[uv_faces],
-        cones=np.array([0, along - 1]),
-        curvatures=np.array([1.0, -1.0]),
-        seams=seams,
-        distortion=SimpleNamespace(qc=qc, qc_mean=1.1, flipped=0, seam_length=0.4),
-        source=None,
-    )
 
 
 def test_the_nearer_triangle_hides_the_farther_one_in_either_order():
@@ -105,8 +74,8 @@ def test_barycentrics_sum_to_one_and_give_back_the_pixel_centres():
     points = np.array([[2.3, 1.1, 0], [28.7, 9.4, 3], [11.2, 30.9, 7]])
     faces = [[0, 1, 2]]
     coverage = rasterise(points, faces, 32, 32)
-    weights = barycentrics(points, faces, coverage)
     row, column = np.nonzero(coverage.covered)
+    weights = Barycentrics(points, np.array(faces)).of(np.zeros_like(row), column, row)
     assert weights.sum(axis=1) == pytest.approx(1.0)
     assert weights.min() > -1e-9
     assert (weights @ points)[:, :2] == pytest.approx(np.column_stack([column + 0.5, row + 0.5]))
@@ -132,14 +101,45 @@ def test_the_view_along_the_upward_axis_is_defined():
 
 
 def test_front_and_back_views_face_each_other_from_above():
-    front, back = default_eye("z"), default_eye("z", behind=True)
-    assert front[2] == back[2]
+    front, back = eye_direction("front-right", "z"), eye_direction("back-left", "z")
+    assert front[2] == back[2] > 0
     assert front[:2] == pytest.approx(-back[:2])
+
+
+@pytest.mark.parametrize("up", ["x", "y", "z"])
+def test_the_sides_of_a_model(up):
+    sides = {name: eye_direction(name, up) for name in ("front", "back", "left", "right", "top", "bottom")}
+    assert sides["top"].tolist() == np.eye(3)["xyz".index(up)].tolist()
+    for one, other in (("front", "back"), ("left", "right"), ("top", "bottom")):
+        np.testing.assert_array_equal(sides[one], -sides[other])
+    # Seen from the front, the right side is to the right in the picture.
+    camera = fit_camera(np.eye(3), (9, 9), "front", up)
+    np.testing.assert_allclose(camera.axes, [sides["right"], sides["top"], sides["front"]], atol=1e-12)
+    more_front, more_right = eye_direction("front-right", up), eye_direction("right-front", up)
+    assert more_front @ sides["front"] > more_front @ sides["right"] > 0
+    assert more_right @ sides["right"] > more_right @ sides["front"] > 0
+    assert eye_direction("front-bottom", up) @ sides["bottom"] > 0
+
+
+def test_the_aspect_of_a_view():
+    box = np.array([[x, y, z] for x in (0, 3) for y in (0, 2) for z in (0, 1)], dtype=float)
+    assert view_aspect(box, "front") == pytest.approx(3 / 2)
+    assert view_aspect(box, "right") == pytest.approx(1 / 2)
+    assert view_aspect(box[:2], "right") == 4.0
+    assert view_aspect(box[[0, 2]], "right") == 0.25
 
 
 def test_an_unknown_upward_axis_is_refused():
     with pytest.raises(OptionError, match="not 'up'"):
         fit_camera(np.eye(3), (10, 10), up="up")
+
+
+@pytest.mark.parametrize(
+    "eye", ["above", "front-", "front-right-top", "left-right", "", (0, 0, 0), (1, 2), (1, np.nan, 0)]
+)
+def test_an_unknown_eye_is_refused(eye):
+    with pytest.raises(OptionError, match="eye"):
+        eye_direction(eye)
 
 
 def test_points_and_lines_behind_the_model_are_hidden():
@@ -148,11 +148,35 @@ def test_points_and_lines_behind_the_model_are_hidden():
     assert picture.visible_points([[1, 0, 0.5], [-1, 0, 0.2]]).tolist() == [True, False]
     assert not picture.visible_points([[0, 9, 0]]).any()
     front, back = np.array([[1, 0, 0.2], [1, 0, 0.8]]), np.array([[-1, 0, 0.1], [-1, 0, 0.4]])
-    pieces = picture.visible_segments(front[:1], front[1:])
-    length = np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1).sum()
-    assert length == pytest.approx(np.linalg.norm(np.diff(picture.camera.project(front)[:, :2], axis=0)))
-    assert len(picture.visible_segments(back[:1], back[1:])) == 0
-    assert picture.visible_segments(np.empty((0, 3)), np.empty((0, 3))).shape == (0, 2, 2)
+    ends = np.stack([front, back], axis=1)
+    pieces, visible = picture.split_segments(*ends)
+    assert visible.tolist() == [True, False]
+    expected = np.stack([picture.camera.project(side)[:, :2] for side in (front, back)])
+    np.testing.assert_allclose(pieces, expected, atol=1e-9)
+    pieces, visible = picture.split_segments(np.empty((0, 3)), np.empty((0, 3)))
+    assert (pieces.shape, visible.shape) == ((0, 2, 2), (0,))
+
+
+def test_a_line_is_cut_where_it_vanishes():
+    wall = np.array([[0, 0, 1], [4, 0, 1], [4, 4, 1], [0, 4, 1]], dtype=float)
+    floor = np.array([[-4, 0, 0], [4, 0, 0], [4, 4, 0], [-4, 4, 0]], dtype=float)
+    picture = render_mesh(
+        np.vstack([wall, floor]), np.vstack([SQUARE, SQUARE + 4]), size=(400, 200), eye="front"
+    )
+    pieces, visible = picture.split_segments([[-3.0, 2, 0]], [[3.0, 2, 0]])
+    assert visible.tolist() == [True, False]
+    # To the step and the reach of the test.
+    assert pieces[0, 1, 0] == pytest.approx(200, abs=4)
+    np.testing.assert_array_equal(pieces[0, 1], pieces[1, 0])
+
+
+def test_a_point_beside_an_outline_is_within_reach():
+    model = tube()
+    picture = render_mesh(model.vertices, model.faces, size=(160, 160), eye=[1, 0, 0], up="z")
+    behind = [[-0.2, 0.98, 0.5]]
+    assert not picture.visible_points(behind).any()
+    assert picture.visible_points(behind, reach=6.0).all()
+    assert not picture.visible_points([[-1, 0, 0.5]], reach=6.0).any()
 
 
 def test_a_picture_shows_the_model_on_a_transparent_ground():
@@ -193,56 +217,58 @@ def test_the_sample_is_a_closed_surface_of_genus_one():
     assert np.einsum("ij,ij->", p, np.cross(q, r)) > 0
 
 
-class TestFigure:
-    @pytest.fixture(autouse=True)
-    def _needs_matplotlib(self):
-        pytest.importorskip("matplotlib")
-
-    def test_the_demo_figure_is_a_picture(self, tmp_path):
-        from coneflat.view import demo_figure, save_figure
-
-        figure = demo_figure(tube(), up="z")
-        path = save_figure(figure, tmp_path / "demo.png")
-        assert path.read_bytes().startswith(b"\x89PNG")
-        assert [file.name for file in tmp_path.iterdir()] == ["demo.png"]
-        figure.canvas.draw()
-        pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]
-        assert 0.05 < (pixels < 250).any(axis=2).mean() < 0.9
-        red = (pixels[..., 0] > 200) & (pixels[..., 1:] < 60).all(axis=2)
-        assert red.any()
-
-    def test_a_flattening_without_cones_or_seams_has_a_figure(self):
-        from coneflat.view import demo_figure
-
-        model = tube()
-        model.cones, model.curvatures = np.empty(0, dtype=int), np.empty(0)
-        model.seams = np.empty((0, 2), dtype=int)
-        model.distortion.qc[:] = np.nan
-        assert not demo_figure(model).legends
-
-    def test_cones_appear_in_the_layout_once_for_each_of_their_points(self):
-        from coneflat.view.panels import layout_cones, layout_edges
-
-        model = tube()
-        vertex, point = layout_cones(model)
-        assert vertex.tolist() == [0, 0, 11, 11]
-        assert len(set(point.tolist())) == 4
-        inner, outline = layout_edges(model.uv_faces)
-        assert len(outline) == 2 * 48 + 2 * 11
-        assert 2 * len(inner) + len(outline) == 3 * len(model.faces)
-
-    def test_the_colour_scale_ends_at_a_round_number(self):
-        from coneflat.view.panels import qc_top
-
-        assert qc_top(np.ones(9)) == pytest.approx(1.05)
-        assert qc_top(np.full(9, 1.12)) == pytest.approx(1.15)
-        assert qc_top(np.full(9, 2.3)) == pytest.approx(2.5)
-        assert qc_top(np.array([np.nan, np.nan])) == pytest.approx(1.05)
+def test_normals_are_smooth_but_at_creases():
+    vertices, faces = shapes.box(3, (1, 1, 1))
+    np.testing.assert_allclose(np.abs(corner_normals(vertices, faces)).max(axis=2), 1.0)
+    vertices, faces = shapes.sphere(3, bumps=0.0)
+    np.testing.assert_allclose(corner_normals(vertices, faces), vertices[faces], atol=0.02)
 
 
-def test_a_missing_matplotlib_is_named_with_its_remedy(monkeypatch):
-    from coneflat.view import demo_figure
+def test_colours_of_faces_and_of_corners_are_those_given():
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
+    flat = {"size": (100, 100), "eye": "front", "contrast": 0.0, "margin": 0.0}
+    colors = np.array([[1, 0, 0], [0, 0, 1]], dtype=float)
+    image = render_mesh(square, SQUARE, colors=colors, **flat).image
+    # The first face is below the diagonal.
+    np.testing.assert_allclose(image[80, 60], [1, 0, 0, 1])
+    np.testing.assert_allclose(image[20, 40], [0, 0, 1, 1])
+    red = np.zeros((2, 3, 3))
+    red[..., 0] = square[SQUARE][..., 0]
+    image = render_mesh(square, SQUARE, colors=red, **flat).image
+    np.testing.assert_allclose(image[30, :, 0], (np.arange(100) + 0.5) / 100, atol=1e-9)
 
-    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    with pytest.raises(OptionError, match=r'pip install "coneflat\[figures\]"'):
-        demo_figure(tube())
+
+def test_the_squares_of_a_checkerboard_are_squares():
+    """A square in the plane is its own layout: the board has straight lines at equal distances."""
+    points, faces = shapes.grid(7, 7)
+    uv = points[faces][..., :2]
+    picture = render_mesh(
+        points, faces, size=(400, 400), eye="front", corner_uv=uv, cell=0.1, contrast=0.0, margin=0.0
+    )
+    light = picture.image[..., 0] > (LIGHT_CELL[0] + DARK_CELL[0]) / 2
+    # The centre of every pixel, counted from below as v is.
+    place = np.floor((np.arange(400) + 0.5) / 40).astype(int)
+    expected = (place[None, :] + place[::-1, None]) % 2 == 0
+    np.testing.assert_array_equal(light, expected)
+    np.testing.assert_allclose(picture.image[20, 20], [*DARK_CELL, 1], atol=1e-9)
+    np.testing.assert_allclose(picture.image[20, 60], [*LIGHT_CELL, 1], atol=1e-9)
+
+
+def test_a_board_seen_at_an_angle_has_straight_lines():
+    points, faces = shapes.grid(5, 9)
+    picture = render_mesh(
+        points,
+        faces,
+        size=(300, 300),
+        eye=(1.0, 0.7, 0.5),
+        corner_uv=points[faces][..., :2],
+        cell=0.25,
+        contrast=0.0,
+    )
+    camera = picture.camera
+    u, v = np.meshgrid(np.arange(0.125, 1, 0.25), np.arange(0.125, 1, 0.25), indexing="ij")
+    centres = np.stack([u, v, np.zeros_like(u)], axis=-1)
+    x, y = np.moveaxis(np.floor(camera.project(centres)[..., :2]).astype(int), -1, 0)
+    light = picture.image[y, x, 0]
+    i, j = np.indices(u.shape)
+    np.testing.assert_allclose(light, np.where((i + j) % 2 == 0, LIGHT_CELL[0], DARK_CELL[0]), atol=1e-9)

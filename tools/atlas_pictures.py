@@ -14,8 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 import shapes
 
 import coneflat
-from coneflat.view import new_figure, save_figure
-from coneflat.view.panels import draw_layout, draw_textured
+from coneflat.view import draw_checker, draw_layout, new_figure, save_figure
 
 SIDE = 2.6  # inches
 
@@ -39,7 +38,7 @@ def draw_shapes(path: Path) -> None:
         result = coneflat.flatten(*mesh, charts="atlas", **options)
         row, column = divmod(index, 4)
         axes = figure.add_axes((column / 4 + 0.01, 0.5 * (1 - row) + 0.01, 0.23, 0.42))
-        draw_layout(axes, result)
+        draw_layout(result, axes)
         axes.set_title(title, size=9)
     save_figure(figure, path)
 
@@ -50,9 +49,9 @@ def draw_models(models: list[tuple[Path, str]], path: Path) -> None:
     for index, (model, up) in enumerate(models):
         result = coneflat.flatten(model, charts="atlas")
         left, width = index / len(models), 1 / len(models)
-        draw_textured(figure.add_axes((left, 0.5, width, 0.46)), result, up)
+        draw_checker(result, figure.add_axes((left, 0.5, width, 0.46)), up=up, cones=True)
         axes = figure.add_axes((left + 0.01, 0.02, width - 0.02, 0.46))
-        draw_layout(axes, result)
+        draw_layout(result, axes)
         what = f"{len(result.cones)} cones, {result.distortion.charts} chart{'s'[: result.distortion.charts > 1]}"
         figure.text(left + width / 2, 0.975, f"{model.stem}: {what}", size=9, ha="center", va="center")
     save_figure(figure, path)

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 import coneflat
-from coneflat.view import demo_figure, new_figure, render_mesh, save_figure
-from coneflat.view.panels import draw_textured
+from coneflat.view import demo_figure, draw_checker, new_figure, render_mesh, save_figure
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 LOWEST, HIGHEST = -16, -1  # decades of curvature error that the colours span
@@ -61,7 +60,7 @@ def quarters_figure(path: Path) -> Any:
         result = coneflat.flatten(path, **options)
         axes = figure.add_axes((0.01 + 0.5 * k, 0.01, 0.48, 0.88))
         axes.set_axis_off()
-        draw_textured(axes, result, "y")
+        draw_checker(result, axes, cones=True)
         figure.text(0.015 + 0.5 * k, 0.945, label, size=13)
         off = (
             ""

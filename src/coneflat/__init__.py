@@ -19,6 +19,7 @@ _HOMES = {
     "Flattening": "result",
     "PAPER": "options",
     "read_mesh": "io",
+    "read_flattening": "io",
     "MeshFile": "io",
     "sample_path": "sample",
     "cone_curve": "curve",
@@ -48,6 +49,14 @@ _HOMES = {
     "CutMesh": "seams",
     "least_squares_layout": "layout",
     "ConeflatError": "errors",
+    "make_figure": "view",
+    "save_figure": "view",
+    "draw_layout": "view",
+    "draw_checker": "view",
+    "draw_quality": "view",
+    "draw_cones": "view",
+    "draw_curvature": "view",
+    "draw_cone_curve": "view",
 }
 
 __all__ = [
@@ -72,6 +81,12 @@ __all__ = [
     "cotangent_laplacian",
     "cotangents",
     "cut_open",
+    "draw_checker",
+    "draw_cone_curve",
+    "draw_cones",
+    "draw_curvature",
+    "draw_layout",
+    "draw_quality",
     "edge_costs",
     "edge_lengths",
     "errors",
@@ -80,10 +95,13 @@ __all__ = [
     "flatten",
     "greedy_cones",
     "least_squares_layout",
+    "make_figure",
     "measure",
     "mollify",
+    "read_flattening",
     "read_mesh",
     "sample_path",
+    "save_figure",
     "scaled_lengths",
     "visible_share",
 ]
@@ -104,7 +122,7 @@ if TYPE_CHECKING:
         mollify,
     )
     from .geometry.visibility import visible_share
-    from .io import MeshFile, read_mesh
+    from .io import MeshFile, read_flattening, read_mesh
     from .layout import least_squares_layout
     from .mesh import TriangleMesh
     from .options import PAPER
@@ -113,6 +131,16 @@ if TYPE_CHECKING:
     from .sample import sample_path
     from .seams import CutMesh, cut_open, edge_costs, find_seams
     from .validation import CheckedMesh, check_mesh
+    from .view import (
+        draw_checker,
+        draw_cone_curve,
+        draw_cones,
+        draw_curvature,
+        draw_layout,
+        draw_quality,
+        make_figure,
+        save_figure,
+    )
 
 
 def __getattr__(name: str) -> Any:

@@ -20,8 +20,6 @@ from .prepare import Component, prepare
 from .threads import one_blas_thread
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from .cones.cone_search import ConeSearch
 
 
@@ -164,27 +162,3 @@ def _open(mesh: Any, faces: ArrayLike | None, options: Options) -> tuple[ConeSea
 
 def _named(solution: ConeSolution, distortion: float, part: Component) -> FoundCones:
     return FoundCones(part.wishes.names[solution.cones], solution.curvatures, distortion)
-
-
-def curve_figure(curve: ConeCurve, distortion: float = 0.2, title: str = "") -> Figure:
-    """Return a figure of the curve, with the distortion wanted and the knee."""
-    from .view import new_figure
-
-    figure = new_figure(7.0, 4.2)
-    axes = figure.add_axes((0.11, 0.14, 0.85, 0.76))
-    axes.plot(curve.counts, curve.distortions, color="#35618f", marker="o", markersize=4, linewidth=1.5)
-    axes.axhline(distortion, color="#b0413e", linewidth=1.0, linestyle="--")
-    axes.annotate(
-        f"E = {distortion:g}", (curve.counts[-1], distortion), color="#b0413e", ha="right", va="bottom"
-    )
-    axes.axvline(curve.knee, color="#888888", linewidth=0.8, linestyle=":")
-    axes.annotate(
-        f"knee: {curve.knee}", (curve.knee, axes.get_ylim()[1]), color="#666666", ha="left", va="top"
-    )
-    axes.set_ylim(bottom=0.0)
-    axes.set_xlabel("number of cones")
-    axes.set_ylabel("area distortion E (standard deviation of the log scale)")
-    axes.set_title(title, fontsize=11)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    return figure

@@ -114,7 +114,7 @@ def measure(
         qc=qc,
         log_area_scale=log_scale,
         qc_mean=_mean(qc[valid], weights),
-        qc_p95=_quantile(qc[valid], weights, 0.95),
+        qc_p95=quantile(qc[valid], weights, 0.95),
         qc_max=float(qc[valid].max()) if len(weights) else float("nan"),
         area_std=float(np.sqrt(_mean((log_scale[valid] - mean_scale) ** 2, weights))),
         flipped=int(against.sum()),
@@ -244,10 +244,11 @@ def _mean(values: FloatArray, weights: FloatArray) -> float:
 
 
 def _spread(log_scale: FloatArray, weights: FloatArray) -> float:
-    return float(np.exp(_quantile(log_scale, weights, 0.95) - _quantile(log_scale, weights, 0.05)))
+    return float(np.exp(quantile(log_scale, weights, 0.95) - quantile(log_scale, weights, 0.05)))
 
 
-def _quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
+def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
+    """Return the value below which lies a fraction of the weight; NaN of nothing."""
     if not len(values):
         return float("nan")
     order = np.argsort(values, kind="stable")

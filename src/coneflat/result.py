@@ -82,15 +82,19 @@ class Flattening:
 
         return as_dict(self)
 
-    def save(self, path: str | PathLike[str]) -> Path:
+    def save(self, path: str | PathLike[str], *, texture: str | PathLike[str] | None = None) -> Path:
         """Write the textured mesh; the format (.obj, .ply, .glb, .npz) follows the path's ending.
 
+        texture: of a .glb: "checker" for a checkerboard, or an image file that becomes part of it.
+
         Raises:
-            UnknownFormatError, MeshFileError: the ending is unknown, or the file cannot be written.
+            UnknownFormatError, MeshFileError: the ending is unknown, or the file cannot be written, or the texture
+                cannot be read.
+            OptionError: files of this ending carry no texture, or Pillow is not installed.
         """
         from .io import write_flattening
 
-        return write_flattening(self, path)
+        return write_flattening(self, path, texture)
 
     def __repr__(self) -> str:
         return (

@@ -55,10 +55,10 @@ def cones(
       coneflat cones horse.ply --distortion 0.1 -o horse.cones
       coneflat cones horse.ply --curve
     """
-    from ..curve import cone_curve, curve_figure, find_cones
+    from ..curve import cone_curve, find_cones
     from ..io import atomic_write, read_mesh
     from ..io.atomic import check_target
-    from ..view import new_figure, save_figure
+    from ..view import check_figure_target, make_figure, new_figure, save_figure
 
     if curve:
         new_figure(1, 1)  # says what is missing before the work
@@ -70,9 +70,10 @@ def cones(
         ):
             if is_given:
                 raise click.UsageError(f"only --curve takes {name}: add it, or leave out {name}", context)
-    for target in (output, picture):
-        if target is not None:
-            check_target(target)
+    if output is not None:
+        check_target(output)
+    if picture is not None:
+        check_figure_target(picture)
     keywords = {**as_keywords(search), "repair": repair}
     source = read_mesh(mesh)
     chosen = find_cones(source, **keywords)
@@ -98,7 +99,7 @@ def cones(
     if not quiet:
         click.echo("\n".join(lines))
     if picture is not None:
-        save_figure(curve_figure(found, wanted, mesh.name), picture)
+        save_figure(make_figure(found, "curve", distortion=wanted, title=mesh.name), picture)
     if output is not None:
         with atomic_write(output, "w") as file:
             for vertex, curvature in zip(chosen.vertices, chosen.curvatures, strict=True):

@@ -49,6 +49,11 @@ from .search import place_options
     type=click.Path(path_type=Path),
     help="Do not cut the edges of a text file, two vertices on each line.",
 )
+@click.option(
+    "--texture",
+    metavar="checker|IMAGE",
+    help="Of a .glb: the texture that it carries, a checkerboard or an image file.",
+)
 @click.option("--report", type=click.Path(path_type=Path), help="Write all measures to this JSON file.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @click.pass_context
@@ -63,6 +68,7 @@ def flatten(
     seams: Path | None,
     forbidden_seams: Path | None,
     weld: bool | None,
+    texture: str | None,
     report: Path | None,
     quiet: bool,
     **method: Any,
@@ -72,7 +78,7 @@ def flatten(
     \b
     Examples:
       coneflat flatten horse.ply -o horse.obj
-      coneflat flatten hand.obj -o hand.glb --distortion 0.1 --report hand.json
+      coneflat flatten hand.obj -o hand.glb --distortion 0.1 --texture checker
       coneflat flatten part.stl --cone 12 --cone 507 --cone 1044
       coneflat flatten bracket.stl -o bracket.obj --sharp-angle 40deg
       coneflat flatten sheet.obj -o flat.obj --corner 10 --corner 95 --corner 230 --corner 310
@@ -96,4 +102,4 @@ def flatten(
         options["forbidden_seams"] = read_pairs(forbidden_seams)
     if corners:
         options["boundary"] = corners
-    run(mesh, output, options, weld=weld, report=report, quiet=quiet)
+    run(mesh, output, options, weld=weld, report=report, texture=texture, quiet=quiet)

@@ -14,6 +14,7 @@ from ..errors import ConeflatError
 from .batch import batch
 from .cones import cones
 from .demo import demo
+from .figure import figure
 from .flatten import flatten
 
 USER_ERROR = 2
@@ -30,6 +31,7 @@ def cli() -> None:
 cli.add_command(flatten)
 cli.add_command(batch)
 cli.add_command(cones)
+cli.add_command(figure)
 cli.add_command(demo)
 
 

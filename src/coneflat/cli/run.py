@@ -25,6 +25,7 @@ def run(
     *,
     weld: bool | None = None,
     report: Path | None = None,
+    texture: str | None = None,
     quiet: bool = False,
 ) -> Flattening:
     """Flatten a mesh file, write the result and its report, and print what came out.
@@ -35,11 +36,12 @@ def run(
         options: keyword arguments of `coneflat.flatten`.
         weld: merge vertices at the same position; None for the format's default.
         report: JSON file for the measures.
+        texture: of a .glb: "checker", or an image file.
         quiet: print nothing.
     """
     output = Path(f"{mesh.stem}_uv.obj") if output is None else output
     # What can fail at the end is looked at before the work.
-    check_output(output)
+    check_output(output, texture)
     if report is not None:
         check_target(report)
     _require_distinct({"input": mesh, "output": output, "report": report})
@@ -55,7 +57,7 @@ def run(
             result = replace(result, notes=(note, *result.notes))
         stages.done = 1.0
         with stages("write"):
-            result.save(output)
+            result.save(output, texture=texture)
         result = replace(result, seconds=dict(stages.seconds))
         if report is not None:
             with atomic_write(report, "w") as file:

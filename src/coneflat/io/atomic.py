@@ -5,13 +5,28 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import IO, Any
 
-from ..errors import ConeflatError, MeshFileError
+from ..errors import ConeflatError, MeshFileError, UnknownFormatError
+
+
+def known_ending(path: Path, endings: Collection[str], what: str) -> str:
+    """Return the ending of a path in lower case if it is known.
+
+    what: is done with files of these endings, for the message: "meshes are read from".
+
+    Raises:
+        UnknownFormatError: it is not.
+    """
+    ending = path.suffix.lower()
+    if ending not in endings:
+        wrong = f"ends with {path.suffix!r}, which is no known format" if path.suffix else "has no ending"
+        raise UnknownFormatError(f"{path} {wrong}; {what} {', '.join(endings)}")
+    return ending
 
 
 def check_target(path: str | PathLike[str]) -> Path:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
 from ..errors import MeshFileError
+from .texture import Texture
 from .uv_split import split_at_seams
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 _COMPONENTS = {"f4": 5126, "u4": 5125}
 _SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
 _MOST_BYTES = 2**32 - 1
-_MATERIAL = {
+_MATERIAL: dict[str, Any] = {
     "name": "coneflat",
     "doubleSided": True,
     "pbrMetallicRoughness": {
@@ -31,8 +32,8 @@ _MATERIAL = {
 }
 
 
-def write_glb(result: Flattening, stream: IO[bytes]) -> None:
-    """Write a result as GLB, with a plain two-sided material.
+def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None = None) -> None:
+    """Write a result as GLB, with a two-sided material that is plain or has a texture.
 
     Every vertex has its UV as TEXCOORD_0 (whose v points down, as glTF has it), a normal of the uncut
     surface, and as _SOURCE_VERTEX the vertex of the input that it came from. All are 32-bit floats, the only
@@ -41,6 +42,7 @@ def write_glb(result: Flattening, stream: IO[bytes]) -> None:
     Args:
         result: what to write.
         stream: a binary file.
+        texture: the image of the material; None for a light grey.
 
     Raises:
         MeshFileError: it is larger than GLB can be.
@@ -54,7 +56,12 @@ def write_glb(result: Flattening, stream: IO[bytes]) -> None:
         "_SOURCE_VERTEX": split.origin,
     }
     arrays += [values.astype("<f4") for values in attributes.values()]
-    header = _header(arrays, list(attributes))
+    tree = _scene(arrays, list(attributes))
+    if texture is not None:
+        image = texture.content + bytes(-len(texture.content) % 4)
+        _add_image(tree, len(image), texture.kind)
+        arrays.append(np.frombuffer(image, dtype=np.uint8))
+    header = _as_text(tree)
     size = sum(array.nbytes for array in arrays)
     total = 12 + 8 + len(header) + 8 + size
     if total > _MOST_BYTES:
@@ -68,8 +75,8 @@ def write_glb(result: Flattening, stream: IO[bytes]) -> None:
         stream.write(array.data)
 
 
-def _header(arrays: list[NDArray[Any]], names: list[str]) -> bytes:
-    """Return the JSON of a scene of one mesh: the first of its arrays are the triangles, the second positions."""
+def _scene(arrays: list[NDArray[Any]], names: list[str]) -> dict[str, Any]:
+    """Return the JSON tree of a scene of one mesh: the first of its arrays are the triangles, the second positions."""
     lengths = [array.nbytes for array in arrays]
     accessors: list[dict[str, Any]] = [
         {
@@ -82,7 +89,7 @@ def _header(arrays: list[NDArray[Any]], names: list[str]) -> bytes:
     ]
     accessors[1] |= {"min": arrays[1].min(axis=0).tolist(), "max": arrays[1].max(axis=0).tolist()}
     attributes = {name: i + 1 for i, name in enumerate(names)}
-    tree = {
+    return {
         "asset": {"version": "2.0", "generator": "coneflat"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -98,6 +105,24 @@ def _header(arrays: list[NDArray[Any]], names: list[str]) -> bytes:
         ],
         "buffers": [{"byteLength": sum(lengths)}],
     }
+
+
+def _add_image(tree: dict[str, Any], size: int, kind: str) -> None:
+    """Give the material an image, that comes behind all else in the buffer."""
+    start = tree["buffers"][0]["byteLength"]
+    tree["bufferViews"].append({"buffer": 0, "byteOffset": start, "byteLength": size})
+    tree["buffers"][0]["byteLength"] = start + size
+    tree["images"] = [{"bufferView": len(tree["bufferViews"]) - 1, "mimeType": kind}]
+    tree["textures"] = [{"source": 0}]
+    look = _MATERIAL["pbrMetallicRoughness"] | {
+        "baseColorFactor": [1.0] * 4,
+        "baseColorTexture": {"index": 0},
+    }
+    tree["materials"] = [_MATERIAL | {"pbrMetallicRoughness": look}]
+
+
+def _as_text(tree: dict[str, Any]) -> bytes:
+    """Return JSON, filled up with blanks to a multiple of 4."""
     text = json.dumps(tree, separators=(",", ":")).encode("ascii")
     return text + b" " * (-len(text) % 4)
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
-from ..errors import ConeflatError, MeshFileError, UnknownFormatError
+from ..errors import ConeflatError, MeshFileError
+from .atomic import known_ending
 from .gltf import parse_gltf
 from .model import MeshFile
 from .obj import parse_obj
@@ -53,10 +54,7 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
         FaceIndexError: a face names a vertex that does not exist.
     """
     path = Path(path)
-    ending = path.suffix.lower()
-    if ending not in _READERS:
-        ending = f"ends with {path.suffix!r}, which is no known format" if path.suffix else "has no ending"
-        raise UnknownFormatError(f"{path} {ending}; meshes are read from {', '.join(INPUT_FORMATS)}")
+    ending = known_ending(path, INPUT_FORMATS, "meshes are read from")
     content = read_bytes(path)
     try:
         mesh = _READERS[ending](path, content)

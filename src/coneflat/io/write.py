@@ -2,87 +2,51 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING
 
-import numpy as np
-
-from ..errors import UnknownFormatError
-from .atomic import atomic_write, check_target
+from ..errors import OptionError
+from .atomic import atomic_write, check_target, known_ending
 from .glb_write import write_glb
+from .npz import write_npz
 from .obj_write import write_obj
 from .ply_write import write_ply
+from .texture import find_texture
 
 if TYPE_CHECKING:
     from ..result import Flattening
 
 
-def _write_obj(result: Flattening, stream: IO[bytes], path: Path) -> None:
-    write_obj(result, stream, path.parent)
-
-
-def _write_ply(result: Flattening, stream: IO[bytes], path: Path) -> None:
-    write_ply(result, stream)
-
-
-def _write_glb(result: Flattening, stream: IO[bytes], path: Path) -> None:
-    write_glb(result, stream)
-
-
-def _write_npz(result: Flattening, stream: IO[bytes], path: Path) -> None:
-    origin = result.vertex_origin
-    arrays: dict[str, Any] = {
-        "vertices": result.vertices,
-        "faces": result.faces,
-        "uv": result.uv,
-        "uv_faces": result.uv_faces,
-        "cones": result.cones,
-        "curvatures": result.curvatures,
-        "log_scale": result.log_scale,
-        "curvature_residual": result.curvature_residual,
-        "seams": result.seams,
-        "vertex_origin": np.arange(len(result.vertices)) if origin is None else origin,
-        "face_origin": np.arange(len(result.faces)) if result.face_origin is None else result.face_origin,
-        "qc": result.distortion.qc,
-        "log_area_scale": result.distortion.log_area_scale,
-        "uv_scale": np.float64(result.uv_scale),
-        "report": np.array(json.dumps(result.report())),
-    }
-    np.savez(stream, **arrays)
-
-
-_WRITERS: dict[str, Callable[[Flattening, IO[bytes], Path], None]] = {
-    ".obj": _write_obj,
-    ".ply": _write_ply,
-    ".glb": _write_glb,
-    ".npz": _write_npz,
-}
-
 #: Endings of the files that `write_flattening` writes.
-OUTPUT_FORMATS = tuple(_WRITERS)
+OUTPUT_FORMATS = (".obj", ".ply", ".glb", ".npz")
 
 
-def check_output(path: str | PathLike[str]) -> Path:
-    """Return the path if `write_flattening` can be expected to succeed with it.
+def check_output(path: str | PathLike[str], texture: str | PathLike[str] | None = None) -> Path:
+    """Return the path if `write_flattening` can be expected to succeed with it and a texture.
 
     Worth asking before long work.
 
     Raises:
         UnknownFormatError: the ending is not one of `OUTPUT_FORMATS`.
-        MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
+        MeshFileError: the folder is missing, the path is a folder, or writing is not permitted; or the texture is no
+            image that can be read.
+        OptionError: files of this ending carry no texture, or Pillow is not installed.
     """
     path = Path(path)
-    if path.suffix.lower() not in _WRITERS:
-        ending = f"ends with {path.suffix!r}, which is no known format" if path.suffix else "has no ending"
-        raise UnknownFormatError(f"{path} {ending}; results are written as {', '.join(OUTPUT_FORMATS)}")
+    ending = known_ending(path, OUTPUT_FORMATS, "results are written as")
     check_target(path)
+    if texture is not None:
+        if ending != ".glb":
+            raise OptionError(f"only .glb files carry a texture, and {path} is none")
+        find_texture(texture)
     return path
 
 
-def write_flattening(result: Flattening, path: str | PathLike[str]) -> Path:
+def write_flattening(
+    result: Flattening, path: str | PathLike[str], texture: str | PathLike[str] | None = None
+) -> Path:
     """Write a flattened mesh, in full or not at all, and return the path.
 
     The format follows the path's ending, in any case. An .obj keeps the polygons, groups, materials and
@@ -90,11 +54,24 @@ def write_flattening(result: Flattening, path: str | PathLike[str]) -> Path:
     pair of vertex and UV point and the input's vertex as an attribute. An .npz holds all arrays of the result
     and its report as JSON.
 
+    Args:
+        result: what to write.
+        path: the file.
+        texture: of a .glb: "checker" for a checkerboard, or an image file that becomes part of it.
+
     Raises:
         UnknownFormatError: the ending is not one of `OUTPUT_FORMATS`.
-        MeshFileError: the file cannot be written.
+        MeshFileError: the file cannot be written, or the texture cannot be read.
+        OptionError: files of this ending carry no texture, or Pillow is not installed.
     """
-    path = check_output(path)
+    path = check_output(path, texture)
+    image = None if texture is None else find_texture(texture, result)
+    writers: dict[str, Callable[[IO[bytes]], None]] = {
+        ".obj": lambda stream: write_obj(result, stream, path.parent),
+        ".ply": lambda stream: write_ply(result, stream),
+        ".glb": lambda stream: write_glb(result, stream, image),
+        ".npz": lambda stream: write_npz(result, stream),
+    }
     with atomic_write(path) as stream:
-        _WRITERS[path.suffix.lower()](result, stream, path)
+        writers[path.suffix.lower()](stream)
     return path

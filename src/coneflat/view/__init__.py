@@ -2,8 +2,32 @@
 
 from __future__ import annotations
 
+from .curve import draw_cone_curve
 from .demo import demo_figure
-from .figure import new_figure, save_figure
+from .figure import FIGURE_FORMATS, check_figure_target, new_figure, save_figure
+from .kinds import KINDS, Look, make_figure
+from .layout import draw_layout
+from .model import draw_checker, draw_cones, draw_curvature, draw_quality
 from .projection import MeshPicture, render_mesh
+from .quantity import ColorScale, Quantity
 
-__all__ = ["MeshPicture", "demo_figure", "new_figure", "render_mesh", "save_figure"]
+__all__ = [
+    "FIGURE_FORMATS",
+    "KINDS",
+    "ColorScale",
+    "Look",
+    "MeshPicture",
+    "Quantity",
+    "check_figure_target",
+    "demo_figure",
+    "draw_checker",
+    "draw_cone_curve",
+    "draw_cones",
+    "draw_curvature",
+    "draw_layout",
+    "draw_quality",
+    "make_figure",
+    "new_figure",
+    "render_mesh",
+    "save_figure",
+]

@@ -49,25 +49,28 @@ def rasterise(points: ArrayLike, faces: ArrayLike, width: int, height: int) -> C
     return Coverage(face, depth)
 
 
-def barycentrics(points: ArrayLike, faces: ArrayLike, coverage: Coverage) -> FloatArray:
-    """Return the (k, 3) barycentric coordinates of the covered pixels' centres, in row order."""
-    points = np.asarray(points, dtype=np.float64)
-    faces = np.asarray(faces, dtype=np.int64)
-    p, q, r = np.moveaxis(points[faces, :2], 1, 0)
-    total = _cross(q - p, r - p)
-    total = np.where(total == 0.0, np.inf, total)[:, None]  # edge on, covered by rounding only
-    # Per face once, per pixel a few products: pixels outnumber faces.
-    turn = np.array([1.0, -1.0])
-    slopes = np.ascontiguousarray((np.hstack([(r - p)[:, ::-1] * turn, (p - q)[:, ::-1] * turn]) / total).T)
-    row, column = np.nonzero(coverage.covered)
-    face = coverage.face[row, column]
-    x = column + 0.5 - np.take(np.ascontiguousarray(p[:, 0]), face)
-    y = row + 0.5 - np.take(np.ascontiguousarray(p[:, 1]), face)
-    weights = np.empty((len(face), 3))
-    weights[:, 1] = slopes[0][face] * x + slopes[1][face] * y
-    weights[:, 2] = slopes[2][face] * x + slopes[3][face] * y
-    weights[:, 0] = 1.0 - weights[:, 1] - weights[:, 2]
-    return weights
+class Barycentrics:
+    """Barycentric coordinates in projected triangles."""
+
+    def __init__(self, points: FloatArray, faces: IntArray) -> None:
+        """Take points (n, 2 or 3) of the picture and faces (m, 3)."""
+        p, q, r = np.moveaxis(points[faces, :2], 1, 0)
+        total = _cross(q - p, r - p)
+        total = np.where(total == 0.0, np.inf, total)[:, None]  # edge on, covered by rounding only
+        # Per face once, per pixel a few products: pixels outnumber faces.
+        turn = np.array([1.0, -1.0])
+        self._slopes = np.hstack([(r - p)[:, ::-1] * turn, (p - q)[:, ::-1] * turn]) / total
+        self._first = p
+
+    def of(self, face: IntArray, column: IntArray, row: IntArray) -> FloatArray:
+        """Return the (k, 3) coordinates of the centres of pixels (k,) in faces (k,)."""
+        slopes, first = self._slopes[face], self._first[face]
+        x, y = column + 0.5 - first[:, 0], row + 0.5 - first[:, 1]
+        weights = np.empty((len(face), 3))
+        weights[:, 1] = slopes[:, 0] * x + slopes[:, 1] * y
+        weights[:, 2] = slopes[:, 2] * x + slopes[:, 3] * y
+        weights[:, 0] = 1.0 - weights[:, 1] - weights[:, 2]
+        return weights
 
 
 def _cross(p: FloatArray, q: FloatArray) -> FloatArray:

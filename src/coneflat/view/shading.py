@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, dots
+from ..geometry import corner_angles, edge_lengths
+from ..mesh import TriangleMesh, corner_fans
 
-CREASE_COSINE = 0.7
-"""About 45 degrees: where a face turns further from its corner's mean normal, the corner is sharp."""
+CREASE_COSINE = 0.6
+"""About 53 degrees: edges at which the surface bends more look sharp."""
 
 KEY_LIGHT = (-0.45, 0.65, 0.62)
 """Towards the main light in camera axes (right, up, near): over the left shoulder, as in drawings."""
@@ -17,16 +19,18 @@ INNER_SIDE_DIM = 0.62
 
 
 def corner_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the (m, 3, 3) unit normal at every triangle corner: averaged, or the face's at creases."""
+    """Return the (m, 3, 3) unit normal at every triangle corner: the mean, by angle, of the faces around it
+    that are joined to it across edges which are not creases."""
     p, q, r = vertices[faces[:, 0]], vertices[faces[:, 1]], vertices[faces[:, 2]]
-    cross = np.cross(q - p, r - p)  # twice the area long, so the sum weights by area
-    mean = np.zeros_like(vertices)
-    for corner in range(3):
-        np.add.at(mean, faces[:, corner], cross)
-    flat = _unit(cross)[:, None, :]
-    smooth = _unit(mean)[faces]
-    sharp = (flat * smooth).sum(axis=2, keepdims=True) < CREASE_COSINE
-    return np.where(sharp, flat, smooth)
+    flat = _unit(np.cross(q - p, r - p))
+    pairs = TriangleMesh(vertices, faces).edge_halfedges
+    pairs = pairs[pairs[:, 1] >= 0]
+    one, two = flat[pairs[:, 0] // 3], flat[pairs[:, 1] // 3]
+    smooth = pairs[dots(one, two) > CREASE_COSINE]
+    count, fan = corner_fans(faces, smooth[:, 0], smooth[:, 1])
+    weights = flat[:, None, :] * corner_angles(edge_lengths(vertices, faces))[:, :, None]
+    sums = [np.bincount(fan.ravel(), weights[..., k].ravel(), count) for k in range(3)]
+    return _unit(np.stack(sums, axis=1))[fan]
 
 
 def lambert(normals: FloatArray, axes: FloatArray) -> FloatArray:
@@ -39,7 +43,7 @@ def lambert(normals: FloatArray, axes: FloatArray) -> FloatArray:
     seen = _unit(normals) @ axes.T
     key = np.maximum(seen @ _unit(np.array(KEY_LIGHT)), 0.0)
     # At an outline the interpolated normal may point away from the eye though its face does not.
-    return np.asarray(0.40 + 0.46 * key + 0.12 * np.maximum(seen[:, 2], 0.0) + 0.09 * seen[:, 1])
+    return np.asarray(0.47 + 0.42 * key + 0.12 * np.maximum(seen[:, 2], 0.0) + 0.06 * seen[:, 1])
 
 
 def checkerboard(uv: FloatArray, footprint: FloatArray, cell: float) -> FloatArray:
@@ -79,15 +83,17 @@ def downsample(image: FloatArray, covered: BoolArray, factor: int) -> FloatArray
     """Return the (h, w, 4) RGBA picture from an image `factor` times as large, with soft outlines.
 
     Args:
-        image: (factor h, factor w, 3) colours.
-        covered: (factor h, factor w) which of them show the model; the others are transparent.
+        image: (factor h, factor w, 3) colours, black where it shows no model.
+        covered: (factor h, factor w) where it shows the model; elsewhere the picture is transparent.
     """
-    height, width = covered.shape[0] // factor, covered.shape[1] // factor
-    blocks = (height, factor, width, factor)
-    alpha = covered.reshape(blocks).mean(axis=(1, 3))
-    colour = np.where(covered[..., None], image, 0.0).reshape(*blocks, 3).mean(axis=(1, 3))
-    colour /= np.where(alpha > 0.0, alpha, 1.0)[..., None]
-    return np.concatenate([np.clip(colour, 0.0, 1.0), alpha[..., None]], axis=2)
+    share = np.zeros((covered.shape[0] // factor, covered.shape[1] // factor))
+    colour = np.zeros((*share.shape, 3))
+    for i in range(factor):
+        for j in range(factor):
+            share += covered[i::factor, j::factor]
+            colour += image[i::factor, j::factor]
+    colour /= np.where(share > 0.0, share, 1.0)[..., None]
+    return np.concatenate([np.clip(colour, 0.0, 1.0), share[..., None] / factor**2], axis=2)
 
 
 def _triangle_wave(x: FloatArray) -> FloatArray:
