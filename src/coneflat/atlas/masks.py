@@ -35,6 +35,13 @@ class Masks:
     first: IntArray
     widest: IntArray
 
+    @property
+    def cells(self) -> IntArray:
+        """(k,) how many cells each chart has at the first of its angles."""
+        length = self.runs[:, 2] - self.runs[:, 1] + 1
+        cells: IntArray = np.add.reduceat(length, self.first[:-1])[:: self.turns]
+        return cells
+
 
 def cover_charts(outlines: Outlines, angles: FloatArray, cell: float) -> Masks:
     """Return the cells, of the given width, of charts turned by (k, t) angles."""

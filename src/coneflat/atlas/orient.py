@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from .._arrays import FloatArray
 from ..errors import OptionError
@@ -96,13 +95,13 @@ def square_angle(points: ComplexArray) -> float:
 
 def convex_hull(points: ComplexArray) -> ComplexArray:
     """Return the corners of the convex hull, counterclockwise; the two ends if the points lie on a line."""
+    from .hull_kernel import fill_hull
+
     points = np.unique(points)
-    if len(points) < 3:
+    if len(points) == 1:
         return points
-    try:
-        return points[ConvexHull(np.column_stack([points.real, points.imag])).vertices]
-    except QhullError:
-        return points[[0, -1]]
+    hull = np.empty(len(points) + 1, dtype=np.int64)
+    return points[hull[: fill_hull(points.view(np.float64).reshape(-1, 2), hull)]]
 
 
 def _spans(hull: ComplexArray, angles: FloatArray) -> ComplexArray:

@@ -68,7 +68,8 @@ def pack_charts(
         padding: texels between charts, at least.
         margin: texels between charts and the border of the texture, at least; None for as many as `padding`.
         rotate: "any" turns charts so that they fill the texture best, "quarter" so that each lies straight, its
-            long side along u or v, "none" leaves them as they are, see `orient_charts`.
+            long side along u or v, "none" leaves them as they are, see `orient_charts`. One chart alone is turned
+            by "any" by at most an eighth of a turn.
         tiles: number of textures to distribute charts over. A chart is not cut, so the largest limits the scale.
 
     Raises:
@@ -81,10 +82,12 @@ def pack_charts(
     _check(resolution, padding, margin, rotate, tiles)
     density = np.ones(charts.count) if areas is None else _densities(charts, areas)
     outlines = charts.outlines()
-    frame = density * (1.0 if rotate == "none" else np.exp(1j * straight_angles(charts, outlines)))
+    alone = charts.count == 1
+    as_given = rotate == "none" or (alone and rotate == "any")
+    frame = density * (1.0 if as_given else np.exp(1j * straight_angles(charts, outlines)))
     outlines = outlines.times(frame)
     room = 1.0 - 2.0 * margin / resolution
-    if charts.count == 1:
+    if alone:
         packing = _alone(outlines, rotate)
     else:
         sizes = charts.sums(charts.areas) * density**2
@@ -141,8 +144,9 @@ def _turns(count: int, rotate: str) -> int:
 
 
 def _alone(outlines: Outlines, rotate: str) -> Packing:
-    """Return one chart in the middle of the smallest square around it."""
+    """Return one chart in the middle of the smallest square around it, turned no more than it must be for that."""
     angle = square_angle(outlines.points(0)) if rotate == "any" else 0.0
+    angle -= math.pi / 2 * round(angle / (math.pi / 2))
     points = outlines.points(0) * np.exp(1j * angle)
     low, high = (complex(pick(points.real), pick(points.imag)) for pick in (np.min, np.max))
     side = max((high - low).real, (high - low).imag)

@@ -14,6 +14,7 @@ CELLS_PER_WORK = 50
 @compiled
 def place_all(
     order: IntArray,
+    group: IntArray,
     turns: int,
     allowed: BoolArray,
     size: IntArray,
@@ -31,6 +32,7 @@ def place_all(
 
     Args:
         order: (k,) charts in the order in which they are placed.
+        group: (k,) charts of a group are so much alike that none is tried below where the one before was placed.
         turns: how many shapes a chart has: its cells at so many angles, those of chart 0 first.
         allowed: (j,) which shapes may be used.
         size: (j, 2) columns and rows of each shape.
@@ -49,6 +51,7 @@ def place_all(
     taken = np.full((strips, limit, width), width, dtype=np.int16)
     last = np.empty((strips, limit, width), dtype=np.int16)
     longest_gap = np.full((strips, limit), width, dtype=np.int64)
+    floor = np.zeros((strips, group.max() + 1), dtype=np.int64)
     top, work = 0, strips * limit * width // CELLS_PER_WORK
     for c in order:
         best, shape, strip, column, row = limit + 1, -1, 0, 0, 0
@@ -58,7 +61,7 @@ def place_all(
             for s in range(strips):
                 x, y, steps = _lowest(
                     taken[s], last[s], longest_gap[s], runs[first[j] : first[j + 1]], widest[j] - first[j],
-                    width - size[j, 0], best - size[j, 1],
+                    width - size[j, 0], floor[s, group[c]], best - size[j, 1],
                 )  # fmt: skip
                 work += steps
                 if y >= 0:
@@ -66,6 +69,7 @@ def place_all(
         if shape < 0:
             return limit + 1, work
         chosen[c] = shape
+        floor[strip, group[c]] = row
         place[c, 0], place[c, 1], place[c, 2] = strip, column, row
         top = max(top, best)
         work += _take(
@@ -88,13 +92,17 @@ def _lowest(
     runs: IntArray,
     widest: int,
     right: int,
+    low: int,
     above: int,
 ) -> tuple[int, int, int]:
-    """Return the column and row below `above` and up to `right` where a shape fits, row -1 if nowhere, and the work."""
+    """Return the lowest place where a shape fits, and the work.
+
+    The row is from `low` to below `above`, -1 if there is none, the column at most `right`.
+    """
     count, work = len(runs), 0
     need = runs[widest, 2] - runs[widest, 1] + 1
     probe = widest
-    for y in range(above):
+    for y in range(low, above):
         work += 1
         if longest_gap[y + runs[widest, 0]] < need:
             continue

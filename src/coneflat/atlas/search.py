@@ -21,6 +21,8 @@ COLUMNS_PER_CHART = 8.0
 TRIES = (500, 120, 30)
 WORK = 20_000_000
 FILLS = 4  # but for so many charts that placing them all once is much of that
+# Of more charts than MANY, those whose sizes differ by less than this factor count as alike, see `place_kernel`.
+MANY, ALIKE = 1000, 1.02
 # The first grid is so much wider than charts without gaps would need, and than the longest of them; no round numbers,
 # so that simple charts do not end where cells do and leave it to rounding which cell is the last.
 ROOMY = 1.2347
@@ -63,6 +65,9 @@ class _Strips:
 
     def __init__(self, masks: Masks, tiles: int) -> None:
         self.masks, self.tiles, self.work = masks, tiles, 0
+        self.group = np.arange(len(masks.size) // masks.turns)
+        if len(self.group) > MANY:
+            _, self.group = np.unique(np.log(masks.cells) // np.log(ALIKE), return_inverse=True)
 
     def fill(self, order: IntArray, allowed: BoolArray, reach: IntArray, width: int, limit: int) -> _Placed:
         """Return charts placed in strips so wide; higher than the limit if not all found a place below it."""
@@ -71,7 +76,7 @@ class _Strips:
         masks = self.masks
         chosen, place = np.empty(len(order), dtype=np.int64), np.empty((len(order), 3), dtype=np.int64)
         height, work = place_all(
-            order, masks.turns, allowed, masks.size, masks.runs, masks.first, masks.widest,
+            order, self.group, masks.turns, allowed, masks.size, masks.runs, masks.first, masks.widest,
             reach, self.tiles, width, limit, chosen, place,
         )  # fmt: skip
         self.work += work
