@@ -19,6 +19,7 @@ _HOMES = {
     "Flattening": "result",
     "PAPER": "options",
     "read_mesh": "io",
+    "read_flattening": "io",
     "MeshFile": "io",
     "sample_path": "sample",
     "cone_curve": "curve",
@@ -79,6 +80,7 @@ __all__ = [
     "least_squares_layout",
     "measure",
     "mollify",
+    "read_flattening",
     "read_mesh",
     "sample_path",
     "scaled_lengths",
@@ -99,7 +101,7 @@ if TYPE_CHECKING:
         edge_lengths,
         mollify,
     )
-    from .io import MeshFile, read_mesh
+    from .io import MeshFile, read_flattening, read_mesh
     from .layout import least_squares_layout
     from .mesh import TriangleMesh
     from .options import PAPER

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .atomic import atomic_write
 from .model import MeshFile
+from .npz import read_flattening
 from .polygons import is_polygon_side, triangulate
 from .raw import COLOURS
 from .read import INPUT_FORMATS, read_mesh
@@ -17,6 +18,7 @@ __all__ = [
     "atomic_write",
     "check_output",
     "is_polygon_side",
+    "read_flattening",
     "read_mesh",
     "triangulate",
     "write_flattening",

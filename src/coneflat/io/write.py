@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
-
-import numpy as np
+from typing import IO, TYPE_CHECKING
 
 from ..errors import UnknownFormatError
 from .atomic import atomic_write, check_target
 from .glb_write import write_glb
+from .npz import write_npz
 from .obj_write import write_obj
 from .ply_write import write_ply
 
@@ -33,25 +31,7 @@ def _write_glb(result: Flattening, stream: IO[bytes], path: Path) -> None:
 
 
 def _write_npz(result: Flattening, stream: IO[bytes], path: Path) -> None:
-    origin = result.vertex_origin
-    arrays: dict[str, Any] = {
-        "vertices": result.vertices,
-        "faces": result.faces,
-        "uv": result.uv,
-        "uv_faces": result.uv_faces,
-        "cones": result.cones,
-        "curvatures": result.curvatures,
-        "log_scale": result.log_scale,
-        "curvature_residual": result.curvature_residual,
-        "seams": result.seams,
-        "vertex_origin": np.arange(len(result.vertices)) if origin is None else origin,
-        "face_origin": np.arange(len(result.faces)) if result.face_origin is None else result.face_origin,
-        "qc": result.distortion.qc,
-        "log_area_scale": result.distortion.log_area_scale,
-        "uv_scale": np.float64(result.uv_scale),
-        "report": np.array(json.dumps(result.report())),
-    }
-    np.savez(stream, **arrays)
+    write_npz(result, stream)
 
 
 _WRITERS: dict[str, Callable[[Flattening, IO[bytes], Path], None]] = {
