@@ -15,6 +15,7 @@ from .batch import batch
 from .cones import cones
 from .demo import demo
 from .flatten import flatten
+from .view import view
 
 USER_ERROR = 2
 INTERNAL_ERROR = 1
@@ -30,6 +31,7 @@ def cli() -> None:
 cli.add_command(flatten)
 cli.add_command(batch)
 cli.add_command(cones)
+cli.add_command(view)
 cli.add_command(demo)
 
 
