@@ -78,13 +78,11 @@ function cornerNormals(model, places) {
 function cornerValues(model, show) {
   const {faces, point_vertex, chart} = model.arrays;
   const out = new Float32Array(faces.length);
-  const scale = model.head.scales[show];
   if (show === "charts") {
     const tints = model.arrays.tints.length / 3;
     for (let c = 0; c < out.length; c++) out[c] = ((chart[(c / 3) | 0] % tints) + 0.5) / tints;
-  } else if (scale) {
-    const values = placesOnScale(scale, model.arrays[show]);
-    const byFace = values.length === faces.length / 3 && (show === "qc" || show === "area");
+  } else if (model.head.scales[show]) {
+    const values = model.tones(show), byFace = show === "qc" || show === "area";
     for (let c = 0; c < out.length; c++) out[c] = values[byFace ? (c / 3) | 0 : point_vertex[faces[c]]];
   }
   return out;

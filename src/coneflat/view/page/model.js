@@ -78,6 +78,11 @@ class Model {
     return this.arrays.face_numbers ? this.arrays.face_numbers[triangle] : triangle;
   }
 
+  /** Where the values of a colour map lie on its scale: of each triangle, or of each vertex. */
+  tones(show) {
+    return placesOnScale(this.head.scales[show], this.arrays[show]);
+  }
+
   /** The triangle with the largest finite QC distortion. */
   worstTriangle() {
     const qc = this.arrays.qc;

@@ -1,7 +1,8 @@
 // Draws a model and its layout into two parts of one canvas, and tells what is at a pixel.
 
 const DARK_CELL = [0.4, 0.53, 0.7]; // What dark squares let through: blue, so that red and black dots stand out.
-const SEAM_CORE = 1, SEAM_RADIUS = 2.2, PICK_RADIUS = 5; // pixels
+const SEAM_CORE = 1, SEAM_RADIUS = 2.2; // pixels
+const PICK_RADII = [5, 1.5]; // What lies right under the pointer comes before what lies beside it.
 const MAP_CONTRAST = 0.55; // On colour maps light is evened out, or a shadow would read as a value.
 
 /** Set the size of a canvas, which costs much and clears it, where it has another. */
@@ -205,8 +206,10 @@ class Renderer {
     const side = Number(pane.inPlane);
     if (state.get("seams")) {
       const numbers = {first: model.triangleCount + 1, sides: 1 + side};
-      this.pickPrograms.line.use({...view, ...numbers, radius: PICK_RADIUS, lift: 3});
-      this.lines[side].shape.drawEach(model.seamCount * (1 + side));
+      for (const radius of PICK_RADII) {
+        this.pickPrograms.line.use({...view, ...numbers, radius, lift: 3});
+        this.lines[side].shape.drawEach(model.seamCount * (1 + side));
+      }
     }
     if (state.get("cones")) {
       this.pickPrograms.dot.use({...view, pixel: 1, first: model.triangleCount + model.seamCount + 1});
