@@ -96,6 +96,49 @@ class Flattening:
 
         return write_flattening(self, path, texture)
 
+    def view(
+        self,
+        path: str | PathLike[str] | None = None,
+        *,
+        texture: str | PathLike[str] | None = None,
+        up: str = "y",
+        show: str | None = None,
+        most_triangles: int | None = None,
+    ) -> Path:
+        """Write an interactive page, one HTML file that loads nothing from anywhere, and return its path.
+
+        It shows the model and its layout side by side, linked, with a checkerboard, a picture or quality in
+        colours, seams and cones.
+
+        Args:
+            path: the page, .html; by default a new temporary file, which is opened in the browser.
+            texture: a PNG, JPEG, GIF or WebP file to lay on the model.
+            up: the model's upward axis in the first view, "x", "y" or "z".
+            show: what the colours show first: "checker", "picture", "charts", "qc", "area", "curvature" (of the
+                model), "flat" (the curvature left) or "plain".
+            most_triangles: a mesh with more is thinned for display; by default half a million.
+
+        Raises:
+            OptionError: `up` or `show` is none of these.
+            ArrayShapeError, MeshError: there are no UVs, or the mesh cannot be thinned to so few triangles.
+            UnknownFormatError, MeshFileError: a file cannot be read or written.
+        """
+        from .view.webpage import MOST_TRIANGLES, check_page, open_page, page_of, write_page
+
+        if path is not None:
+            check_page(path)
+        most = MOST_TRIANGLES if most_triangles is None else most_triangles
+        page = write_page(page_of(self, texture=texture, up=up, show=show, most_triangles=most), path)
+        if path is None:
+            open_page(page)
+        return page
+
+    def _repr_html_(self) -> str:
+        """Return the page in a frame, which notebooks show."""
+        from .view.webpage import notebook_html
+
+        return notebook_html(self)
+
     def __repr__(self) -> str:
         return (
             f"<Flattening: {len(self.faces)} triangles, {len(self.cones)} cones, "

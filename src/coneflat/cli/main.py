@@ -16,6 +16,7 @@ from .cones import cones
 from .demo import demo
 from .figure import figure
 from .flatten import flatten
+from .view import view
 
 USER_ERROR = 2
 INTERNAL_ERROR = 1
@@ -32,6 +33,7 @@ cli.add_command(flatten)
 cli.add_command(batch)
 cli.add_command(cones)
 cli.add_command(figure)
+cli.add_command(view)
 cli.add_command(demo)
 
 

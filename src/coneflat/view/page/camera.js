@@ -1,0 +1,140 @@
+// Where one looks from: an orthographic view, as three rows to the right, up and towards the eye.
+
+const MARGIN = 0.94; // of the pane that the model fills when it fits
+const MOST_ZOOM = 5000;
+const LEAST_ZOOM = 0.05;
+
+/** Return turn * point. */
+function turned(turn, p) {
+  return [0, 3, 6].map((row) => turn[row] * p[0] + turn[row + 1] * p[1] + turn[row + 2] * p[2]);
+}
+
+function product(one, two) {
+  const out = new Array(9).fill(0);
+  for (let i = 0; i < 9; i++) for (let k = 0; k < 3; k++) out[i] += one[i - (i % 3) + k] * two[3 * k + (i % 3)];
+  return out;
+}
+
+/** Return the rotation by an angle about a unit axis. */
+function rotation(axis, angle) {
+  const [x, y, z] = axis, c = Math.cos(angle), s = Math.sin(angle), t = 1 - c;
+  return [
+    t * x * x + c, t * x * y - s * z, t * x * z + s * y,
+    t * x * y + s * z, t * y * y + c, t * y * z - s * x,
+    t * x * z - s * y, t * y * z + s * x, t * z * z + c,
+  ];
+}
+
+/** Return the rows of a rotation made perpendicular and of length 1 again, after rounding. */
+function straightened(turn) {
+  const unit = (v) => v.map((x) => x / Math.hypot(...v));
+  const a = unit(turn.slice(0, 3));
+  const b0 = turn.slice(3, 6), along = a[0] * b0[0] + a[1] * b0[1] + a[2] * b0[2];
+  const b = unit(b0.map((x, i) => x - along * a[i]));
+  return [...a, ...b, a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+}
+
+class Camera {
+  /** points: numbers, three each, that a fitting view shows; turns: whether one may look from elsewhere. */
+  constructor(points, turn, turns) {
+    this.turns = turns;
+    this.home = turn;
+    this.changed = () => {};
+    this.version = 0;
+    this.width = this.height = 1;
+    this.measure(points);
+    this.fit();
+  }
+
+  /** Note the extents of the points as seen from home. */
+  measure(points) {
+    const low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+    for (let i = 0; i < points.length; i += 3) {
+      for (let k = 0; k < 2; k++) {
+        const row = 3 * k;
+        const x = this.home[row] * points[i] + this.home[row + 1] * points[i + 1] + this.home[row + 2] * points[i + 2];
+        if (x < low[k]) low[k] = x;
+        if (x > high[k]) high[k] = x;
+      }
+    }
+    this.extent = [Math.max(high[0] - low[0], 1e-6), Math.max(high[1] - low[1], 1e-6)];
+    this.middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
+  }
+
+  fit() {
+    this.turn = [...this.home];
+    this.pan = [...this.middle];
+    this.zoom = 1;
+    this.note();
+  }
+
+  note() {
+    this.version++;
+    this.changed();
+  }
+
+  resize(width, height) {
+    if (width === this.width && height === this.height) return;
+    [this.width, this.height] = [width, height];
+    this.note();
+  }
+
+  /** Pixels per unit. */
+  get scale() {
+    return Math.min((MARGIN * this.width) / this.extent[0], (MARGIN * this.height) / this.extent[1]) * this.zoom;
+  }
+
+  /** Return the pixel (from the pane's upper left corner) and the nearness of a point. */
+  project(p) {
+    const [x, y, z] = turned(this.turn, p);
+    return [this.width / 2 + (x - this.pan[0]) * this.scale, this.height / 2 - (y - this.pan[1]) * this.scale, z];
+  }
+
+  /** Turn about the screen's axes: right, down, and round, in radians. */
+  rotate(right, down, round = 0) {
+    if (!this.turns) return;
+    let turn = product(rotation([1, 0, 0], down), product(rotation([0, 1, 0], right), this.turn));
+    if (round) turn = product(rotation([0, 0, 1], round), turn);
+    this.turn = straightened(turn);
+    this.note();
+  }
+
+  /** Move what is seen by pixels to the right and down. */
+  move(right, down) {
+    this.pan = [this.pan[0] - right / this.scale, this.pan[1] + down / this.scale];
+    this.note();
+  }
+
+  /** Zoom, keeping what is at a pixel there. */
+  zoomAt(factor, x, y) {
+    const zoom = Math.min(Math.max(this.zoom * factor, LEAST_ZOOM), MOST_ZOOM);
+    const gain = 1 / this.scale - this.zoom / (this.scale * zoom);
+    this.pan = [this.pan[0] + (x - this.width / 2) * gain, this.pan[1] - (y - this.height / 2) * gain];
+    this.zoom = zoom;
+    this.note();
+  }
+}
+
+/** Move a camera, step by step, to another turn and pan. */
+function glide(camera, turn, pan) {
+  const from = {turn: camera.turn, pan: camera.pan};
+  const relative = product(turn, [0, 3, 6, 1, 4, 7, 2, 5, 8].map((i) => from.turn[i]));
+  const cosine = Math.min(Math.max((relative[0] + relative[4] + relative[8] - 1) / 2, -1), 1);
+  const angle = Math.acos(cosine);
+  const raw = [relative[7] - relative[5], relative[2] - relative[6], relative[3] - relative[1]];
+  const length = Math.hypot(...raw);
+  const axis = length > 1e-9 ? raw.map((x) => x / length) : [0, 1, 0];
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const start = performance.now(), last = still ? 1 : 350;
+  const version = {now: camera.version};
+  const step = () => {
+    if (camera.version !== version.now) return; // The user has taken over.
+    const part = Math.min((performance.now() - start) / last, 1), eased = part * part * (3 - 2 * part);
+    camera.turn = part < 1 ? straightened(product(rotation(axis, angle * eased), from.turn)) : turn;
+    camera.pan = [0, 1].map((k) => from.pan[k] + eased * (pan[k] - from.pan[k]));
+    camera.note();
+    version.now = camera.version;
+    if (part < 1) requestAnimationFrame(step);
+  };
+  step();
+}

@@ -1,0 +1,115 @@
+// Arrays with an entry for each corner of each triangle, as the graphics card takes them.
+
+const CREASE_COSINE = 0.77; // About 40 degrees: where faces bend by more, the edge between them is sharp.
+
+function cornerPlaces(model) {
+  const {places, point_vertex, faces} = model.arrays;
+  const out = new Float32Array(3 * faces.length);
+  for (let c = 0; c < faces.length; c++) {
+    const v = 3 * point_vertex[faces[c]];
+    out[3 * c] = places[v];
+    out[3 * c + 1] = places[v + 1];
+    out[3 * c + 2] = places[v + 2];
+  }
+  return out;
+}
+
+function cornerUVs(model) {
+  const {uv, faces} = model.arrays;
+  const out = new Float32Array(2 * faces.length);
+  for (let c = 0; c < faces.length; c++) {
+    out[2 * c] = uv[2 * faces[c]];
+    out[2 * c + 1] = uv[2 * faces[c] + 1];
+  }
+  return out;
+}
+
+/** Return (m, 3) face normals as long as twice the areas. */
+function faceNormals(places) {
+  const out = new Float32Array(places.length / 3);
+  for (let p = 0, f = 0; p < places.length; p += 9, f += 3) {
+    const ax = places[p + 3] - places[p], ay = places[p + 4] - places[p + 1], az = places[p + 5] - places[p + 2];
+    const bx = places[p + 6] - places[p], by = places[p + 7] - places[p + 1], bz = places[p + 8] - places[p + 2];
+    out[f] = ay * bz - az * by;
+    out[f + 1] = az * bx - ax * bz;
+    out[f + 2] = ax * by - ay * bx;
+  }
+  return out;
+}
+
+/** Return the corners at each vertex: those of vertex v are list[start[v]] up to list[start[v + 1] - 1]. */
+function cornersAtVertices(model) {
+  const {point_vertex, faces, places} = model.arrays;
+  const start = new Uint32Array(places.length / 3 + 1);
+  for (let c = 0; c < faces.length; c++) start[point_vertex[faces[c]] + 1]++;
+  for (let v = 1; v < start.length; v++) start[v] += start[v - 1];
+  const next = start.slice(), list = new Uint32Array(faces.length);
+  for (let c = 0; c < faces.length; c++) list[next[point_vertex[faces[c]]]++] = c;
+  return {start, list};
+}
+
+/** Return packed unit normals (10 bits a coordinate): the mean of the faces around that bend off by no crease. */
+function cornerNormals(model, places) {
+  const {point_vertex, faces} = model.arrays;
+  const normals = faceNormals(places);
+  const {start, list} = cornersAtVertices(model);
+  const lengths = new Float32Array(faces.length / 3);
+  for (let f = 0; f < lengths.length; f++) lengths[f] = Math.hypot(normals[3 * f], normals[3 * f + 1], normals[3 * f + 2]);
+  const out = new Uint32Array(faces.length);
+  for (let c = 0; c < faces.length; c++) {
+    const own = (c / 3) | 0, v = point_vertex[faces[c]];
+    const x = normals[3 * own], y = normals[3 * own + 1], z = normals[3 * own + 2];
+    let sx = 0, sy = 0, sz = 0;
+    for (let k = start[v]; k < start[v + 1]; k++) {
+      const f = (list[k] / 3) | 0;
+      const a = normals[3 * f], b = normals[3 * f + 1], d = normals[3 * f + 2];
+      if (x * a + y * b + z * d < CREASE_COSINE * lengths[own] * lengths[f]) continue;
+      sx += a;
+      sy += b;
+      sz += d;
+    }
+    const unit = 511 / (Math.sqrt(sx * sx + sy * sy + sz * sz) || 1);
+    out[c] = (Math.round(sx * unit) & 1023) | ((Math.round(sy * unit) & 1023) << 10) | ((Math.round(sz * unit) & 1023) << 20);
+  }
+  return out;
+}
+
+/** Return the place on the table of colours of each corner, for what is shown. */
+function cornerValues(model, show) {
+  const {faces, point_vertex, chart} = model.arrays;
+  const out = new Float32Array(faces.length);
+  if (show === "charts") {
+    const tints = model.arrays.tints.length / 3;
+    for (let c = 0; c < out.length; c++) out[c] = ((chart[(c / 3) | 0] % tints) + 0.5) / tints;
+  } else if (model.head.scales[show]) {
+    const values = model.tones(show), byFace = show === "qc" || show === "area";
+    for (let c = 0; c < out.length; c++) out[c] = values[byFace ? (c / 3) | 0 : point_vertex[faces[c]]];
+  }
+  return out;
+}
+
+/** Return both ends of lines, six numbers each: seam edges, then boundary edges; in the layout a seam has two. */
+function outlineSegments(model, inPlane) {
+  const seams = model.seamCount, all = model.arrays.outline.length;
+  const chosen = [];
+  for (let i = 0; i < all; i++) if (inPlane || i >= 2 * seams || i % 2 === 0) chosen.push(i);
+  const out = new Float32Array(6 * chosen.length);
+  chosen.forEach((i, row) => {
+    model.outlineCorners(i).forEach((corner, end) => {
+      const point = model.arrays.faces[corner];
+      out.set(inPlane ? model.flatPlace(point) : model.place(model.arrays.point_vertex[point]), 6 * row + 3 * end);
+    });
+  });
+  return out;
+}
+
+/** Return for each dot: where it is (3), its radius in pixels, the sign of its curvature, and which cone it is. */
+function coneDots(model, inPlane) {
+  const rows = [];
+  for (let index = 0; index < model.coneCount; index++) {
+    const curvature = model.head.cone_curvatures[index];
+    const radius = Math.min(Math.max(6.5 * Math.sqrt(Math.abs(curvature) / (Math.PI / 2)), 3.5), 10) * (inPlane ? 0.75 : 1);
+    for (const [at] of model.shapeOf({kind: "cone", index}, inPlane)) rows.push(...at, radius, Math.sign(curvature), index);
+  }
+  return new Float32Array(rows);
+}

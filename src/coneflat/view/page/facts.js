@@ -1,0 +1,73 @@
+// What is known of a triangle, a seam edge or a cone, in words.
+
+const SIGNS = ["−", "", "+"];
+
+/** Return a number with its sign, in few digits: "+0.500", "−1.2e-4". */
+function signed(value, digits = 3) {
+  const amount = Math.abs(value);
+  const text = amount !== 0 && (amount < 1e-3 || amount >= 1e4) ? amount.toExponential(1) : amount.toFixed(digits);
+  return SIGNS[Math.sign(value) + 1] + text;
+}
+
+function grouped(number) {
+  return number.toLocaleString("en-US");
+}
+
+function measured(value, prefix = "", digits = 4) {
+  if (!Number.isFinite(value)) return "undefined";
+  return prefix + (value >= 1e4 ? value.toExponential(2) : value.toFixed(digits));
+}
+
+/** Return phrases about a thing, the first its name. */
+function factsOf(model, thing, show) {
+  if (thing.kind === "triangle") return triangleFacts(model, thing.index, show);
+  return thing.kind === "seam" ? seamFacts(model, thing.index) : coneFacts(model, thing.index);
+}
+
+function triangleFacts(model, index, show) {
+  const {qc, area, chart, faces, point_vertex} = model.arrays;
+  const vertices = [0, 1, 2].map((k) => point_vertex[faces[3 * index + k]]);
+  const facts = [`Triangle ${grouped(model.triangleNumber(index))}`];
+  if (show === "curvature" || show === "flat") {
+    const values = model.arrays[show];
+    facts.push(`curvature at its corners ${vertices.map((v) => `${signed(values[v])} π`).join(", ")}`);
+  } else {
+    facts.push(`QC ${measured(qc[index])}`, `scale ${measured(area[index], "×", 3)}`);
+  }
+  facts.push(`chart ${chart[index] + 1}`, `vertices ${vertices.map((v) => grouped(model.vertexNumber(v))).join(", ")}`);
+  return facts;
+}
+
+function seamFacts(model, index) {
+  const lengths = model.shapeOf({kind: "seam", index}, true).map(([p, q]) => Math.hypot(p[0] - q[0], p[1] - q[1]));
+  const ends = model.outlineCorners(2 * index).map((corner) => grouped(model.vertexNumber(model.vertexAt(corner))));
+  const off = Math.abs(lengths[0] - lengths[1]) / Math.max((lengths[0] + lengths[1]) / 2, 1e-30);
+  const charts = [0, 1].map((side) => model.arrays.chart[Math.floor(model.arrays.outline[2 * index + side] / 3)] + 1);
+  const between = charts[0] === charts[1] ? `within chart ${charts[0]}` : `between charts ${charts[0]} and ${charts[1]}`;
+  // The page has single precision, seven digits.
+  const equal = off < 1e-4 ? "both sides equally long" : `sides ${(100 * off).toPrecision(2)}% apart in length`;
+  return [`Seam edge ${ends.join("–")}`, between, equal];
+}
+
+function coneFacts(model, index) {
+  const curvature = model.head.cone_curvatures[index] / Math.PI;
+  const points = model.conePoints[index].length;
+  return [
+    `Cone at vertex ${grouped(model.vertexNumber(model.arrays.cones[index]))}`,
+    `curvature ${signed(curvature)} π`,
+    `cone angle ${(2 - curvature).toFixed(3)} π`,
+    points === 1 ? "one point of the layout" : `${points} points of the layout`,
+  ];
+}
+
+/** Return where a triangle lies on the scale of what is shown, 0 to 1, or null. */
+function placeOfThing(model, thing, show) {
+  const scale = model.head.scales[show];
+  if (!scale || !thing || thing.kind !== "triangle") return null;
+  const values = model.arrays[show];
+  const perFace = show === "qc" || show === "area";
+  const corners = [0, 1, 2].map((k) => model.vertexAt(3 * thing.index + k));
+  const chosen = perFace ? [values[thing.index]] : corners.map((v) => values[v]);
+  const places = placesOnScale(scale, chosen);
+  return places[0] < 0 ? null : places.reduce((sum, place) => sum + place, 0) / places.length;
+}

@@ -1,0 +1,229 @@
+// The page at work: a model, two views of it, and what links them.
+
+/** A side of the page. */
+class Pane {
+  constructor(name, camera, inPlane, changed) {
+    this.name = name;
+    this.element = document.getElementById(name);
+    this.camera = camera;
+    this.inPlane = inPlane;
+    this.changed = changed;
+    camera.changed = () => this.spoil();
+  }
+
+  /** It must be drawn again. */
+  spoil() {
+    this.stale = true;
+    this.changed();
+  }
+
+  /** Note where it lies on the stage. */
+  place(stage) {
+    const box = this.element.getBoundingClientRect();
+    [this.left, this.top, this.width, this.height] = [box.left - stage.left, box.top - stage.top, box.width, box.height];
+    this.camera.resize(Math.max(this.width, 1), Math.max(this.height, 1));
+    this.spoil();
+  }
+
+  sees([x, y]) {
+    return x > 0 && y > 0 && x < this.width && y < this.height;
+  }
+}
+
+class Viewer {
+  constructor(model) {
+    this.model = model;
+    this.state = new State({
+      show: model.head.show, squares: 36, seams: true, cones: true, edges: false, report: false,
+      dark: matchMedia("(prefers-color-scheme: dark)").matches, hovered: null, picked: null,
+    });
+    this.panes = [
+      new Pane("model", new Camera(model.arrays.places, model.head.turn.flat(), true), false, () => this.schedule()),
+      new Pane("layout", new Camera(this.flatPlaces(), [1, 0, 0, 0, 1, 0, 0, 0, 1], false), true, () => this.schedule()),
+    ];
+    this.used = this.panes[0];
+    this.renderer = new Renderer(document.getElementById("scene"), model);
+    this.renderer.setPicture(numberedBoard());
+    this.marks = new Marks(document.getElementById("marks"), model, this.renderer);
+    this.controls = new Controls(this);
+    this.panes.forEach((pane) => new Gestures(pane, this));
+    this.state.listen((names) => this.note(names));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", (event) => this.state.set({dark: event.matches}));
+    this.renderer.canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+    this.renderer.canvas.addEventListener("webglcontextrestored", () => {
+      this.renderer.prepare();
+      this.redraw();
+    });
+    this.readColours();
+    const watcher = new ResizeObserver(() => this.resize());
+    for (const element of [document.getElementById("stage"), ...this.panes.map((pane) => pane.element)]) watcher.observe(element);
+    this.resize();
+    this.drawStale();
+  }
+
+  flatPlaces() {
+    const points = this.model.arrays.uv.length / 2;
+    const out = new Float32Array(3 * points);
+    for (let i = 0; i < points; i++) out.set(this.model.flatPlace(i), 3 * i);
+    return out;
+  }
+
+  /** Some of the state has changed. */
+  note(names) {
+    if (names.has("dark")) this.readColours();
+    if (names.has("hovered") || names.has("picked")) {
+      this.marksStale = true;
+      this.schedule();
+    }
+    if (["show", "squares", "seams", "cones", "edges", "dark"].some((name) => names.has(name))) this.redraw();
+  }
+
+  redraw() {
+    this.panes.forEach((pane) => pane.spoil());
+  }
+
+  /** Draw what is stale with the next frame. */
+  schedule() {
+    if (this.scheduled) return;
+    this.scheduled = true;
+    requestAnimationFrame(() => {
+      this.scheduled = false;
+      this.drawStale();
+    });
+  }
+
+  readColours() {
+    const style = getComputedStyle(document.documentElement);
+    const colour = (name) => style.getPropertyValue(`--${name}`).trim();
+    const names = ["ground", "pane", "paint", "undefined", "seam", "halo"];
+    this.renderer.setColours(Object.fromEntries(names.map((name) => [name, rgb(expanded(colour(name)))])));
+    this.accent = colour("accent");
+  }
+
+  resize() {
+    const stage = document.getElementById("stage").getBoundingClientRect();
+    const pixel = Math.min(devicePixelRatio || 1, 2);
+    this.renderer.resize(stage.width, stage.height, pixel);
+    this.marks.resize(stage.width, stage.height, pixel);
+    this.panes.forEach((pane) => pane.place(stage));
+  }
+
+  drawStale() {
+    const stale = this.panes.filter((pane) => pane.stale);
+    if (stale.length === this.panes.length) this.renderer.clear();
+    for (const pane of stale) {
+      this.renderer.draw(pane, this.state);
+      pane.stale = false;
+    }
+    if (stale.length || this.marksStale) {
+      this.marks.draw(this.panes, this.state, {accent: this.accent});
+      this.marksStale = false;
+    }
+  }
+
+  // What the gestures tell.
+
+  use(pane) {
+    this.used = pane;
+  }
+
+  hover(pane, x, y) {
+    const thing = this.renderer.pick(pane, x, y, this.state);
+    if (!sameThing(thing, this.state.get("hovered"))) this.state.set({hovered: thing});
+  }
+
+  leave() {
+    this.state.set({hovered: null});
+  }
+
+  pick(pane, x, y) {
+    this.find(this.renderer.pick(pane, x, y, this.state), pane);
+  }
+
+  pickMiddle() {
+    this.pick(this.used, this.used.width / 2, this.used.height / 2);
+  }
+
+  /** Pick a thing, and bring it into sight in every view but the one where the user just saw it. */
+  find(thing, except = null) {
+    this.state.set({picked: thing});
+    if (thing) this.panes.filter((pane) => pane !== except).forEach((pane) => this.bringIntoSight(pane, thing));
+  }
+
+  bringIntoSight(pane, thing) {
+    const middles = this.model.shapeOf(thing, pane.inPlane).map(middleOf);
+    const within = middles.some((middle) => pane.sees(pane.camera.project(middle)));
+    if (within && this.marks.isSeen(pane, thing, this.state)) return;
+    const turn = pane.inPlane ? pane.camera.turn : this.turnTowards(thing, pane.camera.turn);
+    const place = turned(turn, middles[0]), {pan, scale} = pane.camera;
+    const off = [0, 1].map((k) => Math.abs(place[k] - pan[k]) * scale);
+    const near = off[0] < 0.4 * pane.width && off[1] < 0.4 * pane.height;
+    glide(pane.camera, turn, near ? pan : place.slice(0, 2));
+  }
+
+  /** Return the least turned view in which a thing's triangle faces the user. */
+  turnTowards(thing, turn) {
+    const [p, q, r] = this.model.shapeOf({kind: "triangle", index: this.triangleAt(thing)}, false)[0];
+    const [a, b] = [q, r].map((end) => end.map((x, k) => x - p[k]));
+    const out = this.model.head.outward;
+    const normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]].map((x) => out * x);
+    const length = Math.hypot(...normal) || 1;
+    const [x, y, z] = turned(turn, normal).map((value) => value / length);
+    const side = Math.hypot(x, y);
+    const axis = side > 1e-9 ? [y / side, -x / side, 0] : [0, 1, 0];
+    return straightened(product(rotation(axis, Math.atan2(side, z)), turn));
+  }
+
+  /** A triangle that a thing lies on. */
+  triangleAt(thing) {
+    if (thing.kind === "triangle") return thing.index;
+    const {outline, faces, point_vertex, cones} = this.model.arrays;
+    if (thing.kind === "seam") return Math.floor(outline[2 * thing.index] / 3);
+    return Math.floor(faces.findIndex((point) => point_vertex[point] === cones[thing.index]) / 3);
+  }
+
+  async takePicture(blob) {
+    try {
+      this.renderer.setPicture(await pictureOf(blob, this.renderer.gl.getParameter(this.renderer.gl.MAX_TEXTURE_SIZE)));
+      this.state.set({show: "picture"});
+      this.redraw();
+    } catch (error) {
+      trouble(error.message);
+    }
+  }
+}
+
+/** Return a colour #rgb as #rrggbb. */
+function expanded(colour) {
+  return colour.length === 4 ? colour.replace(/[0-9a-f]/gi, "$&$&") : colour;
+}
+
+function trouble(message) {
+  const place = document.getElementById("trouble");
+  place.hidden = !message;
+  place.textContent = message ? message[0].toUpperCase() + message.slice(1) + "." : "";
+}
+
+/** Start with the data that the page itself carries. */
+async function startFromPage() {
+  try {
+    if (typeof DecompressionStream === "undefined") throw new Error("this browser is too old for the page");
+    const head = JSON.parse(document.getElementById("head").textContent);
+    const arrays = document.getElementById("arrays");
+    const model = await unpackModel(head, arrays.textContent.trim());
+    arrays.remove();
+    const viewer = new Viewer(model);
+    if (head.picture) {
+      const show = head.show;
+      await viewer.takePicture(new Blob([model.arrays.picture], {type: head.picture.type}));
+      viewer.state.set({show});
+    }
+    window.coneflat = viewer;
+    document.documentElement.dataset.ready = String(Math.round(performance.now()));
+  } catch (error) {
+    trouble(error.message);
+    throw error;
+  }
+}
+
+startFromPage();

@@ -1,0 +1,77 @@
+// What is pointed at and what is picked, drawn over both views; dashed where it is hidden.
+
+const RING = 11; // pixels
+const SMALL = 14; // pixels: what is smaller gets a ring around it, to be found
+
+class Marks {
+  constructor(canvas, model, renderer) {
+    this.canvas = canvas;
+    this.model = model;
+    this.renderer = renderer;
+  }
+
+  resize(width, height, pixel) {
+    this.pixel = pixel;
+    sizeCanvas(this.canvas, width * pixel, height * pixel);
+  }
+
+  draw(panes, state, colours) {
+    const pen = this.canvas.getContext("2d");
+    pen.setTransform(this.pixel, 0, 0, this.pixel, 0, 0);
+    pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    const [picked, hovered] = [state.get("picked"), state.get("hovered")];
+    for (const pane of panes) {
+      pen.save();
+      pen.beginPath();
+      pen.rect(pane.left, pane.top, pane.width, pane.height);
+      pen.clip();
+      pen.translate(pane.left, pane.top);
+      if (picked) this.drawThing(pen, pane, state, picked, colours.accent, true);
+      if (hovered && !sameThing(hovered, picked)) this.drawThing(pen, pane, state, hovered, colours.accent, false);
+      pen.restore();
+    }
+  }
+
+  drawThing(pen, pane, state, thing, ink, strong) {
+    const seen = this.isSeen(pane, thing, state);
+    for (const ends of this.model.shapeOf(thing, pane.inPlane)) {
+      const places = ends.map((end) => pane.camera.project(end));
+      const span = Math.max(...places.map(([x, y]) => Math.hypot(x - places[0][0], y - places[0][1])));
+      const path = new Path2D();
+      places.forEach(([x, y], i) => (i ? path.lineTo(x, y) : path.moveTo(x, y)));
+      if (thing.kind === "triangle") path.closePath();
+      if (span < SMALL) {
+        const [x, y] = middleOf(places);
+        path.moveTo(x + RING, y);
+        path.arc(x, y, RING, 0, 2 * Math.PI);
+      }
+      pen.lineJoin = pen.lineCap = "round";
+      pen.setLineDash(seen ? [] : [4, 5]);
+      if (thing.kind === "triangle" && seen && span >= SMALL) {
+        pen.fillStyle = ink + (strong ? "55" : "33");
+        pen.fill(path);
+      }
+      for (const [style, width] of [["#ffffff", strong ? 6 : 4.5], [ink, strong ? 3.2 : 2]]) {
+        pen.strokeStyle = style;
+        pen.lineWidth = width;
+        pen.stroke(path);
+      }
+    }
+  }
+
+  /** Whether nothing lies in front of a thing; in the plane nothing does. */
+  isSeen(pane, thing, state) {
+    if (pane.inPlane) return true;
+    const places = this.model.shapeOf(thing, false)[0].map((end) => pane.camera.project(end));
+    const [x, y, near] = middleOf(places);
+    const front = this.renderer.pick(pane, x, y, state);
+    if (!front) return false;
+    if (sameThing(front, thing)) return true;
+    const other = middleOf(this.model.shapeOf(front, false)[0].map((end) => pane.camera.project(end)));
+    return other[2] < near + 0.03; // model radii
+  }
+}
+
+function middleOf(places) {
+  return [0, 1, 2].map((k) => places.reduce((sum, place) => sum + place[k], 0) / places.length);
+}

@@ -1,0 +1,122 @@
+// A flattened mesh: its arrays, and what can be asked of them. Points of the layout lie about the origin, too.
+
+const ARRAY_TYPES = {f4: Float32Array, u4: Uint32Array, i4: Int32Array, u2: Uint16Array, u1: Uint8Array};
+
+/** Return the model that a page carries: `head` is an object, `text` the base64 of its compressed arrays. */
+async function unpackModel(head, text) {
+  const packed = Uint8Array.fromBase64 ? Uint8Array.fromBase64(text) : bytesOfBase64(text);
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const block = await new Response(stream).arrayBuffer();
+  const arrays = {};
+  for (const {name, type, offset, count} of head.arrays) {
+    arrays[name] = new ARRAY_TYPES[type](block, offset, count);
+  }
+  return new Model(head, arrays);
+}
+
+function bytesOfBase64(text) {
+  const letters = atob(text);
+  const bytes = new Uint8Array(letters.length);
+  for (let i = 0; i < letters.length; i++) bytes[i] = letters.charCodeAt(i);
+  return bytes;
+}
+
+class Model {
+  constructor(head, arrays) {
+    this.head = head;
+    this.arrays = arrays;
+    this.triangleCount = arrays.faces.length / 3;
+    this.seamCount = head.seams;
+    this.coneCount = arrays.cones.length;
+    const [low, high] = [head.uv_low, head.uv_high];
+    this.uvCentre = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
+    this.uvUnit = 2 / (Math.max(high[0] - low[0], high[1] - low[1]) || 1);
+    this.conePoints = this.findConePoints();
+  }
+
+  /** The vertex of a corner, 3 * triangle + 0, 1, 2. */
+  vertexAt(corner) {
+    return this.arrays.point_vertex[this.arrays.faces[corner]];
+  }
+
+  place(vertex) {
+    const places = this.arrays.places;
+    return [places[3 * vertex], places[3 * vertex + 1], places[3 * vertex + 2]];
+  }
+
+  /** Where a point of the layout is drawn: in a plane, about the origin. */
+  flatPlace(point) {
+    const uv = this.arrays.uv;
+    return [(uv[2 * point] - this.uvCentre[0]) * this.uvUnit, (uv[2 * point + 1] - this.uvCentre[1]) * this.uvUnit, 0];
+  }
+
+  /** The corners that the i-th half-edge on the outlines of charts runs from and to. */
+  outlineCorners(i) {
+    const halfedge = this.arrays.outline[i];
+    const base = halfedge - (halfedge % 3);
+    return [base + ((halfedge + 1 - base) % 3), base + ((halfedge + 2 - base) % 3)];
+  }
+
+  /** The points in space, or of the layout, that a thing consists of: a list of lists of ends. */
+  shapeOf(thing, inPlane) {
+    const at = (corner) => (inPlane ? this.flatPlace(this.arrays.faces[corner]) : this.place(this.vertexAt(corner)));
+    if (thing.kind === "triangle") return [[0, 1, 2].map((k) => at(3 * thing.index + k))];
+    if (thing.kind === "seam") {
+      const sides = inPlane ? [2 * thing.index, 2 * thing.index + 1] : [2 * thing.index];
+      return sides.map((side) => this.outlineCorners(side).map(at));
+    }
+    if (!inPlane) return [[this.place(this.arrays.cones[thing.index])]];
+    return this.conePoints[thing.index].map((point) => [this.flatPlace(point)]);
+  }
+
+  /** The number of a vertex, or of a triangle, in the user's mesh. */
+  vertexNumber(vertex) {
+    return this.arrays.vertex_numbers ? this.arrays.vertex_numbers[vertex] : vertex;
+  }
+
+  triangleNumber(triangle) {
+    return this.arrays.face_numbers ? this.arrays.face_numbers[triangle] : triangle;
+  }
+
+  /** Where the values of a colour map lie on its scale: of each triangle, or of each vertex. */
+  tones(show) {
+    return placesOnScale(this.head.scales[show], this.arrays[show]);
+  }
+
+  /** The triangle with the largest finite QC distortion. */
+  worstTriangle() {
+    const qc = this.arrays.qc;
+    let worst = 0;
+    for (let i = 1; i < qc.length; i++) if (qc[i] > qc[worst] || !(qc[worst] >= 0)) worst = i;
+    return worst;
+  }
+
+  findConePoints() {
+    const cone = new Map(Array.from(this.arrays.cones, (vertex, index) => [vertex, index]));
+    const found = Array.from(this.arrays.cones, () => []);
+    if (!cone.size) return found;
+    const vertices = this.arrays.point_vertex;
+    for (let point = 0; point < vertices.length; point++) {
+      const index = cone.get(vertices[point]);
+      if (index !== undefined) found[index].push(point);
+    }
+    return found;
+  }
+}
+
+/** Where values lie on a scale, 0 to 1, and -1 where they are undefined. */
+function placesOnScale(scale, values) {
+  const {kind, low, high} = scale;
+  const range = Math.log(high / low);
+  const place = new Float32Array(values.length);
+  for (let i = 0; i < values.length; i++) {
+    const value = values[i];
+    let at = (value - low) / (high - low);
+    if (kind === "log") at = Math.log(Math.max(value, 1e-300) / low) / range;
+    if (kind === "signed log") {
+      at = 0.5 + (0.5 * Math.sign(value) * Math.log(Math.max(Math.abs(value), low) / low)) / range;
+    }
+    place[i] = Number.isNaN(value) ? -1 : Math.min(Math.max(at, 0), 1);
+  }
+  return place;
+}

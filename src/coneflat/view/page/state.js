@@ -1,0 +1,46 @@
+// What the page shows, apart from how it is drawn and from where its data comes.
+
+// What can be shown: [key, name, the scale of its colours if it has one].
+const SHOWS = [
+  ["checker", "Checkerboard"],
+  ["picture", "Picture"],
+  ["charts", "Charts"],
+  ["qc", "QC distortion"],
+  ["area", "Area scale"],
+  ["curvature", "Curvature before"],
+  ["flat", "Curvature after"],
+  ["plain", "Plain"],
+];
+
+/** Named values; listeners hear which of them changed. */
+class State {
+  constructor(values) {
+    this.values = {...values};
+    this.listeners = [];
+  }
+
+  get(name) {
+    return this.values[name];
+  }
+
+  set(changes) {
+    const changed = Object.keys(changes).filter((name) => !Object.is(this.values[name], changes[name]));
+    if (!changed.length) return;
+    Object.assign(this.values, changes);
+    const names = new Set(changed);
+    for (const listener of this.listeners) listener(names);
+  }
+
+  toggle(name) {
+    this.set({[name]: !this.values[name]});
+  }
+
+  listen(listener) {
+    this.listeners.push(listener);
+  }
+}
+
+/** Whether two picked things, {kind, index} or null, are the same. */
+function sameThing(one, other) {
+  return one === other || (one && other && one.kind === other.kind && one.index === other.index);
+}

@@ -1,0 +1,48 @@
+"""The user's picture, as a texture."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+from ..errors import MeshFileError
+
+MOST_BYTES = 32 * 2**20
+"""A page that holds more is slow to open."""
+
+_BEGINNINGS = ((b"\x89PNG\r\n\x1a\n", "image/png"), (b"\xff\xd8\xff", "image/jpeg"), (b"GIF8", "image/gif"))
+
+
+class Picture(NamedTuple):
+    """A picture file: its name, its media type, its bytes."""
+
+    name: str
+    type: str
+    content: bytes
+
+
+def read_picture(path: str | PathLike[str]) -> Picture:
+    """Return a PNG, JPEG, GIF or WebP file; the content counts, not the ending.
+
+    Raises:
+        MeshFileError: it cannot be read, is no such picture, or is too large.
+    """
+    path = Path(path)
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError as error:
+        raise MeshFileError(f"{path}: there is no such picture") from error
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise MeshFileError(f"the picture {path} cannot be read: {reason}") from error
+    kind = next((kind for beginning, kind in _BEGINNINGS if content.startswith(beginning)), None)
+    if content[:4] == b"RIFF" and content[8:12] == b"WEBP":
+        kind = "image/webp"
+    if kind is None:
+        raise MeshFileError(f"{path} is no PNG, JPEG, GIF or WebP picture")
+    if len(content) > MOST_BYTES:
+        raise MeshFileError(
+            f"the picture {path} has {len(content) / 2**20:.0f} MiB; a page takes up to {MOST_BYTES / 2**20:.0f}"
+        )
+    return Picture(path.name, kind, content)
