@@ -49,6 +49,7 @@ _HOMES = {
     "CutMesh": "seams",
     "least_squares_layout": "layout",
     "ConeflatError": "errors",
+    "pack_together": "atlas",
     "make_figure": "view",
     "save_figure": "view",
     "draw_layout": "view",
@@ -98,6 +99,7 @@ __all__ = [
     "make_figure",
     "measure",
     "mollify",
+    "pack_together",
     "read_flattening",
     "read_mesh",
     "sample_path",
@@ -108,6 +110,7 @@ __all__ = [
 
 if TYPE_CHECKING:
     from . import errors
+    from .atlas import pack_together
     from .cones import ConeSolution, cones_at, cones_with_curvature, greedy_cones
     from .conformal.linear import scaled_lengths
     from .curve import ConeCurve, FoundCones, cone_curve, find_cones

@@ -6,6 +6,7 @@ from .orient import orient_charts
 from .overlap import Overlaps, find_overlaps
 from .pack import Packed, pack_charts
 from .regions import overlap_layers, overlap_regions
+from .together import pack_together
 
 __all__ = [
     "Layout",
@@ -18,4 +19,5 @@ __all__ = [
     "overlap_layers",
     "overlap_regions",
     "pack_charts",
+    "pack_together",
 ]

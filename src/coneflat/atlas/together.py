@@ -1,0 +1,59 @@
+"""Several flattened meshes in one texture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .._arrays import IntArray
+from ..errors import EmptyMeshError
+from ..mesh import TriangleMesh, label_components
+from .pack import pack_charts
+
+if TYPE_CHECKING:
+    from ..result import Flattening
+
+
+def pack_together(
+    results: Sequence[Flattening], *, resolution: int = 1024, padding: float = 2.0, tiles: int = 1
+) -> list[Flattening]:
+    """Return results whose charts share one texture, or several (UDIM tiles), all at one scale of their models.
+
+    Args:
+        results: flattened meshes, in the same unit of length.
+        resolution: texels along a side of the texture.
+        padding: texels between charts, at least.
+        tiles: number of textures.
+
+    Raises:
+        EmptyMeshError: there are no results.
+        OptionError: a number makes no sense, or so much padding leaves no room.
+    """
+    if not results:
+        raise EmptyMeshError("there are no results to pack")
+    labels = [_charts(result) for result in results]
+    first = np.cumsum([0, *(int(label.max()) + 1 for label in labels)])
+    packed = pack_charts(
+        np.concatenate([result.corner_uv / result.uv_scale for result in results]),
+        np.concatenate([label + start for label, start in zip(labels, first[:-1], strict=True)]),
+        resolution=resolution,
+        padding=padding,
+        tiles=tiles,
+    )
+    ends = np.cumsum([len(result.faces) for result in results])[:-1]
+    together = []
+    for result, corner_uv in zip(results, np.split(packed.corner_uv, ends), strict=True):
+        uv = np.empty_like(result.uv)
+        uv[result.uv_faces] = corner_uv
+        together.append(replace(result, uv=uv, uv_scale=packed.scale, packing_efficiency=packed.efficiency))
+    return together
+
+
+def _charts(result: Flattening) -> IntArray:
+    """Return (m,) the chart of each triangle: what hangs together in the plane."""
+    flat = TriangleMesh(result.uv, result.uv_faces)
+    faces = flat.edge_faces[~flat.is_boundary_edge]
+    return label_components(len(result.uv_faces), faces[:, 0], faces[:, 1])[1]

@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+import coneflat
+from coneflat import errors
+from coneflat.atlas import find_overlaps
+
+
+@pytest.fixture(scope="module")
+def results():
+    meshes = (shapes.sphere(2), shapes.torus(24, 12), shapes.cylinder(12, 3))
+    return [
+        coneflat.flatten(vertices * size, faces, charts="atlas")
+        for (vertices, faces), size in zip(meshes, (1, 2, 0.5), strict=True)
+    ]
+
+
+def test_charts_of_several_meshes_share_a_texture(results):
+    together = coneflat.pack_together(results, resolution=512, padding=4)
+    corners = np.concatenate([one.corner_uv for one in together])
+    assert corners.min() >= 4 / 512 - 1e-12
+    assert corners.max() <= 1 - 4 / 512 + 1e-12
+    assert len(find_overlaps(corners).pairs) == 0
+    # One scale for all models, and nothing but moved.
+    assert len({one.uv_scale for one in together}) == 1
+    for before, after in zip(results, together, strict=True):
+        sides = [
+            np.linalg.norm(one.corner_uv[:, 1] - one.corner_uv[:, 0], axis=1) / one.uv_scale
+            for one in (before, after)
+        ]
+        np.testing.assert_allclose(*sides, rtol=1e-9)
+        assert after.packing_efficiency == together[0].packing_efficiency
+
+
+def test_tiles(results):
+    together = coneflat.pack_together(results, tiles=2)
+    tiles = {int(u) for one in together for u in np.floor(one.corner_uv[..., 0].ravel())}
+    assert tiles == {0, 1}
+    assert together[0].uv_scale > 1.05 * coneflat.pack_together(results)[0].uv_scale
+
+
+def test_what_makes_no_sense(results):
+    with pytest.raises(errors.EmptyMeshError, match="no results"):
+        coneflat.pack_together([])
+    with pytest.raises(errors.OptionError):
+        coneflat.pack_together(results, tiles=0)
