@@ -310,6 +310,8 @@ class TestConesAndCurvature:
         assert before.percentile(100) == pytest.approx(np.abs(defect).max())
         assert after.percentile(100) < 1e-10
         np.testing.assert_allclose(after.values[result.cones], np.abs(result.curvatures), atol=1e-9)
+        linear = quantity.curvature(coneflat.flatten(*shapes.sphere(3), **coneflat.PAPER), True)
+        assert 1e-6 < linear.percentile(50) < before.percentile(50)
 
     def test_boundaries_have_no_curvature_to_show(self):
         result = coneflat.flatten(*shapes.hill())
