@@ -254,6 +254,7 @@ def tube(around: int = 48, along: int = 12):
         cones=np.array([0, along - 1]),
         curvatures=np.array([1.0, -1.0]),
         seams=seams,
+        curvature_residual=np.full(len(vertices), 1e-13),
         distortion=SimpleNamespace(qc=qc, log_area_scale=log_scale, qc_mean=1.1, flipped=0, seam_length=0.4),
         source=None,
     )

@@ -34,9 +34,13 @@ def test_readme_gives_the_shape_of_the_sample():
 
 
 def test_every_option_is_described():
-    page = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
+    text = {
+        name: (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+        for name in ("command-line", "figures")
+    }
+    pages = {"flatten": text["command-line"], "figure": text["figures"]}
     for name, command in cli.commands.items():
-        assert f"coneflat {name}" in page
+        assert f"coneflat {name}" in text["command-line"]
         for parameter in command.params:
-            if name == "flatten" and parameter.param_type_name == "option":
-                assert any(f"{option}" in page for option in parameter.opts), parameter.name
+            if name in pages and parameter.param_type_name == "option":
+                assert any(f"{option}" in pages[name] for option in parameter.opts), parameter.name

@@ -172,6 +172,23 @@ class TestLayout:
         assert vertex.tolist() == [0, 0, 11, 11]
         np.testing.assert_array_equal(shown_at(axes, tube.uv[point]), [RED, RED, BLACK, BLACK])
 
+    def test_textures_stand_side_by_side(self):
+        tube = shapes.tube()
+        tube.uv = np.add(tube.uv, [1, 0])
+        tube.corner_uv = tube.uv[tube.uv_faces]
+        axes = axes_of()
+        coneflat.draw_layout(tube, axes)
+        assert not axes.texts
+        assert axes.get_xlim() == pytest.approx((0.98, 2.02))
+        half = len(tube.faces) // 2
+        tube.uv_faces[half:] += len(tube.uv)
+        tube.uv = np.concatenate([tube.uv, np.add(tube.uv, [0, 1])])
+        tube.corner_uv = tube.uv[tube.uv_faces]
+        coneflat.draw_layout(tube, axes)
+        assert axes.get_ylim() == pytest.approx((-0.04, 2.04))
+        assert [text.get_text() for text in axes.texts] == ["1002", "1012"]
+        assert layout.layout_aspect(tube, crop=False) == 0.5
+
     def test_crop_shows_the_charts_alone(self):
         tube = shapes.tube()
         axes = axes_of()
@@ -310,6 +327,8 @@ class TestConesAndCurvature:
         assert before.percentile(100) == pytest.approx(np.abs(defect).max())
         assert after.percentile(100) < 1e-10
         np.testing.assert_allclose(after.values[result.cones], np.abs(result.curvatures), atol=1e-9)
+        linear = quantity.curvature(coneflat.flatten(*shapes.sphere(3), **coneflat.PAPER), True)
+        assert 1e-6 < linear.percentile(50) < before.percentile(50)
 
     def test_boundaries_have_no_curvature_to_show(self):
         result = coneflat.flatten(*shapes.hill())

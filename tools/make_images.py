@@ -1,84 +1,114 @@
-"""Draw the pictures of the documentation: `python tools/make_images.py [MODEL]`.
+"""Draw the pictures of the documentation: `python tools/make_images.py FOLDER`.
 
-The sample's picture is that of `coneflat demo`. The picture of the curvature left after flattening takes a model
-file, the sample if none is given, and so does that of cones of whole quarter turns.
+The folder holds the models fandisk.obj, bunny.obj and horse.ply; the sample comes with the package. Pictures are kept
+small: 256 colours each.
 """
 
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
+from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 import coneflat
-from coneflat.view import demo_figure, draw_checker, new_figure, render_mesh, save_figure
+from coneflat.view import demo_figure
+from coneflat.view.camera import view_aspect
+from coneflat.view.compose import Panel, Row, compose
+from coneflat.view.marks import mark_handles
+from coneflat.view.quantity import curvature
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
-LOWEST, HIGHEST = -16, -1  # decades of curvature error that the colours span
+DPI = 170.0
+
+#: How to look at the models of the gallery.
+LOOKS: dict[str, dict[str, Any]] = {
+    "fandisk.obj": {"up": "x", "eyes": ["right-front", "left-back"]},
+    "bunny.obj": {"eyes": ["front-right", "back-left"]},
+    "horse.ply": {"up": "z", "eyes": ["right-back", "left-front"]},
+}
+#: The kinds that show one view, for two would be small.
+SINGLE = ("quality", "curvature")
+
+
+def save(figure: Any, name: str) -> None:
+    """Write a figure with a palette instead of full colours."""
+    stream = BytesIO()
+    figure.savefig(stream, format="png", dpi=figure.dpi)
+    with Image.open(stream) as picture:
+        full = picture.convert("RGB")
+        palette = full.quantize(255, Image.Quantize.MAXCOVERAGE)
+        few = full.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
+        colors = palette.getpalette() or []
+        numbers = np.asarray(few).copy()
+        numbers[(np.asarray(full) == 255).all(axis=2)] = 255  # paper stays white
+        few = Image.fromarray(numbers)
+        few.putpalette([*colors[: 3 * 255], 255, 255, 255])
+    path = IMAGES / f"{name}.png"
+    few.save(path, optimize=True)
+    print(f"{path.name}: {few.width} x {few.height}, {path.stat().st_size / 1000:.0f} KB", flush=True)
 
 
 def curvature_figure(path: Path) -> Any:
     """Return a figure of what curvature a model has, and what the linear and the exact metric leave of it."""
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import LogNorm
-
     linear = coneflat.flatten(path, **coneflat.PAPER)
     exact = coneflat.flatten(path)
-    mesh = coneflat.TriangleMesh(exact.vertices, exact.faces)
-    angles = coneflat.corner_angles(coneflat.edge_lengths(mesh.vertices, mesh.faces))
-    before = np.abs(coneflat.angle_defect(mesh.faces, angles, mesh.is_boundary_vertex))
-    figure = new_figure(15.0, 5.2)
-    colors = colormaps["magma"]
-    panels = [("on the model", before), ("left by the linear metric", np.abs(linear.curvature_residual)),
-              ("left by the exact metric", np.abs(exact.curvature_residual))]  # fmt: skip
-    for k, (label, values) in enumerate(panels):
-        share = (np.log10(np.maximum(values, 1e-300)) - LOWEST) / (HIGHEST - LOWEST)
-        shade = colors(np.clip(share, 0, 1)[mesh.faces].mean(axis=1))[:, :3]
-        picture = render_mesh(mesh.vertices, mesh.faces, face_colors=shade)
-        axes = figure.add_axes((0.01 + 0.305 * k, 0.02, 0.295, 0.84))
-        axes.imshow(picture.image)
-        axes.set_axis_off()
-        figure.text(0.015 + 0.305 * k, 0.93, f"Curvature {label}", size=13)
-        spread = f"root mean square {np.sqrt(np.mean(values**2)):.1e} rad, largest {values.max():.1e}"
-        figure.text(0.015 + 0.305 * k, 0.88, spread, size=11, color="#444444")
-    bar = figure.colorbar(
-        ScalarMappable(LogNorm(10.0**LOWEST, 10.0**HIGHEST), colors),
-        cax=figure.add_axes((0.945, 0.1, 0.01, 0.7)),
-    )
-    bar.ax.set_title("|K|, rad", size=11)
-    return figure
+    labels = ("On the model", "After the linear metric", "After the exact metric")
+    panels = [
+        Panel(
+            view_aspect(result.vertices), partial(coneflat.draw_curvature, result, flat=flat, dpi=DPI), label
+        )
+        for result, flat, label in zip((exact, linear, exact), (False, True, True), labels, strict=True)
+    ]
+    left = [
+        replace(curvature(result, True), label=f"|K| left, {name} metric")
+        for result, name in ((linear, "linear"), (exact, "exact"))
+    ]
+    return compose([Row(panels, left)], dpi=DPI, width=9.0)
 
 
 def quarters_figure(path: Path) -> Any:
     """Return a figure of a model with a checkerboard: with any cones, and with cones of whole quarter turns."""
-    figure = new_figure(13.0, 6.6)
-    quarters = {"quantum": np.pi / 2, "correct_handles": True}
-    for k, (label, options) in enumerate((("Any curvatures", {}), ("Multiples of a quarter turn", quarters))):
-        result = coneflat.flatten(path, **options)
-        axes = figure.add_axes((0.01 + 0.5 * k, 0.01, 0.48, 0.88))
-        axes.set_axis_off()
-        draw_checker(result, axes, cones=True)
-        figure.text(0.015 + 0.5 * k, 0.945, label, size=13)
-        off = (
-            ""
-            if result.rotations is None
-            else f"; seams are off quarter turns by {result.rotations.worst:.0e} rad"
+    free = coneflat.flatten(path)
+    quarters = coneflat.flatten(path, quantum=np.pi / 2, correct_handles=True)
+    assert quarters.rotations is not None
+    off = f"{quarters.rotations.worst:.0e}"
+    labels = (
+        f"Any curvatures: {len(free.cones)} cones",
+        f"Multiples of a quarter turn, to {off} rad: {len(quarters.cones)} cones",
+    )
+    panels = [
+        Panel(
+            view_aspect(result.vertices), partial(coneflat.draw_checker, result, cones=True, dpi=DPI), label
         )
-        figure.text(0.015 + 0.5 * k, 0.905, f"{len(result.cones)} cones{off}", size=11, color="#444444")
-    return figure
+        for result, label in zip((free, quarters), labels, strict=True)
+    ]
+    return compose([Row(panels)], marks=mark_handles(free), dpi=DPI)
 
 
-def main() -> None:
+def gallery(path: Path, **look: Any) -> None:
+    """Draw a figure of every kind."""
+    result = coneflat.flatten(path, charts="atlas")
+    for kind in ("layout", "checker", "quality", "cones", "curvature"):
+        eyes = look["eyes"][:1] if kind in SINGLE else look["eyes"]
+        save(coneflat.make_figure(result, kind, dpi=DPI, **{**look, "eyes": eyes}), f"{path.stem}-{kind}")
+    curve = coneflat.cone_curve(path)
+    save(coneflat.make_figure(curve, "curve", dpi=DPI), f"{path.stem}-curve")
+
+
+def main(folder: Path) -> None:
     """Draw everything."""
-    sample = coneflat.sample_path()
-    save_figure(demo_figure(coneflat.flatten(sample)), IMAGES / "sample.png")
-    model = Path(sys.argv[1]) if len(sys.argv) > 1 else sample
-    save_figure(curvature_figure(model), IMAGES / "curvature.png")
-    save_figure(quarters_figure(model), IMAGES / "quarters.png")
+    save(demo_figure(coneflat.flatten(coneflat.sample_path(), charts="atlas")), "sample")
+    save(curvature_figure(folder / "bunny.obj"), "curvature")
+    save(quarters_figure(folder / "bunny.obj"), "quarters")
+    for name, look in LOOKS.items():
+        gallery(folder / name, **look)
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]))

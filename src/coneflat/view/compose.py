@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 WIDTH = 7.0
 MARGIN = 0.08
 GAP = 0.12
-CARD = 1.35
+CARD, CARD_HEIGHT = 1.35, 1.4
 TITLE, LABEL, LEGEND = 0.3, 0.22, 0.28
-TICKS, LINE = 0.3, 0.14
+TICKS, LINE = 0.28, 0.135
 SCALE_LEFT, SCALE_BELOW = 0.55, 0.42  # for the ticks and labels of a graph
 
 # Points.
@@ -85,13 +85,15 @@ def compose(
     """
     above = [LABEL * any(panel.label for panel in row.panels) for row in rows]
     fixed = TITLE * bool(title) + LEGEND * bool(marks) + sum(above) + GAP * (len(rows) - 1) + 2 * MARGIN
+    least = [max(CARD_HEIGHT * len(row.quantities), 0.3) for row in rows]
     if size is None:
-        heights = [min(_room(row, width) / _aspect(row), row.tallest) for row in rows]
-        size = max(h * _aspect(r) + width - _room(r, width) for h, r in zip(heights, rows, strict=True)), 0.0
-        size = size[0], sum(heights) + fixed
+        natural = [min(_room(row, width) / _aspect(row), row.tallest) for row in rows]
+        width -= min(_room(row, width) - h * _aspect(row) for row, h in zip(rows, natural, strict=True))
+        heights = np.maximum(natural, least).tolist()
+        size = width, sum(heights) + fixed
     else:
         heights = [(size[1] - fixed) / len(rows)] * len(rows)
-        if not min(heights) > 0.3 or not min(_room(row, size[0]) for row in rows) > 0.3:
+        if heights[0] < max(least) or min(_room(row, size[0]) for row in rows) < 0.3:
             raise OptionError(f"{size[0]:g} by {size[1]:g} inches leave no room for the pictures")
     check_pixels(size, dpi)
     figure = new_figure(*size, dpi=dpi)

@@ -39,7 +39,7 @@ def demo_figure(result: Flattening, *, up: str = "y") -> Figure:
     distortion = partial(draw_quality, result, up=up, dpi=DOTS_PER_INCH)
     panels = [
         Panel(view_aspect(vertices, FRONT, up), checker, "Model, textured by its UVs"),
-        Panel(layout_aspect(result), partial(draw_layout, result, crop=True), "UV layout"),
+        Panel(layout_aspect(result, crop=True), partial(draw_layout, result, crop=True), "UV layout"),
         Panel(view_aspect(vertices, FRONT, up), partial(distortion, eye=FRONT), "Distortion, front and back"),
         Panel(view_aspect(vertices, BACK, up), partial(distortion, eye=BACK)),
     ]

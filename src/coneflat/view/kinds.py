@@ -115,7 +115,9 @@ _Rows: TypeAlias = "tuple[list[Row], list[Any]]"
 
 
 def _layout(result: Flattening, look: Look) -> _Rows:
-    panel = Panel(1.0, partial(draw_layout, result, color_charts=look.color_charts))
+    panel = Panel(
+        layout_aspect(result, crop=False), partial(draw_layout, result, color_charts=look.color_charts)
+    )
     return [Row([panel])], mark_handles(result, seams=False)
 
 
@@ -132,7 +134,10 @@ def _quality(result: Flattening, look: Look) -> _Rows:
     for measure, find in (("qc", conformal_distortion), ("scale", stretch)):
         options: dict[str, Any] = {"measure": measure, "colors": look.colors}
         layout = partial(draw_quality, result, on="layout", dpi=look.dpi, **options)
-        panels = [*look.views(result, draw_quality, **options), Panel(layout_aspect(result), layout)]
+        panels = [
+            *look.views(result, draw_quality, **options),
+            Panel(layout_aspect(result, crop=True), layout),
+        ]
         rows.append(Row(panels, [find(result).recolored(look.colors)]))
     return rows, []
 

@@ -55,9 +55,9 @@ def draw_layout(
         color_charts: give the charts different colours.
         edges: draw the triangles' edges.
         cones: mark the cones.
-        crop: show the charts alone, not all of the unit square.
+        crop: show the charts alone, not all of the unit square, or of the tiles of several textures.
     """
-    from matplotlib.patches import PathPatch, Rectangle
+    from matplotlib.patches import PathPatch
 
     scale = np.sqrt(mark_scale(axes))
     paths = chart_paths(result.uv, result.uv_faces)
@@ -72,8 +72,7 @@ def draw_layout(
         _draw_segments(axes, inner, "edges", color=EDGE_COLOR, width=0.2 * scale, zorder=1)
     draw_outlines(axes, result, paths, 0.8 * scale)
     if not crop:
-        frame = Rectangle((0, 0), 1, 1, fill=False, edgecolor=FRAME_COLOR, linewidth=0.5, zorder=-1)
-        axes.add_patch(frame)
+        _draw_tiles(axes, layout_tiles(result))
     if cones:
         vertex, point = layout_cones(result)
         curvature = dict(zip(result.cones.tolist(), result.curvatures.tolist(), strict=True))
@@ -123,8 +122,8 @@ def boundary_ends(result: Flattening, sides: IntArray) -> FloatArray:
 
 
 def frame_layout(axes: Axes, result: Flattening, crop: bool) -> None:
-    """Set the axes' limits: around the charts, or around the unit square."""
-    low, high = layout_box(result) if crop else (np.zeros(2), np.ones(2))
+    """Set the axes' limits: around the charts, or around the unit square, or its like for each texture."""
+    low, high = layout_box(result, crop)
     margin = 0.02 * max(high - low)
     axes.set_xlim(low[0] - margin, high[0] + margin)
     axes.set_ylim(low[1] - margin, high[1] + margin)
@@ -132,15 +131,23 @@ def frame_layout(axes: Axes, result: Flattening, crop: bool) -> None:
     axes.set_axis_off()
 
 
-def layout_box(result: Flattening) -> tuple[FloatArray, FloatArray]:
-    """Return the (2,) lower left and upper right corners of the box around the charts."""
+def layout_tiles(result: Flattening) -> IntArray:
+    """Return the (k, 2) lower left corners of the unit squares that hold charts: one, or those of several textures."""
+    return np.unique(np.floor(result.corner_uv.mean(axis=1)).astype(np.int64), axis=0)
+
+
+def layout_box(result: Flattening, crop: bool) -> tuple[FloatArray, FloatArray]:
+    """Return the (2,) lower left and upper right corners of the box around the charts, or around whole tiles."""
     used = result.uv[np.unique(result.uv_faces)]
+    if not crop:
+        tiles = layout_tiles(result)
+        used = np.concatenate([tiles, tiles + 1]).astype(np.float64)
     return used.min(axis=0), used.max(axis=0)
 
 
-def layout_aspect(result: Flattening) -> float:
-    """Return the width of the box around the charts over its height, at least 1/4 and at most 4."""
-    low, high = layout_box(result)
+def layout_aspect(result: Flattening, crop: bool) -> float:
+    """Return the width of this box over its height, at least 1/4 and at most 4."""
+    low, high = layout_box(result, crop)
     width, height = high - low
     return float(np.clip(width / max(height, np.finfo(np.float64).tiny), 0.25, 4.0))
 
@@ -188,6 +195,16 @@ def layout_cones(result: Flattening) -> tuple[IntArray, IntArray]:
     pairs = np.column_stack([result.faces[at_cone], result.uv_faces[at_cone]])
     vertex, point = np.unique(pairs, axis=0).reshape(-1, 2).T
     return vertex, point
+
+
+def _draw_tiles(axes: Axes, tiles: IntArray) -> None:
+    """Draw the frames of textures, with their UDIM numbers if there are several."""
+    from matplotlib.patches import Rectangle
+
+    for u, v in tiles.tolist():
+        axes.add_patch(Rectangle((u, v), 1, 1, fill=False, edgecolor=FRAME_COLOR, linewidth=0.5, zorder=-1))
+        if len(tiles) > 1:
+            axes.text(u + 0.02, v + 0.98, f"{1001 + u + 10 * v}", color=FRAME_COLOR, va="top", size="small")
 
 
 def _draw_segments(

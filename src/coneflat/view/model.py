@@ -123,7 +123,7 @@ def draw_curvature(
     """Draw the curvature of every vertex, the angles missing around it, by colours, and return what is shown.
 
     Args:
-        flat: measure angles in the layout, where only cones should have curvature; else on the model.
+        flat: of the flat metric, where only cones should have curvature; else of the model.
         colors: a colour map of matplotlib.
 
     The other arguments and errors are those of `draw_checker`.
