@@ -90,12 +90,11 @@ def pack_charts(
     if alone:
         packing = _alone(outlines, rotate)
     else:
-        sizes = charts.sums(charts.areas) * density**2
-        order = np.lexsort((np.arange(charts.count), -sizes))
+        area = float(np.abs(charts.sums(charts.areas) * density**2).sum())
         turns = _turns(charts.count, rotate)
         angles = np.tile(np.arange(turns) * (2 * np.pi / turns), (charts.count, 1))
         gap = padding / resolution / room
-        packing = pack(outlines, order, angles, gap, min(tiles, charts.count), refine=turns > QUARTERS)
+        packing = pack(outlines, area, angles, gap, min(tiles, charts.count), refine=turns > QUARTERS)
 
     scale = room / (packing.side or 1.0)
     factors = scale * frame * np.exp(1j * packing.angle)

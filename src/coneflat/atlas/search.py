@@ -90,18 +90,18 @@ class _Strips:
 
 
 def pack(
-    outlines: Outlines, order: IntArray, angles: FloatArray, gap: float, tiles: int = 1, refine: bool = True
+    outlines: Outlines, area: float, angles: FloatArray, gap: float, tiles: int = 1, refine: bool = True
 ) -> Packing:
     """Return a tight packing of charts, none mirrored or scaled, in square tiles.
 
-    Charts are placed one after the other, each where its top is lowest. The order, and the angles that each may
-    take, are changed at random, a little each time, and a change is kept if the charts do not stand higher for it
-    in strips of a given width; once they stand no higher than wide, the width is made smaller. On the finer grids
-    this goes on, with angles closer and closer to those found.
+    Charts are placed one after the other, those in the largest boxes first, each where its top is lowest. The
+    order, and the angles that each may take, are changed at random, a little each time, and a change is kept if the
+    charts do not stand higher for it in strips of a given width; once they stand no higher than wide, the width is
+    made smaller. On the finer grids this goes on, with angles closer and closer to those found.
 
     Args:
         outlines: of k charts.
-        order: (k,) to begin with.
+        area: of all charts, about.
         angles: (k, t) radians, that charts may be turned by.
         gap: between charts, in units of the side of a tile, without its margins.
         tiles: number of tiles.
@@ -113,7 +113,7 @@ def pack(
     rng = np.random.default_rng(0)
     most = int((MOST_CELLS / tiles) ** 0.5)
     coarse = min(max(GRIDS[0], int(COLUMNS_PER_CHART * (len(outlines) / tiles) ** 0.5)), most)
-    strips, width, placed = _first(outlines, order, angles, gap, tiles, coarse)
+    strips, width, placed = _first(outlines, area, angles, gap, tiles, coarse)
     placed, best, width = _climb(strips, placed, _reach(gap * width), width, TRIES[0], rng)
     packing = strips.packing(best or placed, width)
     step = np.pi / angles.shape[1]
@@ -136,13 +136,14 @@ def pack(
 
 
 def _first(
-    outlines: Outlines, order: IntArray, angles: FloatArray, gap: float, tiles: int, columns: int
+    outlines: Outlines, area: float, angles: FloatArray, gap: float, tiles: int, columns: int
 ) -> tuple[_Strips, int, _Placed]:
     """Return strips of cells, about so many columns, in which charts stand no higher than wide; the width, and how."""
     _, extent = turned_boxes(outlines, angles)
     longest = float(np.maximum(extent.real, extent.imag).min(axis=1).max())
-    side = max(ROOMY * (_total_area(outlines) / tiles) ** 0.5, LONGER * longest)
+    side = max(ROOMY * (area / tiles) ** 0.5, LONGER * longest)
     strips = _Strips(cover_charts(outlines, angles, (side or 1.0) / columns), tiles)
+    order = np.argsort(-(extent.real + extent.imag).min(axis=1), kind="stable")
     allowed, width = np.ones(angles.size, dtype=bool), columns
     while tiles * width**2 <= ROOM:
         placed = strips.fill(order, allowed, _reach(gap * width), width, width)
@@ -222,11 +223,6 @@ def _changed(placed: _Placed, turns: int, rng: np.random.Generator) -> tuple[Int
 def _above(width: int) -> int:
     """Return how high charts may stand in strips of a width before they are to be brought down to it."""
     return width + width // 4
-
-
-def _total_area(outlines: Outlines) -> float:
-    start, end = outlines.sides.T
-    return float(np.abs((np.conj(start) * end).imag.sum()) / 2)
 
 
 def _reach(gap: float) -> IntArray:
