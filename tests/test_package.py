@@ -53,7 +53,8 @@ class Listener(event.Listener):
 event.register("numba:compile", Listener())
 with numpy.load(sys.argv[1]) as mesh:
     vertices, faces = mesh["vertices"], mesh["faces"]
-flat = coneflat.flatten(vertices, faces)
+flat = one = coneflat.flatten(vertices, faces, charts="atlas")
+coneflat.pack_together([one, one])
 coneflat.flatten(coneflat.read_mesh(flat.save(sys.argv[1] + ".obj"), weld=True))
 coneflat.flatten(vertices, faces[5:], min_cone_angle=0.3, max_cones=6)
 coneflat.flatten(coneflat.sample_path(), metric="linear")

@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from ._arrays import FloatArray, IntArray
+from .atlas import pack_together
 from .geometry.visibility import visible_share
 from .io import read_mesh
 from .pipeline import flatten
@@ -22,8 +23,10 @@ TAU = 2 * np.pi
 
 def compile_kernels() -> None:
     """Flatten small meshes of every kind, so that every kernel that flattening uses is compiled."""
+    sample = flatten(sample_path(), charts="atlas")
+    pack_together([sample, sample])
     with TemporaryDirectory() as folder:
-        read_mesh(flatten(sample_path(), charts="atlas").save(Path(folder) / "flat.obj"), weld=True)
+        read_mesh(sample.save(Path(folder) / "flat.obj"), weld=True)
     flatten(sample_path(), cones="greedy", metric="linear")
     for mesh in (_tube(closed=True), _tube(closed=False)):
         flatten(*mesh)

@@ -113,7 +113,7 @@ def _packed(
 
     space: (m, 3, 3) the triangles' corners on the model.
     """
-    flat, rotate = points[corners], "any"
+    flat, rotate = _upright(points[corners], chart), "any"
     if options.up is not None:
         flat, rotate = orient_charts(flat, chart, corners=space, up=options.up), "none"
     packed = pack_charts(
@@ -127,6 +127,16 @@ def _packed(
     uv = np.empty_like(points)
     uv[corners] = packed.corner_uv
     return uv, packed
+
+
+def _upright(flat: FloatArray, chart: IntArray) -> FloatArray:
+    """Return (m, 3, 2) charts, those turned over of which more area is upside down than not."""
+    sides = flat[:, 1:] - flat[:, :1]
+    areas = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
+    is_mirrored = np.bincount(chart, weights=areas) < 0
+    if is_mirrored.any():
+        flat[is_mirrored[chart], :, 1] *= -1
+    return flat
 
 
 def _number_vertices(
