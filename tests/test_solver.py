@@ -9,7 +9,7 @@ from coneflat import errors, flatten
 from coneflat.cli.main import cli
 from coneflat.geometry import cotangent_laplacian, cotangents, edge_lengths
 from coneflat.options import SOLVERS as SOLVER_NAMES
-from coneflat.solver import available, factorize, solving
+from coneflat.solver import available, factorize, pardiso, solving
 from coneflat.solver.ladder import HUGE, LARGE, MODULES, best_for
 
 SOLVERS = [
@@ -138,3 +138,17 @@ def test_every_list_of_solvers_is_the_same():
         option for option in cli.commands["flatten"].params if option.name == "solver"
     ).type.choices
     assert tuple(choices) == SOLVER_NAMES == ("auto", *MODULES)
+
+
+@pytest.mark.skipif(not available("pardiso"), reason="pypardiso is not installed")
+@pytest.mark.parametrize("found", [None, ()])
+def test_mkl_is_found_where_no_package_tells_of_it(monkeypatch, found):
+    def files(name):
+        if found is None:
+            raise pardiso.metadata.PackageNotFoundError(name)
+        return found
+
+    usual = pardiso._library()
+    monkeypatch.setattr(pardiso.metadata, "files", files)
+    assert pardiso._library()["pardiso"] is not None
+    assert usual["pardiso"] is not None

@@ -7,8 +7,11 @@ called itself. It takes the upper triangle by rows: for a symmetric matrix the l
 from __future__ import annotations
 
 import ctypes
+import os
 import weakref
+from contextlib import suppress
 from functools import lru_cache
+from importlib import metadata
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -27,6 +30,9 @@ NO_DEFAULTS, ORDERING, PERMUTATION, FROM_ZERO = 0, 1, 4, 34
 NESTED_DISSECTION, GIVEN, WANTED = 2, 1, 2
 # So many right-hand sides are solved faster together than one by one.
 TOGETHER = 8
+# MKL's file on each system, and what tells pypardiso of another one.
+RUNTIMES = ("libmkl_rt.", "mkl_rt.")
+LIBRARY_GIVEN = "PYPARDISO_MKL_RT"
 # PARDISO's codes.
 OUT_OF_MEMORY, ZERO_PIVOT = -2, -4
 
@@ -156,10 +162,23 @@ def _address(array: AnyArray | None) -> ctypes.c_void_p:
 @lru_cache(maxsize=1)
 def _routines() -> tuple[Any, Any]:
     """Return PARDISO, and what sets the number of threads of the calling thread and returns the one before."""
-    from pypardiso import PyPardisoSolver
-
-    library = PyPardisoSolver().libmkl
+    library = _library()
     pardiso, set_threads = library["pardiso"], library["MKL_Set_Num_Threads_Local"]
     pardiso.restype = None
     set_threads.argtypes, set_threads.restype = [ctypes.c_int], ctypes.c_int
     return pardiso, set_threads
+
+
+def _library() -> ctypes.CDLL:
+    """Load MKL from the package that brings it; pypardiso, which knows more places, looks through all folders."""
+    try:
+        installed = metadata.files("mkl") or ()
+    except metadata.PackageNotFoundError:
+        installed = ()
+    for path in installed if LIBRARY_GIVEN not in os.environ else ():
+        if path.name.startswith(RUNTIMES):
+            with suppress(OSError):
+                return ctypes.CDLL(str(path.locate()))
+    from pypardiso import PyPardisoSolver
+
+    return PyPardisoSolver().libmkl
