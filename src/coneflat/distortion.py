@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ._arrays import BoolArray, FloatArray, IntArray, dots
 from .atlas.overlap import find_overlaps
 from .mesh import TriangleMesh, end_corners, label_components
+from .threads import meanwhile
 
 ZERO_AREA = 1e-12  # twice the area over the longest side squared: no digit of the shape is left below
 JOINED = 1e-6  # UV distance over UV edge length at which two sides of an edge count as one
@@ -91,6 +93,19 @@ def measure(
         cones: (s,) vertices at which the rotation between the sides of a seam changes.
         curvature_error: what `curvature_errors` returns for the metric.
     """
+    with meanwhile(partial(find_overlaps, corner_uv), len(corner_uv)) as finding:
+        measured = _measure(mesh, corner_uv, curvature_error, cones)
+        overlaps = finding.result()
+    return replace(measured, overlap=overlaps.fraction, overlapping_pairs=len(overlaps.pairs))
+
+
+def _measure(
+    mesh: TriangleMesh,
+    corner_uv: FloatArray,
+    curvature_error: tuple[float, float],
+    cones: IntArray | None,
+) -> Distortion:
+    """Return all measures but those of overlaps."""
     area, longest = _model_areas(mesh)
     one, two = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
     uv_area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
@@ -108,7 +123,6 @@ def measure(
     seams, charts, chart = _seams_and_charts(mesh, corner_uv)
     majority = np.sign(np.bincount(chart, weights=np.where(valid, uv_area, 0), minlength=charts))
     against = np.where(valid, np.sign(uv_area), 0) * majority[chart] < 0
-    overlaps = find_overlaps(corner_uv)
     seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
     return Distortion(
         qc=qc,
@@ -127,8 +141,8 @@ def measure(
         seam_mismatch_max=float(mismatches.max()) if len(seams) else 0.0,
         seam_motion_mismatch=_seam_motion_mismatch(mesh, corner_uv, seams, cones),
         density_spread=_spread(log_scale[valid], weights),
-        overlap=overlaps.fraction,
-        overlapping_pairs=len(overlaps.pairs),
+        overlap=float("nan"),
+        overlapping_pairs=0,
         curvature_error=curvature_error[0],
         curvature_error_max=curvature_error[1],
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from .conformal.turning import open_turning
 from .distortion import measure
 from .errors import ConvergenceError, CurvatureError
 from .geometry.areas import area_distortion, weighted_areas
+from .mesh import TriangleMesh
 from .methods import ExactChoices, FlatMetric, LaidOut, exact_flattening, linear_flattening
 from .methods.exact import ExactFlatMetric
 from .methods.handles import corrected_flattening
@@ -31,7 +33,7 @@ from .seams import cut_open, find_seams
 from .solver import solving
 from .stages import Progress, Stages
 from .text import plural
-from .threads import one_blas_thread
+from .threads import meanwhile, one_blas_thread
 from .wishes import Wishes
 
 # Searches for cones at most: each forbids those where the triangles of the one before had no room for the angle.
@@ -311,16 +313,12 @@ def _lay_out(
 ) -> LaidOut:
     """Scale, cut and lay out a connected mesh with given cones."""
     mesh = part.mesh
-    with stages("metric", 0.75):
-        metric = find_metric(surface, solution, part.wishes, options)
-
-    with stages("cut", 0.85):
-        # What unfolds without distortion is a polyhedron, and opens along its edges.
-        is_polyhedron = np.ptp(solution.log_scale) < FLAT
-        marked = replace(options, creases=1.0) if is_polyhedron and not options.creases else options
-        costs, avoided, forbidden = seam_costs(part, marked)
-        seams = find_seams(mesh, solution.cones, costs, avoided, forbidden=np.flatnonzero(forbidden))
-        disk = cut_open(mesh, seams).mesh
+    # The cut depends on the cones alone.
+    with meanwhile(partial(_cut, part, solution, options), len(mesh.faces)) as cutting:
+        with stages("metric", 0.75):
+            metric = find_metric(surface, solution, part.wishes, options)
+        with stages("cut", 0.85):
+            disk, seams = cutting.result()
 
     with stages("layout", 0.95):
         laid_out = metric.lay_out(disk, seams)
@@ -333,6 +331,16 @@ def _lay_out(
         if options.quantum is not None:
             rotations = measure_rotations(laid_out.mesh, laid_out.points[laid_out.corners], options.quantum)
         return replace(laid_out, figures=figures, rotations=rotations)
+
+
+def _cut(part: Component, solution: ConeSolution, options: Options) -> tuple[TriangleMesh, IntArray]:
+    """Return a connected mesh cut open to a disk with the cones on its border, and the edges that were cut."""
+    # What unfolds without distortion is a polyhedron, and opens along its edges.
+    is_polyhedron = np.ptp(solution.log_scale) < FLAT
+    marked = replace(options, creases=1.0) if is_polyhedron and not options.creases else options
+    costs, avoided, forbidden = seam_costs(part, marked)
+    seams = find_seams(part.mesh, solution.cones, costs, avoided, forbidden=np.flatnonzero(forbidden))
+    return cut_open(part.mesh, seams).mesh, seams
 
 
 def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, options: Options) -> FlatMetric:

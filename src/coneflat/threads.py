@@ -1,9 +1,33 @@
-"""How many threads the libraries below use."""
+"""Threads: how many the libraries below use, and one of our own where two stages can share the time."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
+from contextvars import copy_context
+from typing import TypeVar
+
+Result = TypeVar("Result")
+
+# Triangles from which on memory is what matters.
+HUGE = 3_000_000
+
+
+@contextmanager
+def meanwhile(call: Callable[[], Result], triangles: int) -> Iterator[Future[Result]]:
+    """Have something done on another thread while what is inside runs, and yield its future.
+
+    Of a huge mesh it is done before, as what both hold in memory would be too much.
+
+    Both are the same as one after the other: they share no data that either changes. Compiled loops, factorizations
+    and most of numpy leave the interpreter to the other thread.
+    """
+    with ThreadPoolExecutor(1, thread_name_prefix="coneflat") as executor:
+        future = executor.submit(copy_context().run, call)
+        if triangles > HUGE:
+            wait([future])
+        yield future
 
 
 @contextmanager

@@ -38,6 +38,16 @@ class CoarseModel:
         rows = self.basis[unknowns]
         return np.asarray((rows @ (rows @ self.kernel).T).T), np.asarray(rows @ self.slope)
 
+    def scaled_to(self, constant: float) -> CoarseModel:
+        """Return the model whose E^2 without cones is this.
+
+        Aggregates make a Laplacian that is too stiff by a factor that is nearly the same for all smooth functions, so
+        one number takes most of the error away.
+        """
+        # A surface that is evenly curved has no E to compare.
+        scale = constant / self.constant if min(constant, self.constant) > ROUNDING else 1.0
+        return CoarseModel(self.basis, self.kernel * scale, self.slope * scale, constant)
+
     def squared_distances(self, one: int, others: IntArray) -> FloatArray:
         """Return (p,) the squared norm of the difference of two Green's functions, for each of the others."""
         from .aggregate_kernel import squared_distances
@@ -46,18 +56,12 @@ class CoarseModel:
         return squared_distances(basis.indptr, basis.indices, basis.data, self.kernel, one, others)
 
 
-def coarse_model(
-    operator: GreenOperator, curvature: FloatArray, log_scale: FloatArray, size: int
-) -> CoarseModel:
-    """Return a coarse model whose E without cones is exact.
-
-    Aggregates make a Laplacian that is too stiff by a factor that is nearly the same for all smooth functions, so
-    one number takes most of the error away.
+def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> CoarseModel:
+    """Return a coarse model; it needs no factorization.
 
     Args:
         operator: of the mesh.
         curvature: (f,).
-        log_scale: (f,) -G curvature.
         size: the number of basis functions, about.
     """
     areas = operator.areas
@@ -74,11 +78,7 @@ def coarse_model(
     kernel = (kernel + kernel.T) / 2
     bare = basis.T @ curvature
     slope = -(kernel @ bare)
-    constant = float(-(slope @ bare))
-    exact = float(log_scale @ operator.weighted(log_scale))
-    # A surface that is evenly curved has no E to compare.
-    scale = exact / constant if min(exact, constant) > ROUNDING else 1.0
-    return CoarseModel(basis, kernel * scale, slope * scale, exact)
+    return CoarseModel(basis, kernel, slope, float(-(slope @ bare)))
 
 
 def candidates(model: CoarseModel, fitness: FloatArray) -> IntArray:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from scipy.sparse import csc_matrix
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..threads import meanwhile
 from .coarse_model import candidates, coarse_model
 from .dense_model import MANY, Limits
 from .dense_search import DenseSearch
@@ -70,10 +72,11 @@ class ConeSearch:
         unknown[vertices] = np.arange(len(vertices))
         free = unknown[required]
         inner = curvature[vertices]
-        log_scale = -self.operator.solve(inner)
         self._shakes = min(max(len(vertices) // VERTICES_PER_SHAKE, LEAST_SHAKES), MOST_SHAKES)
         size = min(max(len(vertices) // VERTICES_PER_UNKNOWN, LEAST_SIZE), MOST_SIZE)
-        coarse = coarse_model(self.operator, inner, log_scale, size)
+        with meanwhile(partial(coarse_model, self.operator, inner, size), 2 * len(vertices)) as modelling:
+            log_scale = -self.operator.solve(inner)
+            coarse = modelling.result().scaled_to(float(log_scale @ self.operator.weighted(log_scale)))
         is_usable = usable[vertices].copy()
         is_usable[free] = False
         least = np.full(len(vertices), limits.least)

@@ -7,6 +7,8 @@ functions, a back-substitution each.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
@@ -18,7 +20,7 @@ BATCH, NUMBERS = 32, 50_000_000
 
 
 class GreenOperator:
-    """The Laplacian of the vertices off the boundary in an order of choice, factorized once.
+    """The Laplacian of the vertices off the boundary in an order of choice, factorized when it is first needed.
 
     Attributes:
         vertices: (f,) the vertex of each unknown.
@@ -35,8 +37,11 @@ class GreenOperator:
         self.laplacian.sort_indices()
         self.areas = areas[self.vertices]
         self.is_closed = len(self.vertices) == len(order)
+
+    @cached_property
+    def _factor(self) -> Factor:
         inner = self.laplacian[1:][:, 1:] if self.is_closed else self.laplacian
-        self._factor: Factor = factorize(csc_matrix(inner))
+        return factorize(csc_matrix(inner))
 
     @property
     def worth(self) -> int:

@@ -18,6 +18,6 @@ def compiled(function: F) -> F:
     """Compile a function of arrays and numbers to machine code, kept on disk between runs.
 
     Divisions by zero give inf or nan, as in numpy. Results do not depend on the machine's number of cores:
-    nothing runs in parallel and nothing is reassociated.
+    nothing runs in parallel inside and nothing is reassociated. Other threads of the interpreter go on meanwhile.
     """
-    return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
