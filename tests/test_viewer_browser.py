@@ -58,7 +58,9 @@ class Visit:
         self.page.route("**/*", lambda route: self._request(route, path.as_uri()))
         self.page.goto(path.as_uri())
         self.page.wait_for_selector("html[data-ready]", timeout=60_000)
-        self.settle()
+        self.page.wait_for_function(
+            "!window.coneflat || (!coneflat.moving && !coneflat.panes.some((pane) => pane.rough || pane.stale))"
+        )
 
     def _request(self, route, own):
         if route.request.url == own:
@@ -454,6 +456,19 @@ def test_fingers_turn_zoom_and_pick(browser, written):
     visit.page.touchscreen.tap(*visit.at("layout", thing("triangle", 500))[0])
     assert visit.state("picked") == {"kind": "triangle", "index": 500}
     visit.close()
+
+
+def test_slow_machines_draw_roughly_while_something_moves(visit):
+    visit.run("coneflat.slowFrames = 2")
+    camera = "coneflat.panes[0].camera"
+    visit.run(f"{camera}.rotate(0.3, 0.1)")
+    visit.settle()
+    assert visit.run("coneflat.panes.map((pane) => pane.rough)") == [True, False]
+    visit.page.wait_for_timeout(500)
+    assert visit.run("coneflat.panes.map((pane) => pane.rough)") == [False, False]
+    fine = visit.picture("model")
+    visit.run("coneflat.slowFrames = 0; coneflat.redraw()")
+    np.testing.assert_array_equal(visit.picture("model"), fine)
 
 
 def test_drawing_goes_on_after_the_graphics_card_was_lost(visit):

@@ -88,28 +88,42 @@ function cornerValues(model, show) {
   return out;
 }
 
-/** Return both ends of lines, six numbers each: seam edges, then boundary edges; in the layout a seam has two. */
-function outlineSegments(model, inPlane) {
-  const seams = model.seamCount, all = model.arrays.outline.length;
-  const chosen = [];
-  for (let i = 0; i < all; i++) if (inPlane || i >= 2 * seams || i % 2 === 0) chosen.push(i);
-  const out = new Float32Array(6 * chosen.length);
-  chosen.forEach((i, row) => {
-    model.outlineCorners(i).forEach((corner, end) => {
-      const point = model.arrays.faces[corner];
-      out.set(inPlane ? model.flatPlace(point) : model.place(model.arrays.point_vertex[point]), 6 * row + 3 * end);
-    });
-  });
+const QUAD = 6; // vertices of the two triangles that a line or a dot is drawn as
+
+/** Return the rows of an array, so many numbers each, repeated for every vertex of a quad. */
+function forQuads(rows, size) {
+  const out = new Float32Array(QUAD * rows.length);
+  for (let i = 0; i < rows.length; i += size) {
+    for (let k = 0; k < QUAD; k++) out.set(rows.slice(i, i + size), QUAD * i + size * k);
+  }
   return out;
 }
 
-/** Return for each dot: where it is (3), its radius in pixels, the sign of its curvature, and which cone it is. */
+/** Return where lines begin and end: seam edges, then boundary edges; in the layout a seam has two, side by side. */
+function outlineLines(model, inPlane) {
+  const begins = [], ends = [];
+  for (let i = 0; i < model.arrays.outline.length; i++) {
+    if (!inPlane && i < 2 * model.seamCount && i % 2) continue;
+    const [begin, end] = model.outlineCorners(i).map((corner) => {
+      const point = model.arrays.faces[corner];
+      return inPlane ? model.flatPlace(point) : model.place(model.arrays.point_vertex[point]);
+    });
+    begins.push(...begin);
+    ends.push(...end);
+  }
+  return [begins, ends];
+}
+
+/** Return where dots are, and for each its radius in pixels, the sign of its curvature, and which cone it is. */
 function coneDots(model, inPlane) {
-  const rows = [];
+  const places = [], looks = [];
   for (let index = 0; index < model.coneCount; index++) {
     const curvature = model.head.cone_curvatures[index];
     const radius = Math.min(Math.max(6.5 * Math.sqrt(Math.abs(curvature) / (Math.PI / 2)), 3.5), 10) * (inPlane ? 0.75 : 1);
-    for (const [at] of model.shapeOf({kind: "cone", index}, inPlane)) rows.push(...at, radius, Math.sign(curvature), index);
+    for (const [at] of model.shapeOf({kind: "cone", index}, inPlane)) {
+      places.push(...at);
+      looks.push(radius, Math.sign(curvature), index);
+    }
   }
-  return new Float32Array(rows);
+  return [places, looks];
 }

@@ -48,21 +48,20 @@ class Program {
   }
 }
 
-/** Attributes of a drawing: a list of {array, size, type, normalised, stride, offset, each}. */
+/** Vertices to draw, three for a triangle: a list of attributes, {array, size, type, normalised}. */
 class Shape {
   constructor(gl, attributes) {
     this.gl = gl;
     this.handle = gl.createVertexArray();
-    this.buffers = [];
+    this.count = attributes[0].array.length / attributes[0].size;
     gl.bindVertexArray(this.handle);
-    attributes.forEach((a, location) => {
-      const buffer = a.buffer ?? gl.createBuffer();
-      this.buffers.push(buffer);
+    this.buffers = attributes.map(({array, size, type = gl.FLOAT, normalised = false}, location) => {
+      const buffer = gl.createBuffer();
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-      if (a.array) gl.bufferData(gl.ARRAY_BUFFER, a.array, gl.STATIC_DRAW);
+      gl.bufferData(gl.ARRAY_BUFFER, array, gl.STATIC_DRAW);
       gl.enableVertexAttribArray(location);
-      gl.vertexAttribPointer(location, a.size, a.type ?? gl.FLOAT, Boolean(a.normalised), a.stride ?? 0, a.offset ?? 0);
-      gl.vertexAttribDivisor(location, a.each ?? 0);
+      gl.vertexAttribPointer(location, size, type, normalised, 0, 0);
+      return buffer;
     });
     gl.bindVertexArray(null);
   }
@@ -72,16 +71,60 @@ class Shape {
     this.gl.bufferData(this.gl.ARRAY_BUFFER, array, this.gl.STATIC_DRAW);
   }
 
-  /** Lines and dots: four corners for each instance. */
-  drawEach(count) {
+  /** Draw all vertices, or the first so many. */
+  draw(count = this.count) {
     if (!count) return;
     this.gl.bindVertexArray(this.handle);
-    this.gl.drawArraysInstanced(this.gl.TRIANGLE_STRIP, 0, 4, count);
+    this.gl.drawArrays(this.gl.TRIANGLES, 0, count);
+  }
+}
+
+/** Memory to draw into, with so many samples a pixel; 0 can be read. */
+class Target {
+  constructor(gl, width, height, samples) {
+    Object.assign(this, {gl, width, height, samples});
+    this.frame = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
+    this.parts = [[gl.RGBA8, gl.COLOR_ATTACHMENT0], [gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT]].map(([format, place]) => {
+      const part = gl.createRenderbuffer();
+      gl.bindRenderbuffer(gl.RENDERBUFFER, part);
+      gl.renderbufferStorageMultisample(gl.RENDERBUFFER, samples, format, width, height);
+      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, part);
+      return part;
+    });
   }
 
-  drawTriangles(count) {
-    this.gl.bindVertexArray(this.handle);
-    this.gl.drawArrays(this.gl.TRIANGLES, 0, 3 * count);
+  fits(width, height, samples) {
+    return this.width === width && this.height === height && this.samples === samples;
+  }
+
+  /** Aim at a box of it, left, bottom, width, height, and clear that. */
+  begin(colour, box) {
+    const gl = this.gl;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
+    gl.viewport(...box);
+    gl.scissor(...box);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.clearColor(...colour);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.disable(gl.SCISSOR_TEST);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
+  }
+
+  /** Show one box in another of the canvas; of several samples a pixel it must be the same. */
+  show([left, bottom, width, height], [toLeft, toBottom, toWidth, toHeight]) {
+    const gl = this.gl;
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.frame);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+    const from = [left, bottom, left + width, bottom + height], to = [toLeft, toBottom, toLeft + toWidth, toBottom + toHeight];
+    gl.blitFramebuffer(...from, ...to, gl.COLOR_BUFFER_BIT, this.samples ? gl.NEAREST : gl.LINEAR);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  }
+
+  discard() {
+    this.gl.deleteFramebuffer(this.frame);
+    this.parts.forEach((part) => this.gl.deleteRenderbuffer(part));
   }
 }
 

@@ -1,20 +1,23 @@
 // The page at work: a model, two views of it, and what links them.
 
+const REST = 160; // milliseconds without a move after which nothing moves
+const SLOW = 45; // milliseconds for a frame from which on a machine is slow
+
 /** A side of the page. */
 class Pane {
-  constructor(name, camera, inPlane, changed) {
-    this.name = name;
+  constructor(name, camera, inPlane, viewer) {
+    Object.assign(this, {name, camera, inPlane, viewer});
     this.element = document.getElementById(name);
-    this.camera = camera;
-    this.inPlane = inPlane;
-    this.changed = changed;
-    camera.changed = () => this.spoil();
+    camera.changed = () => {
+      this.spoil();
+      viewer.noteMove();
+    };
   }
 
   /** It must be drawn again. */
   spoil() {
     this.stale = true;
-    this.changed();
+    this.viewer.schedule();
   }
 
   /** Note where it lies on the stage. */
@@ -31,19 +34,21 @@ class Pane {
 }
 
 class Viewer {
-  constructor(model) {
+  /** picture: to lay on the model, or null. */
+  constructor(model, picture) {
     this.model = model;
     this.state = new State({
       show: model.head.show, squares: 36, seams: true, cones: true, edges: false, report: false,
       dark: matchMedia("(prefers-color-scheme: dark)").matches, hovered: null, picked: null,
     });
     this.panes = [
-      new Pane("model", new Camera(model.arrays.places, model.head.turn.flat(), true), false, () => this.schedule()),
-      new Pane("layout", new Camera(this.flatPlaces(), [1, 0, 0, 0, 1, 0, 0, 0, 1], false), true, () => this.schedule()),
+      new Pane("model", new Camera(model.arrays.places, model.head.turn.flat(), true), false, this),
+      new Pane("layout", new Camera(this.flatPlaces(), [1, 0, 0, 0, 1, 0, 0, 0, 1], false), true, this),
     ];
     this.used = this.panes[0];
+    this.moving = this.slowFrames = 0;
     this.renderer = new Renderer(document.getElementById("scene"), model);
-    this.renderer.setPicture(numberedBoard());
+    if (picture) this.renderer.setPicture(picture);
     this.marks = new Marks(document.getElementById("marks"), model, this.renderer);
     this.controls = new Controls(this);
     this.panes.forEach((pane) => new Gestures(pane, this));
@@ -58,6 +63,18 @@ class Viewer {
     const watcher = new ResizeObserver(() => this.resize());
     for (const element of [document.getElementById("stage"), ...this.panes.map((pane) => pane.element)]) watcher.observe(element);
     this.resize();
+    this.drawFirst();
+  }
+
+  /** Draw for the first time, roughly; how long that takes tells whether there is a graphics card. */
+  drawFirst() {
+    const start = performance.now();
+    this.slowFrames = 2;
+    this.drawStale();
+    this.renderer.finish();
+    if (performance.now() - start > SLOW) return; // It will be drawn finely a little later.
+    this.slowFrames = 0;
+    this.redraw();
     this.drawStale();
   }
 
@@ -86,10 +103,24 @@ class Viewer {
   schedule() {
     if (this.scheduled) return;
     this.scheduled = true;
-    requestAnimationFrame(() => {
+    requestAnimationFrame((time) => {
       this.scheduled = false;
+      if (this.moving && time - this.lastFrame > SLOW && time - this.lastFrame < REST + 1000) this.slowFrames++;
+      this.lastFrame = time;
       this.drawStale();
     });
+  }
+
+  /** A camera moves; when it rests, everything is drawn finely. */
+  noteMove() {
+    if (!this.moving) this.lastFrame = Infinity;
+    clearTimeout(this.moving);
+    this.moving = setTimeout(() => {
+      this.moving = 0;
+      this.panes.filter((pane) => pane.rough).forEach((pane) => pane.spoil());
+      this.marksStale = true;
+      this.schedule();
+    }, REST);
   }
 
   readColours() {
@@ -109,14 +140,15 @@ class Viewer {
   }
 
   drawStale() {
-    const stale = this.panes.filter((pane) => pane.stale);
+    const stale = this.panes.filter((pane) => pane.stale), rough = Boolean(this.moving) && this.slowFrames > 1;
+    if (this.state.get("show") === "picture" && !this.renderer.look.picture) this.renderer.setPicture(numberedBoard());
     if (stale.length === this.panes.length) this.renderer.clear();
     for (const pane of stale) {
-      this.renderer.draw(pane, this.state);
-      pane.stale = false;
+      this.renderer.draw(pane, this.state, rough);
+      [pane.stale, pane.rough] = [false, rough];
     }
     if (stale.length || this.marksStale) {
-      this.marks.draw(this.panes, this.state, {accent: this.accent});
+      this.marks.draw(this.panes, this.state, this.accent, !this.moving);
       this.marksStale = false;
     }
   }
@@ -184,7 +216,7 @@ class Viewer {
 
   async takePicture(blob) {
     try {
-      this.renderer.setPicture(await pictureOf(blob, this.renderer.gl.getParameter(this.renderer.gl.MAX_TEXTURE_SIZE)));
+      this.renderer.setPicture(await pictureOf(blob));
       this.state.set({show: "picture"});
       this.redraw();
     } catch (error) {
@@ -212,13 +244,8 @@ async function startFromPage() {
     const arrays = document.getElementById("arrays");
     const model = await unpackModel(head, arrays.textContent.trim());
     arrays.remove();
-    const viewer = new Viewer(model);
-    if (head.picture) {
-      const show = head.show;
-      await viewer.takePicture(new Blob([model.arrays.picture], {type: head.picture.type}));
-      viewer.state.set({show});
-    }
-    window.coneflat = viewer;
+    const picture = head.picture ? await pictureOf(new Blob([model.arrays.picture], {type: head.picture.type})) : null;
+    window.coneflat = new Viewer(model, picture);
     document.documentElement.dataset.ready = String(Math.round(performance.now()));
   } catch (error) {
     trouble(error.message);

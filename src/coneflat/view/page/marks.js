@@ -8,6 +8,7 @@ class Marks {
     this.canvas = canvas;
     this.model = model;
     this.renderer = renderer;
+    this.seen = new Map();
   }
 
   resize(width, height, pixel) {
@@ -15,25 +16,29 @@ class Marks {
     sizeCanvas(this.canvas, width * pixel, height * pixel);
   }
 
-  draw(panes, state, colours) {
+  /** settled: nothing moves; else what is hidden is what was. */
+  draw(panes, state, ink, settled) {
     const pen = this.canvas.getContext("2d");
     pen.setTransform(this.pixel, 0, 0, this.pixel, 0, 0);
     pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
     const [picked, hovered] = [state.get("picked"), state.get("hovered")];
+    if (!picked && !hovered) this.seen.clear();
     for (const pane of panes) {
       pen.save();
       pen.beginPath();
       pen.rect(pane.left, pane.top, pane.width, pane.height);
       pen.clip();
       pen.translate(pane.left, pane.top);
-      if (picked) this.drawThing(pen, pane, state, picked, colours.accent, true);
-      if (hovered && !sameThing(hovered, picked)) this.drawThing(pen, pane, state, hovered, colours.accent, false);
+      if (picked) this.drawThing(pen, pane, state, picked, ink, true, settled);
+      if (hovered && !sameThing(hovered, picked)) this.drawThing(pen, pane, state, hovered, ink, false, settled);
       pen.restore();
     }
   }
 
-  drawThing(pen, pane, state, thing, ink, strong) {
-    const seen = this.isSeen(pane, thing, state);
+  drawThing(pen, pane, state, thing, ink, strong, settled) {
+    const key = [pane.name, thing.kind, thing.index].join();
+    if (settled || !this.seen.has(key)) this.seen.set(key, this.isSeen(pane, thing, state));
+    const seen = this.seen.get(key);
     for (const ends of this.model.shapeOf(thing, pane.inPlane)) {
       const places = ends.map((end) => pane.camera.project(end));
       const span = Math.max(...places.map(([x, y]) => Math.hypot(x - places[0][0], y - places[0][1])));

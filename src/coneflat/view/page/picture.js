@@ -1,5 +1,6 @@
 // Pictures to lay on the model: the user's, or a board of numbered squares.
 
+const LARGEST = 4096; // pixels along a side, which every graphics card takes
 const BOARD_SIZE = 1024, BOARD_SQUARES = 8;
 
 /** Return a canvas of squares A1 to H8, A1 at the lower left, where u and v are 0; each row has a hue of its own. */
@@ -24,14 +25,14 @@ function numberedBoard() {
 }
 
 /** Return a picture that the graphics card takes, made smaller where it must be. */
-async function pictureOf(blob, largest) {
+async function pictureOf(blob) {
   let picture;
   try {
     picture = await createImageBitmap(blob);
   } catch {
     throw new Error("this browser cannot show the picture");
   }
-  const share = Math.min(1, largest / Math.max(picture.width, picture.height));
+  const share = Math.min(1, LARGEST / Math.max(picture.width, picture.height));
   if (share === 1) return picture;
   const size = {resizeWidth: Math.floor(picture.width * share), resizeHeight: Math.floor(picture.height * share)};
   return createImageBitmap(picture, {...size, resizeQuality: "high"});

@@ -3,6 +3,8 @@
 const DARK_CELL = [0.4, 0.53, 0.7]; // What dark squares let through: blue, so that red and black dots stand out.
 const SEAM_CORE = 1, SEAM_RADIUS = 2.2; // pixels
 const PICK_RADII = [5, 1.5]; // What lies right under the pointer comes before what lies beside it.
+const SAMPLES = 4; // a pixel, for smooth outlines
+const ROUGH = 0.5; // of the pixels along a side, while a slow machine draws what moves
 const MAP_CONTRAST = 0.55; // On colour maps light is evened out, or a shadow would read as a value.
 
 /** Set the size of a canvas, which costs much and clears it, where it has another. */
@@ -16,7 +18,7 @@ class Renderer {
   constructor(canvas, model) {
     this.canvas = canvas;
     this.model = model;
-    this.gl = canvas.getContext("webgl2", {antialias: true, alpha: false, preserveDrawingBuffer: true});
+    this.gl = canvas.getContext("webgl2", {antialias: false, depth: false, preserveDrawingBuffer: true});
     if (!this.gl) throw new Error("this browser shows no WebGL 2, which the drawing needs");
     this.look = {};
     this.prepare();
@@ -43,8 +45,8 @@ class Renderer {
       {array: cornerNormals(model, places), size: 4, type: gl.INT_2_10_10_10_REV, normalised: true},
       {array: new Float32Array(3 * model.triangleCount), size: 1},
     ]);
-    this.lines = [false, true].map((inPlane) => this.instances(outlineSegments(model, inPlane)));
-    this.dots = [false, true].map((inPlane) => this.instances(coneDots(model, inPlane)));
+    this.lines = [false, true].map((inPlane) => this.quads(outlineLines(model, inPlane)));
+    this.dots = [false, true].map((inPlane) => this.quads(coneDots(model, inPlane)));
     const {sequential, diverging, tints} = model.arrays;
     this.tables = {
       sequential: tableTexture(gl, sequential, true),
@@ -55,14 +57,13 @@ class Renderer {
     this.picture = null;
     if (this.look.picture) this.setPicture(this.look.picture);
     this.shown = null;
-    this.pickBuffers = new Map();
+    this.targets = new Map();
+    this.samples = Math.min(SAMPLES, gl.getParameter(gl.MAX_SAMPLES) ?? 0);
   }
 
-  /** Return lines or dots, of six numbers each. */
-  instances(array) {
-    const buffer = this.gl.createBuffer();
-    const halves = [{array, offset: 0}, {offset: 12}].map((half) => ({...half, buffer, size: 3, stride: 24, each: 1}));
-    return {shape: new Shape(this.gl, halves), count: array.length / 6};
+  /** Return lines or dots of two attributes of three numbers. */
+  quads(attributes) {
+    return new Shape(this.gl, attributes.map((rows) => ({array: forQuads(rows, 3), size: 3})));
   }
 
   /** source: an ImageBitmap or a canvas. */
@@ -86,22 +87,37 @@ class Renderer {
   clear() {
     const gl = this.gl;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.disable(gl.SCISSOR_TEST);
     gl.clearColor(...this.look.colours.ground, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
   }
 
-  /** Draw a pane, {left, top, width, height, camera, inPlane}, as the state says; sizes in CSS pixels. */
-  draw(pane, state) {
-    const gl = this.gl, colours = this.look.colours, side = Number(pane.inPlane);
+  /**
+   * Draw a pane, {name, left, top, width, height, camera, inPlane}, as the state says; sizes in CSS pixels.
+   * rough: at a quarter of the work, for slow machines while something moves.
+   */
+  draw(pane, state, rough) {
+    const gl = this.gl;
     if (gl.isContextLost()) return;
+    const [left, right] = [pane.left, pane.left + pane.width].map((x) => Math.round(x * this.pixel));
+    const [top, bottom] = [pane.top, pane.top + pane.height].map((y) => Math.round(y * this.pixel));
+    const box = [left, this.canvas.height - bottom, Math.max(1, right - left), Math.max(1, bottom - top)];
+    const part = rough ? [0, 0, Math.ceil(ROUGH * box[2]), Math.ceil(ROUGH * box[3])] : box;
+    const target = rough
+      ? this.targetOf(`${pane.name} rough`, part[2], part[3], 0)
+      : this.targetOf("fine", this.canvas.width, this.canvas.height, this.samples);
+    target.begin([...this.look.colours.pane, 1], part);
+    this.drawInto(pane, state, part[2] / pane.width);
+    target.show(part, box);
+  }
+
+  drawInto(pane, state, pixel) {
+    const gl = this.gl, colours = this.look.colours, side = Number(pane.inPlane);
     const show = state.get("show");
     if (this.shown !== show) {
       this.surface.refill(3, cornerValues(this.model, show));
       this.shown = show;
     }
-    this.begin(pane, this.pixel, null, [...colours.pane, 1]);
-    const view = this.viewOf(pane, this.pixel);
+    const view = this.viewOf(pane, pixel);
     const scale = this.model.head.scales[show];
     const table = scale ? scale.table : "charts";
     gl.activeTexture(gl.TEXTURE0);
@@ -125,21 +141,21 @@ class Renderer {
       outward: this.model.head.outward,
       contrast: scale ? MAP_CONTRAST : 1,
     });
-    this.surface.drawTriangles(this.model.triangleCount);
+    this.surface.draw();
     gl.enable(gl.BLEND);
     gl.depthMask(false); // What is only laid over the surface hides nothing.
     gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     if (state.get("seams")) {
       // All halos before all lines: a halo would break the line before it.
       for (const [ink, strength, radius, lift] of [[colours.halo, 0.7, SEAM_RADIUS, 3], [colours.seam, 1, SEAM_CORE, 3.5]]) {
-        const widths = {radius: (radius + 0.5) * this.pixel + 0.5, lift: lift * this.pixel};
+        const widths = {radius: (radius + 0.5) * pixel + 0.5, lift: lift * pixel};
         this.programs.line.use({...view, ...widths, ink, strength});
-        this.lines[side].shape.drawEach(this.lines[side].count);
+        this.lines[side].draw();
       }
     }
     if (state.get("cones")) {
-      this.programs.dot.use({...view, pixel: this.pixel});
-      this.dots[side].shape.drawEach(this.dots[side].count);
+      this.programs.dot.use({...view, pixel});
+      this.dots[side].draw();
     }
     gl.depthMask(true);
     gl.disable(gl.BLEND);
@@ -151,31 +167,28 @@ class Renderer {
     return {turn: camera.turn, pan: camera.pan, zoom, size: [width * pixel, height * pixel]};
   }
 
-  /** Aim at a pane of the canvas, or of a buffer of its own, and clear it. */
-  begin(pane, pixel, buffer, colour) {
-    const gl = this.gl;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
-    const left = buffer ? 0 : Math.round(pane.left * pixel);
-    const bottom = buffer ? 0 : this.canvas.height - Math.round((pane.top + pane.height) * pixel);
-    const box = [left, bottom, Math.round(pane.width * pixel), Math.round(pane.height * pixel)];
-    gl.viewport(...box);
-    gl.scissor(...box);
-    gl.enable(gl.SCISSOR_TEST);
-    gl.clearColor(...colour);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    gl.enable(gl.DEPTH_TEST);
-    gl.depthFunc(gl.LEQUAL);
-    gl.disable(gl.BLEND);
+  /** Return the memory of a name, made anew where it has another size. */
+  targetOf(name, width, height, samples) {
+    const old = this.targets.get(name);
+    if (old?.fits(width, height, samples)) return old;
+    old?.discard();
+    const target = new Target(this.gl, width, height, samples);
+    this.targets.set(name, target);
+    return target;
+  }
+
+  /** Wait until everything is drawn. */
+  finish() {
+    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
   /** Return the thing at a pixel of a pane, {kind, index}, or null. */
   pick(pane, x, y, state) {
     const gl = this.gl;
     if (gl.isContextLost() || x < 0 || y < 0 || x >= pane.width || y >= pane.height) return null;
-    const buffer = this.pickBufferOf(pane, state);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, buffer.frame);
-    const bytes = new Uint8Array(4);
-    gl.readPixels(Math.floor(x), buffer.height - 1 - Math.floor(y), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+    const target = this.pickTargetOf(pane, state), bytes = new Uint8Array(4);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
+    gl.readPixels(Math.floor(x), target.height - 1 - Math.floor(y), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     let index = new DataView(bytes.buffer).getUint32(0, true) - 1;
     if (index < 0) return null;
@@ -186,57 +199,30 @@ class Renderer {
     return {kind: "cone", index};
   }
 
-  /** Return the buffer with the numbers of what a pane shows; drawn again only when the view has changed. */
-  pickBufferOf(pane, state) {
+  /** Return the numbers of what a pane shows; drawn again only when the view has changed. */
+  pickTargetOf(pane, state) {
     const gl = this.gl, model = this.model;
-    const width = Math.max(1, Math.round(pane.width)), height = Math.max(1, Math.round(pane.height));
-    const key = [pane.camera.version, width, height, state.get("seams"), state.get("cones")].join();
-    let buffer = this.pickBuffers.get(pane.name);
-    if (buffer && buffer.key === key) return buffer;
-    if (!buffer || buffer.width !== width || buffer.height !== height) {
-      if (buffer) this.discard(buffer);
-      buffer = this.newPickBuffer(width, height);
-      this.pickBuffers.set(pane.name, buffer);
-    }
-    buffer.key = key;
-    this.begin(pane, 1, buffer.frame, [0, 0, 0, 0]);
-    const view = this.viewOf(pane, 1);
+    const size = [pane.width, pane.height].map((side) => Math.max(1, Math.round(side)));
+    const target = this.targetOf(`${pane.name} numbers`, ...size, 0);
+    const key = [pane.camera.version, state.get("seams"), state.get("cones")].join();
+    if (target.key === key) return target;
+    target.key = key;
+    target.begin([0, 0, 0, 0], [0, 0, ...size]);
+    const view = this.viewOf(pane, 1), side = Number(pane.inPlane);
     this.pickPrograms.surface.use({...view, inPlane: pane.inPlane, plane: [...model.uvCentre, model.uvUnit]});
-    this.surface.drawTriangles(model.triangleCount);
-    const side = Number(pane.inPlane);
+    this.surface.draw();
     if (state.get("seams")) {
       const numbers = {first: model.triangleCount + 1, sides: 1 + side};
       for (const radius of PICK_RADII) {
         this.pickPrograms.line.use({...view, ...numbers, radius, lift: 3});
-        this.lines[side].shape.drawEach(model.seamCount * (1 + side));
+        this.lines[side].draw(QUAD * model.seamCount * (1 + side));
       }
     }
     if (state.get("cones")) {
       this.pickPrograms.dot.use({...view, pixel: 1, first: model.triangleCount + model.seamCount + 1});
-      this.dots[side].shape.drawEach(this.dots[side].count);
+      this.dots[side].draw();
     }
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    return buffer;
-  }
-
-  newPickBuffer(width, height) {
-    const gl = this.gl;
-    const frame = gl.createFramebuffer(), colour = gl.createRenderbuffer(), depth = gl.createRenderbuffer();
-    gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
-    for (const [target, format, place] of [
-      [colour, gl.RGBA8, gl.COLOR_ATTACHMENT0],
-      [depth, gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT],
-    ]) {
-      gl.bindRenderbuffer(gl.RENDERBUFFER, target);
-      gl.renderbufferStorage(gl.RENDERBUFFER, format, width, height);
-      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, target);
-    }
-    return {frame, colour, depth, width, height, key: ""};
-  }
-
-  discard({frame, colour, depth}) {
-    this.gl.deleteFramebuffer(frame);
-    this.gl.deleteRenderbuffer(colour);
-    this.gl.deleteRenderbuffer(depth);
+    return target;
   }
 }

@@ -9,6 +9,10 @@ vec4 clip(vec3 p) {
   vec3 q = turn * p;
   return vec4((q.xy - pan) * zoom, -0.45 * q.z, 1.0);
 }
+vec2 quadCorner() {  // -1 or 1, of the two triangles that a line or dot is drawn as
+  int k = gl_VertexID % 6;
+  return vec2(k == 1 || k == 2 || k == 4 ? 1.0 : -1.0, k == 2 || k == 4 || k == 5 ? 1.0 : -1.0);
+}
 float nearer(float pixels) {  // clip depth of a way towards the eye that is as long as so many pixels
   return 0.9 * pixels / (zoom.y * size.y);
 }
@@ -68,6 +72,8 @@ uniform sampler2D table, picture;
 uniform vec3 paint, dark, undefinedPaint;
 uniform float cell, edges, outward, contrast;
 
+const vec3 KEY_LIGHT = vec3(-0.4478, 0.6469, 0.6170);  // over the left shoulder, as in drawings
+
 float wave(float x) { return 1.0 - abs(mod(x, 2.0) - 1.0); }
 
 // Share of light squares in the pixel: the board's mean over its footprint, so that far squares fade to grey.
@@ -93,10 +99,10 @@ void main() {
     base = mix(base, texel.rgb, texel.a);
   }
   if (board) base *= mix(dark, vec3(1.0), lightShare());
-  base = mix(base, 0.35 * base, edgeShare());
+  if (edges > 0.0) base *= 1.0 - 0.65 * edgeShare();
   if (!inPlane) {
     vec3 n = normalize(gl_FrontFacing ? facing : -facing);
-    float key = max(dot(n, normalize(vec3(-0.45, 0.65, 0.62))), 0.0);
+    float key = max(dot(n, KEY_LIGHT), 0.0);
     float light = 0.52 + 0.40 * key + 0.14 * max(n.z, 0.0) + 0.08 * n.y;
     if (gl_FrontFacing != (outward > 0.0)) light *= 0.62;
     base *= 1.0 + contrast * (light - 1.0);
@@ -124,13 +130,13 @@ void main() {
   float far = length(way);
   vec2 along = far > 1e-4 ? way / far : vec2(1.0, 0.0);
   vec2 across = vec2(-along.y, along.x);
-  bool atEnd = (gl_VertexID & 1) == 1;
-  float side = gl_VertexID < 2 ? -1.0 : 1.0;
+  bool atEnd = quadCorner().x > 0.0;
+  float side = quadCorner().y;
   vec4 here = atEnd ? b : a;
   vec2 step = (atEnd ? along : -along) * radius + across * side * radius;
   gl_Position = vec4(here.xy + step / (0.5 * size), here.z - nearer(lift), 1.0);
 #ifdef PICK
-  id = first + uint(gl_InstanceID) / sides;
+  id = first + uint(gl_VertexID / 6) / sides;
 #else
   off = vec2(atEnd ? far + radius : -radius, side * radius);
   length_ = far;
@@ -171,7 +177,7 @@ flat out float radius, positive;
 #endif
 void main() {
   float size_ = (dot_.x + 1.5) * pixel;
-  vec2 corner = vec2((gl_VertexID & 1) == 1 ? 1.0 : -1.0, gl_VertexID < 2 ? -1.0 : 1.0) * size_;
+  vec2 corner = quadCorner() * size_;
   vec4 here = clip(place);
   gl_Position = vec4(here.xy + corner / (0.5 * size), here.z - nearer(size_ + 3.0), 1.0);
 #ifdef PICK
