@@ -25,12 +25,6 @@ SEQUENTIAL_ANCHORS = (
 LOW_ANCHORS = ((31, 40, 280), (50, 34, 262), (73, 22, 250), (95, 1, 100))
 HIGH_ANCHORS = ((95, 1, 100), (74, 40, 60), (54, 58, 46), (33, 46, 40))
 
-# Tints of charts: light, so that a checkerboard and marks stay legible, and apart in lightness as well as in hue.
-CHART_TINTS = (
-    (88, 22, 250), (80, 40, 85), (84, 30, 160), (74, 34, 20), (90, 30, 110), (72, 30, 285),
-    (82, 26, 205), (78, 34, 55), (92, 12, 330), (70, 30, 140), (86, 26, 35), (76, 24, 235),
-)  # fmt: skip
-
 _WHITE = np.array([0.95047, 1.0, 1.08883])
 _FROM_XYZ = np.array(
     [
@@ -50,11 +44,6 @@ def diverging() -> NDArray[np.uint8]:
     """Return (256, 3) colours from blue over near white to red."""
     halves = (_even_steps(anchors, STEPS // 2) for anchors in (LOW_ANCHORS, HIGH_ANCHORS))
     return lab_to_srgb(np.concatenate(list(halves)))
-
-
-def chart_tints() -> NDArray[np.uint8]:
-    """Return (12, 3) light colours."""
-    return lab_to_srgb(_lab(CHART_TINTS))
 
 
 def _even_steps(anchors: ArrayLike, count: int) -> FloatArray:

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
+from ..checker import cell_side
 from ..errors import ArrayShapeError, OptionError
-from ..geometry import angle_defect, corner_angles, edge_lengths
 from ..io.uv_split import split_at_seams
 from ..mesh import TriangleMesh, end_corners, label_components
+from .quantity import conformal_distortion, missing_angles, stretch
+from .scales import Scale, page_scales
 from .thin import cross, sides, thin
 
 if TYPE_CHECKING:
@@ -27,20 +29,21 @@ class Content:
         centre, radius: where the ball lies in the model's units.
         point_vertex: (u,) the vertex of each point of the layout.
         uv: (u, 2) the points.
-        uv_area: what all triangles cover in the plane, added up.
+        uv_side: the root of the area of all triangles in the plane.
         faces: (m, 3) triangles of points.
         outline: half-edges 3 f + i on the outlines of charts, each opposite corner i of face f: the two sides of
             each seam edge, one after the other, then those of the boundary.
         seams: how many seam edges there are.
         chart: (m,) the chart of each triangle, the largest first.
         qc, area_scale: (m,) QC distortion, and scale relative to its mean; NaN where undefined.
-        curvature, flat_curvature: (v,) on the model and in the layout, in units of pi.
+        curvature, flat_curvature: (v,) of the model and of the flat metric, in units of pi; NaN on the boundary.
         cones: (c,) vertices.
         cone_curvatures: (c,) radians.
         vertex_numbers: (v,) each vertex's number in the input, or -1.
         face_numbers: (m,) each triangle's number in the result.
         outward: 1 if triangles run anticlockwise seen from outside, else -1.
         left_out: how many triangles are not shown.
+        scales: the scale of each colour map.
     """
 
     places: FloatArray
@@ -48,7 +51,7 @@ class Content:
     radius: float
     point_vertex: IntArray
     uv: FloatArray
-    uv_area: float
+    uv_side: float
     faces: IntArray
     outline: IntArray
     seams: int
@@ -63,6 +66,7 @@ class Content:
     face_numbers: IntArray
     outward: int
     left_out: int
+    scales: dict[str, Scale]
 
 
 def content_of(result: Flattening, most: int) -> Content:
@@ -86,14 +90,9 @@ def content_of(result: Flattening, most: int) -> Content:
     places, centre, radius = _into_unit_ball(result.vertices[used])
     mesh = TriangleMesh(places, vertex[split.faces])
     outline, seams = outline_halfedges(mesh, split.faces)
-    uv_areas = np.abs(cross(*sides(split.uv[split.faces]))) / 2
-    chart = _charts(split.faces, uv_areas, len(split.uv))
-    curvatures = (_curvature(mesh, places, mesh.faces), _curvature(mesh, split.uv, split.faces))
-    normals = np.cross(*sides(places[mesh.faces]))
-    area_scale = result.distortion.log_area_scale
-    known = np.isfinite(area_scale)
-    weights = np.linalg.norm(normals, axis=1)[known]
-    mean = np.average(area_scale[known], weights=weights) if weights.sum() > 0 else 0.0
+    chart = _charts(split.faces, split.uv)
+    qc, scale = conformal_distortion(result), stretch(result)
+    curvatures = [missing_angles(result, flat)[used] / np.pi for flat in (False, True)]
     cone = np.searchsorted(used, result.cones)
 
     shown, corners = np.arange(len(split.faces)), split.faces
@@ -113,13 +112,13 @@ def content_of(result: Flattening, most: int) -> Content:
         radius=radius,
         point_vertex=point_vertex.reshape(-1),
         uv=split.uv[points],
-        uv_area=float(uv_areas.sum()),
+        uv_side=cell_side(split.uv, split.faces, 1.0),
         faces=faces.reshape(-1, 3),
         outline=outline,
         seams=seams,
         chart=chart[shown],
-        qc=result.distortion.qc[shown],
-        area_scale=np.exp(area_scale[shown] - mean),
+        qc=qc.values[shown],
+        area_scale=scale.values[shown],
         curvature=curvatures[0][vertices],
         flat_curvature=curvatures[1][vertices],
         cones=np.searchsorted(vertices, cone),
@@ -128,8 +127,9 @@ def content_of(result: Flattening, most: int) -> Content:
         if result.vertex_origin is None
         else result.vertex_origin[used[vertices]],
         face_numbers=shown,
-        outward=_outward(places[mesh.faces].mean(axis=1), normals),
+        outward=_outward(places[mesh.faces]),
         left_out=len(split.faces) - len(shown),
+        scales=page_scales(qc, scale, curvatures[0]),
     )
 
 
@@ -157,21 +157,17 @@ def _into_unit_ball(vertices: FloatArray) -> tuple[FloatArray, FloatArray, float
     return centred / radius, centre, radius
 
 
-def _charts(faces: IntArray, areas: FloatArray, points: int) -> IntArray:
+def _charts(faces: IntArray, uv: FloatArray) -> IntArray:
     """Return (m,) the chart of each triangle, numbered from the one with the largest area."""
-    count, label = label_components(points, faces[:, :2].reshape(-1), np.repeat(faces[:, 2], 2))
-    chart = label[faces[:, 0]]
+    count, label = label_components(len(uv), faces[:, :2].reshape(-1), np.repeat(faces[:, 2], 2))
+    chart, areas = label[faces[:, 0]], np.abs(cross(*sides(uv[faces])))
     rank = np.full(count, -1, dtype=np.int64)
     rank[np.argsort(-np.bincount(chart, weights=areas, minlength=count), kind="stable")] = np.arange(count)
     return rank[chart]
 
 
-def _curvature(mesh: TriangleMesh, points: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (v,) the curvature at vertices, in units of pi, of triangles of the same mesh somewhere else."""
-    angles = corner_angles(edge_lengths(points, faces))
-    return angle_defect(mesh.faces, angles, mesh.is_boundary_vertex) / np.pi
-
-
-def _outward(centroids: FloatArray, normals: FloatArray) -> int:
-    """Return 1 if normals point away from the middle, by and large, else -1."""
-    return -1 if float(((centroids - centroids.mean(axis=0)) * normals).sum()) < 0 else 1
+def _outward(corners: FloatArray) -> int:
+    """Return 1 if normals point away from the middle, by and large, else -1; `corners` is (m, 3, 3)."""
+    centroids = corners.mean(axis=1)
+    away = (centroids - centroids.mean(axis=0)) * np.cross(*sides(corners))
+    return -1 if float(away.sum()) < 0 else 1

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checker import CELLS
+from ..io.texture import Texture
 from ..report import as_rows
 from .camera import fit_camera
-from .colours import chart_tints, diverging, sequential
+from .colours import diverging, sequential
 from .content import Content
 from .demo import title
-from .picture import Picture
-from .scales import scales_of
+from .layout import CHART_COLORS
 
 if TYPE_CHECKING:
     from ..result import Flattening
@@ -37,7 +38,7 @@ class Payload(NamedTuple):
 
 
 def payload_of(
-    result: Flattening, content: Content, picture: Picture | None, name: str, up: str, show: str
+    result: Flattening, content: Content, picture: Texture | None, name: str, up: str, show: str
 ) -> Payload:
     """Return the data of a page.
 
@@ -62,9 +63,10 @@ def payload_of(
         "turn": fit_camera(content.places, (1, 1), up=up).axes.tolist(),
         "uv_low": low.tolist(),
         "uv_high": high.tolist(),
-        "uv_side": float(np.sqrt(content.uv_area)) or 1.0,
-        "scales": {key: asdict(scale) for key, scale in scales_of(content).items()},
-        "picture": None if picture is None else {"name": picture.name, "type": picture.type},
+        "uv_side": content.uv_side,
+        "squares": CELLS,
+        "scales": {key: asdict(scale) for key, scale in content.scales.items()},
+        "picture": None if picture is None else picture.kind,
         "show": show,
         "arrays": listed,
     }
@@ -87,7 +89,7 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
         "cones": content.cones.astype(np.uint32),
         "sequential": sequential(),
         "diverging": diverging(),
-        "tints": chart_tints(),
+        "tints": np.array([list(bytes.fromhex(colour[1:])) for colour in CHART_COLORS], dtype=np.uint8),
     }
     if not np.array_equal(content.vertex_numbers, np.arange(len(content.places))):
         arrays["vertex_numbers"] = content.vertex_numbers.astype(np.int32)

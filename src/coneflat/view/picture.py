@@ -1,12 +1,12 @@
-"""The user's picture, as a texture."""
+"""The user's picture, for the page."""
 
 from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
 
 from ..errors import MeshFileError
+from ..io.texture import Texture
 
 MOST_BYTES = 32 * 2**20
 """A page that holds more is slow to open."""
@@ -14,16 +14,8 @@ MOST_BYTES = 32 * 2**20
 _BEGINNINGS = ((b"\x89PNG\r\n\x1a\n", "image/png"), (b"\xff\xd8\xff", "image/jpeg"), (b"GIF8", "image/gif"))
 
 
-class Picture(NamedTuple):
-    """A picture file: its name, its media type, its bytes."""
-
-    name: str
-    type: str
-    content: bytes
-
-
-def read_picture(path: str | PathLike[str]) -> Picture:
-    """Return a PNG, JPEG, GIF or WebP file; the content counts, not the ending.
+def read_picture(path: str | PathLike[str]) -> Texture:
+    """Return a PNG, JPEG, GIF or WebP file as it is: browsers read them. The content counts, not the ending.
 
     Raises:
         MeshFileError: it cannot be read, is no such picture, or is too large.
@@ -42,7 +34,6 @@ def read_picture(path: str | PathLike[str]) -> Picture:
     if kind is None:
         raise MeshFileError(f"{path} is no PNG, JPEG, GIF or WebP picture")
     if len(content) > MOST_BYTES:
-        raise MeshFileError(
-            f"the picture {path} has {len(content) / 2**20:.0f} MiB; a page takes up to {MOST_BYTES / 2**20:.0f}"
-        )
-    return Picture(path.name, kind, content)
+        size = f"{len(content) / 2**20:.0f} MiB; a page takes up to {MOST_BYTES / 2**20:.0f}"
+        raise MeshFileError(f"the picture {path} has {size}")
+    return Texture(content, kind)

@@ -148,25 +148,34 @@ def stretch(result: Flattening) -> Quantity:
 def curvature(result: Flattening, flat: bool) -> Quantity:
     """Return how much the angles around each vertex miss a full turn, on the model or in the flat metric.
 
-    That of the metric, before it is laid out: in the plane no angle is ever missing but where it was cut. Vertices of
-    the boundary have none. Cones, which keep their curvature, do not count in percentiles.
+    Cones, which keep their curvature, do not count in percentiles.
+    """
+    values = missing_angles(result, flat)
+    counts = np.isfinite(values).astype(np.float64)
+    if flat:
+        counts[result.cones] = 0.0
+    ticks = tuple((10.0**k, f"$10^{{{k}}}$") for k in (-15, -10, -5, 0))
+    scale = ColorScale(1e-16, 1.0, "YlGnBu", True, ticks)
+    label = "|K| after, cones aside" if flat else "|K| before"
+    return Quantity(label, np.abs(values), counts, scale, ".1e", result.faces)
+
+
+def missing_angles(result: Flattening, flat: bool) -> FloatArray:
+    """Return (n,) by how much the angles around each vertex miss a full turn, radians; NaN on the boundary.
+
+    flat: those of the metric, before it is laid out: in the plane no angle is ever missing but where it was cut.
     """
     mesh = TriangleMesh(result.vertices, result.faces)
     inside = np.zeros(len(mesh.vertices), dtype=bool)
     inside[mesh.faces] = True
     inside &= ~mesh.is_boundary_vertex
-    counts = inside.astype(np.float64)
     if flat:
         values = -result.curvature_residual
         values[result.cones] += result.curvatures
-        counts[result.cones] = 0.0
     else:
         angles = corner_angles(edge_lengths(mesh.vertices, mesh.faces))
         values = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
-    ticks = tuple((10.0**k, f"$10^{{{k}}}$") for k in (-15, -10, -5, 0))
-    scale = ColorScale(1e-16, 1.0, "YlGnBu", True, ticks)
-    label = "|K| after, cones aside" if flat else "|K| before"
-    return Quantity(label, np.where(inside, np.abs(values), np.nan), counts, scale, ".1e", mesh.faces)
+    return np.where(inside, values, np.nan)
 
 
 def qc_top(qc: FloatArray, weights: FloatArray) -> float:

@@ -1,4 +1,4 @@
-"""Scales of the colour maps: from which value to which, in what steps."""
+"""Scales of the page's colour maps: from which value to which, in what steps."""
 
 from __future__ import annotations
 
@@ -7,17 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .._arrays import FloatArray
-from .content import Content
-from .quantity import qc_top
-
-FACTORS = (1.1, 1.25, 1.5, 2.0, 3.0, 4.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)
-"""Where a scale of factors may end."""
-
-WITHIN = 98.0
-"""Percent of the area scales that lie within the ends of their scale."""
+from .quantity import Quantity
 
 DECADES = 4
 """Of the curvatures that have colours of their own, to either side of zero."""
+
+EXTREME = 99.9
+"""Percent of the curvatures that lie within the ends of their scale."""
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -48,46 +44,39 @@ class Scale:
             amount = np.maximum(np.abs(values), self.low)
             place = 0.5 + np.sign(values) * 0.5 * np.log(amount / self.low) / np.log(self.high / self.low)
         elif self.kind == "log":
-            place = np.log(np.maximum(values, 1e-300) / self.low) / np.log(self.high / self.low)
+            place = np.log(np.maximum(values, self.low) / self.low) / np.log(self.high / self.low)
         else:
             place = (values - self.low) / (self.high - self.low)
         return np.clip(place, 0.0, 1.0)
 
 
-def scales_of(content: Content) -> dict[str, Scale]:
-    """Return the scale of each colour map of a page."""
-    curvature = _curvature_scale(np.abs(content.curvature))
+def page_scales(qc: Quantity, stretch: Quantity, curvature: FloatArray) -> dict[str, Scale]:
+    """Return the scale of each colour map of a page.
+
+    curvature: on the model, in units of pi.
+    """
+    before = _curvature_scale(curvature)
     return {
-        "qc": _qc_scale(content.qc),
-        "area": _area_scale(content.area_scale),
-        "curvature": curvature,
-        "flat": replace(curvature, title="Curvature left in the layout, in π"),
+        "qc": _as_in_figures(qc, "QC distortion", "sequential"),
+        "area": _as_in_figures(stretch, "Scale, against its mean", "diverging"),
+        "curvature": before,
+        "flat": replace(before, title="Curvature of the flat metric, in π"),
     }
 
 
-def _qc_scale(qc: FloatArray) -> Scale:
-    top = qc_top(qc, np.ones(len(qc)))
-    places = np.linspace(0, 1, 6)
-    ticks = tuple((place, f"{1 + place * (top - 1):.2f}") for place in places.tolist())
-    return Scale("QC distortion", "linear", 1.0, top, "sequential", ticks)
+def _as_in_figures(quantity: Quantity, title: str, table: str) -> Scale:
+    scale = quantity.scale
+    places = scale.position(np.array([value for value, _ in scale.ticks]))
+    ticks = zip(places.tolist(), (label for _, label in scale.ticks), strict=True)
+    return Scale(title, "log" if scale.log else "linear", scale.low, scale.high, table, tuple(ticks))
 
 
-def _area_scale(factor: FloatArray) -> Scale:
-    known = np.abs(np.log(factor[np.isfinite(factor) & (factor > 0)]))
-    spread = float(np.exp(np.percentile(known, WITHIN))) if len(known) else 1.0
-    end = next((each for each in FACTORS if each >= spread), FACTORS[-1])
-    middle = float(np.sqrt(end))
-    labels = (f"×{1 / end:.2g}", f"×{1 / middle:.2g}", "×1", f"×{middle:.3g}", f"×{end:.3g}")
-    ticks = tuple((place, label) for place, label in zip((0.0, 0.25, 0.5, 0.75, 1.0), labels, strict=True))
-    return Scale("Scale against its mean", "log", 1 / end, end, "diverging", ticks)
-
-
-def _curvature_scale(amounts: FloatArray) -> Scale:
-    known = amounts[np.isfinite(amounts) & (amounts > 0)]
-    largest = float(np.percentile(known, 99.9)) if len(known) else 1.0
+def _curvature_scale(curvature: FloatArray) -> Scale:
+    amounts = np.abs(curvature[np.isfinite(curvature) & (curvature != 0)])
+    largest = float(np.percentile(amounts, EXTREME)) if len(amounts) else 1.0
     top = int(np.clip(np.ceil(np.log10(largest)), -12, 1))
     powers = [f"10{str(power).translate(_SUPERSCRIPTS)}" if power else "1" for power in (top, top - 2)]
     labels = (f"−{powers[0]}", f"−{powers[1]}", "0", powers[1], powers[0])
-    ticks = tuple((place, label) for place, label in zip((0.0, 0.25, 0.5, 0.75, 1.0), labels, strict=True))
+    ticks = tuple(zip((0.0, 0.25, 0.5, 0.75, 1.0), labels, strict=True))
     low, high = 10.0 ** (top - DECADES), 10.0**top
-    return Scale("Curvature on the model, in π", "signed log", low, high, "diverging", ticks)
+    return Scale("Curvature of the model, in π", "signed log", low, high, "diverging", ticks)

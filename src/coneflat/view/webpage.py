@@ -13,8 +13,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import OptionError, UnknownFormatError
-from ..io.atomic import atomic_write, check_target
+from ..errors import OptionError
+from ..io.atomic import atomic_write, check_target, known_ending
 from .content import content_of
 from .payload import payload_of
 from .picture import read_picture
@@ -88,9 +88,7 @@ def check_page(path: str | PathLike[str]) -> Path:
         MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
     """
     path = Path(path)
-    if path.suffix.lower() not in ENDINGS:
-        ending = f"ends with {path.suffix!r}" if path.suffix else "has no ending"
-        raise UnknownFormatError(f"{path} {ending}; pages are written as {', '.join(ENDINGS)}")
+    known_ending(path, ENDINGS, "pages are written as")
     check_target(path)
     return path
 

@@ -82,10 +82,21 @@ function cornerValues(model, show) {
     const tints = model.arrays.tints.length / 3;
     for (let c = 0; c < out.length; c++) out[c] = ((chart[(c / 3) | 0] % tints) + 0.5) / tints;
   } else if (model.head.scales[show]) {
-    const values = model.tones(show), byFace = show === "qc" || show === "area";
-    for (let c = 0; c < out.length; c++) out[c] = values[byFace ? (c / 3) | 0 : point_vertex[faces[c]]];
+    const tones = model.tones(show), byFace = show === "qc" || show === "area";
+    for (let c = 0; c < out.length; c++) out[c] = tones[byFace ? (c / 3) | 0 : point_vertex[faces[c]]];
+    if (!byFace) fillUndefined(out);
   }
   return out;
+}
+
+/** Give corners without a tone the mean of the others of their triangle, if there are any. */
+function fillUndefined(tones) {
+  for (let c = 0; c < tones.length; c += 3) {
+    if (Math.min(tones[c], tones[c + 1], tones[c + 2]) >= 0) continue;
+    const three = tones.subarray(c, c + 3), known = three.filter((tone) => tone >= 0);
+    const mean = known.length ? known.reduce((sum, tone) => sum + tone, 0) / known.length : -1;
+    for (let k = 0; k < 3; k++) if (three[k] < 0) three[k] = mean;
+  }
 }
 
 const QUAD = 6; // vertices of the two triangles that a line or a dot is drawn as

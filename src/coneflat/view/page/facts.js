@@ -4,6 +4,7 @@ const SIGNS = ["−", "", "+"];
 
 /** Return a number with its sign, in few digits: "+0.500", "−1.2e-4". */
 function signed(value, digits = 3) {
+  if (!Number.isFinite(value)) return "undefined";
   const amount = Math.abs(value);
   const text = amount !== 0 && (amount < 1e-3 || amount >= 1e4) ? amount.toExponential(1) : amount.toFixed(digits);
   return SIGNS[Math.sign(value) + 1] + text;
@@ -30,7 +31,7 @@ function triangleFacts(model, index, show) {
   const facts = [`Triangle ${grouped(model.triangleNumber(index))}`];
   if (show === "curvature" || show === "flat") {
     const values = model.arrays[show];
-    facts.push(`curvature at its corners ${vertices.map((v) => `${signed(values[v])} π`).join(", ")}`);
+    facts.push(`curvature at its corners ${vertices.map((v) => signed(values[v])).join(", ")}, in π`);
   } else {
     facts.push(`QC ${measured(qc[index])}`, `scale ${measured(area[index], "×", 3)}`);
   }
@@ -68,6 +69,6 @@ function placeOfThing(model, thing, show) {
   const perFace = show === "qc" || show === "area";
   const corners = [0, 1, 2].map((k) => model.vertexAt(3 * thing.index + k));
   const chosen = perFace ? [values[thing.index]] : corners.map((v) => values[v]);
-  const places = placesOnScale(scale, chosen);
-  return places[0] < 0 ? null : places.reduce((sum, place) => sum + place, 0) / places.length;
+  const places = placesOnScale(scale, chosen).filter((place) => place >= 0);
+  return places.length ? places.reduce((sum, place) => sum + place, 0) / places.length : null;
 }

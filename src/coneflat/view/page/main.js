@@ -38,7 +38,7 @@ class Viewer {
   constructor(model, picture) {
     this.model = model;
     this.state = new State({
-      show: model.head.show, squares: 36, seams: true, cones: true, edges: false, report: false,
+      show: model.head.show, squares: model.head.squares, seams: true, cones: true, edges: false, report: false,
       dark: matchMedia("(prefers-color-scheme: dark)").matches, hovered: null, picked: null,
     });
     this.panes = [
@@ -244,7 +244,7 @@ async function startFromPage() {
     const arrays = document.getElementById("arrays");
     const model = await unpackModel(head, arrays.textContent.trim());
     arrays.remove();
-    const picture = head.picture ? await pictureOf(new Blob([model.arrays.picture], {type: head.picture.type})) : null;
+    const picture = head.picture ? await pictureOf(new Blob([model.arrays.picture], {type: head.picture})) : null;
     window.coneflat = new Viewer(model, picture);
     document.documentElement.dataset.ready = String(Math.round(performance.now()));
   } catch (error) {

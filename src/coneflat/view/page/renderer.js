@@ -134,7 +134,7 @@ class Renderer {
       table: 0,
       picture: 1,
       paint: show === "checker" ? [0.97, 0.97, 0.98] : colours.paint,
-      dark: show === "charts" ? [0.72, 0.72, 0.74] : DARK_CELL,
+      dark: show === "charts" ? [0.76, 0.76, 0.78] : DARK_CELL,
       undefinedPaint: colours.undefined,
       cell: this.model.head.uv_side / state.get("squares"),
       edges: state.get("edges") ? 0.9 : 0,
