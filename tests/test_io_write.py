@@ -1,93 +1,26 @@
-"""Writing flattened meshes, and that a file is written in full or not at all."""
+"""Writing flattened meshes."""
 
 from __future__ import annotations
 
 import json
-import os
 import struct
 import sys
-from dataclasses import fields
 from io import BytesIO
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import shapes
+from bars import OBJ, POINTS, cut_bar, flattening, read_bar
 
 import coneflat
 from coneflat.checker import DARK_CELL, LIGHT_CELL
-from coneflat.errors import ConeflatError, MeshFileError, OptionError, UnknownFormatError
-from coneflat.io import OUTPUT_FORMATS, atomic_write, check_output, read_mesh, triangulate, write_flattening
-
-OBJ = b"""\
-# a bar of two cells \xe9
-mtllib bar.mtl more/paint.mtl
-o bar
-v 0 0 0 1 0 0
-v 1 0 0 1 0 0
-v 2 0 0.30000000000000004 1 0 0
-v 0 1 0 0 1 0
-v 1 1 0 0 1 0
-v 2 1 1e-17 0 1 0
-v 7 7 7
-vt 0.5 0.5
-vn 0 0 1
-g left
-usemtl red
-f 1/1/1 2/1/1 5/1/1 4/1/1
-s off
-l 1/1 2/1
-g right
-f -6//-1 -5//-1 -2//-1 # the triangle
-# between
-f 2/1 6 5
-# the end"""
-
-POINTS = np.array(
-    [[0, 0, 0], [1, 0, 0], [2, 0, 0.1 + 0.2], [0, 1, 0], [1, 1, 0], [2, 1, 1e-17], [7, 7, 7]], dtype=float
-)
-
-
-def flattening(vertices, faces, uv, uv_faces, source=None, face_corners=None, origin=None):
-    return SimpleNamespace(
-        vertices=np.asarray(vertices, dtype=float),
-        faces=np.asarray(faces),
-        uv=np.asarray(uv, dtype=float),
-        uv_faces=np.asarray(uv_faces),
-        uv_scale=0.25,
-        cones=np.array([1]),
-        curvatures=np.array([np.pi / 2]),
-        log_scale=np.linspace(0, 1, len(vertices)),
-        curvature_residual=np.zeros(len(vertices)),
-        seams=np.array([[1, 4]]),
-        vertex_origin=np.arange(len(vertices)) if origin is None else np.asarray(origin),
-        face_origin=None,
-        face_corners=face_corners,
-        distortion=SimpleNamespace(qc=np.ones(len(faces)), log_area_scale=np.zeros(len(faces))),
-        source=source,
-        report=lambda: {"faces": len(faces), "note": "größer"},
-    )
-
-
-def cut_bar(source, keep=slice(None), flip=()):
-    """Return a result whose layout is x and y, with a seam along the edge 1-4 between the cells."""
-    faces, face_corners = triangulate(source.vertices, source.corners, source.offsets)
-    right = np.array([False, False, *[True] * (len(faces) - 2)])[:, None]
-    uv = np.concatenate((source.vertices[:, :2] / 3, source.vertices[[1, 4], :2] / 3 + [0.3, 0]))
-    shifted = {1: 7, 4: 8}
-    uv_faces = np.where(right, np.vectorize(lambda v: shifted.get(v, v))(faces), faces)
-    for t in flip:
-        for rows in (faces, uv_faces, face_corners):
-            rows[t] = rows[t, ::-1]
-    return flattening(source.vertices, faces[keep], uv, uv_faces[keep], source, face_corners[keep])
+from coneflat.errors import MeshFileError, OptionError
+from coneflat.io import read_mesh, triangulate, write_flattening
 
 
 @pytest.fixture
 def bar(tmp_path):
-    (tmp_path / "in").mkdir()
-    path = tmp_path / "in" / "bar.obj"
-    path.write_bytes(OBJ)
-    return read_mesh(path)
+    return read_bar(tmp_path)
 
 
 def lines_of(path):
@@ -361,139 +294,3 @@ class TestSplitFormats:
             for name in names:
                 np.testing.assert_array_equal(arrays[name], getattr(result, name))
             assert json.loads(str(arrays["report"])) == result.report()
-
-
-@pytest.fixture(scope="module")
-def result():
-    return coneflat.flatten(*shapes.hill(), quantum=np.pi / 2)
-
-
-class TestReadingResults:
-    def test_a_result_comes_back(self, result, tmp_path):
-        again = coneflat.read_flattening(result.save(tmp_path / "out.npz"))
-        for field in fields(result):
-            one, other = getattr(result, field.name), getattr(again, field.name)
-            if isinstance(one, np.ndarray):
-                np.testing.assert_array_equal(one, other)
-        np.testing.assert_array_equal(again.distortion.qc, result.distortion.qc)
-        assert again.report() == result.report()
-
-    @pytest.mark.parametrize(
-        ("name", "value", "message"),
-        [
-            ("uv", None, "holds no UVs: 'uv' is missing"),
-            ("seams", None, "holds no result of coneflat: 'seams' is missing"),
-            ("uv", np.zeros((4, 3)), r"'uv' has the shape \(4, 3\)"),
-            ("uv_faces", np.array([[0, 1, 10**6]]), "'uv_faces' has indices beyond the"),
-            ("cones", np.zeros(9, dtype=int), "; 9 cones"),
-            ("vertices", "nan", "not finite"),
-            ("report", np.array("{}"), "not a readable NPZ file"),
-            ("report", np.array("[1"), "not a readable NPZ file"),
-        ],
-    )
-    def test_what_is_no_result(self, result, tmp_path, name, value, message):
-        with np.load(result.save(tmp_path / "out.npz")) as archive:
-            arrays = dict(archive)
-        if value is None:
-            del arrays[name]
-        elif isinstance(value, str):
-            arrays[name] = np.full_like(arrays[name], value)
-        else:
-            arrays[name] = value
-        np.savez(tmp_path / "bad.npz", **arrays)
-        with pytest.raises(MeshFileError, match=message) as caught:
-            coneflat.read_flattening(tmp_path / "bad.npz")
-        assert "\n" not in str(caught.value)
-
-    @pytest.mark.parametrize("content", [b"PK\x03\x04 broken", b"no archive", b""])
-    def test_damaged_files(self, tmp_path, content):
-        (tmp_path / "bad.npz").write_bytes(content)
-        with pytest.raises(ConeflatError, match=r"bad\.npz"):
-            coneflat.read_flattening(tmp_path / "bad.npz")
-        with pytest.raises(MeshFileError, match="no such file"):
-            coneflat.read_flattening(tmp_path / "none.npz")
-
-
-class TestTargets:
-    @pytest.mark.parametrize("ending", OUTPUT_FORMATS)
-    def test_missing_folder(self, bar, tmp_path, ending):
-        with pytest.raises(MeshFileError, match=r"there is no folder .*create it first"):
-            write_flattening(cut_bar(bar), tmp_path / "none" / ("x" + ending))
-        assert not (tmp_path / "none").exists()
-
-    @pytest.mark.parametrize("name", ["x.stl", "x", "x.png"])
-    def test_unknown_ending(self, bar, tmp_path, name):
-        with pytest.raises(UnknownFormatError, match=r"\.obj, \.ply, \.glb, \.npz"):
-            write_flattening(cut_bar(bar), tmp_path / name)
-        assert not (tmp_path / name).exists()
-
-    def test_folder_in_the_way(self, bar, tmp_path):
-        (tmp_path / "x.obj").mkdir()
-        with pytest.raises(MeshFileError, match="it is a folder"):
-            write_flattening(cut_bar(bar), tmp_path / "x.obj")
-        (tmp_path / "file").write_text("")
-        with pytest.raises(MeshFileError, match="no folder"):
-            check_output(tmp_path / "file" / "x.obj")
-
-    @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
-    def test_no_permission(self, bar, tmp_path):
-        (tmp_path / "x.obj").write_text("old")
-        (tmp_path / "x.obj").chmod(0o444)
-        with pytest.raises(MeshFileError, match="permission"):
-            write_flattening(cut_bar(bar), tmp_path / "x.obj")
-        (tmp_path / "in").chmod(0o555)
-        with pytest.raises(MeshFileError, match="permission"):
-            write_flattening(cut_bar(bar), tmp_path / "in" / "x.obj")
-
-    @pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError, OSError, MeshFileError])
-    def test_interruption_leaves_the_old_file(self, tmp_path, error):
-        path = tmp_path / "report.json"
-        path.write_text("old")
-        expected = MeshFileError if error is OSError else error
-
-        def interrupted():
-            with atomic_write(path, "w") as stream:
-                stream.write("new")
-                stream.flush()
-                assert len(list(tmp_path.iterdir())) == 2
-                raise error("stop")
-
-        with pytest.raises(expected, match="stop"):
-            interrupted()
-        assert [p.name for p in tmp_path.iterdir()] == ["report.json"]
-        assert path.read_text() == "old"
-
-    @pytest.mark.parametrize("ending", OUTPUT_FORMATS)
-    def test_interrupted_writer_leaves_nothing(self, bar, tmp_path, ending):
-        result = cut_bar(bar)
-        (tmp_path / "out").mkdir()
-
-        class Interrupting:
-            def __getattr__(self, name):
-                if name in ("uv", "uv_faces"):
-                    raise KeyboardInterrupt
-                return getattr(result, name)
-
-        with pytest.raises(KeyboardInterrupt):
-            write_flattening(Interrupting(), tmp_path / "out" / ("x" + ending))
-        assert list((tmp_path / "out").iterdir()) == []
-
-    def test_text_is_utf8_with_its_own_newlines(self, tmp_path):
-        with atomic_write(tmp_path / "t.txt", "w") as stream:
-            stream.write("größer\n")
-        assert (tmp_path / "t.txt").read_bytes() == "größer\n".encode()
-
-    @pytest.mark.skipif(os.name != "posix", reason="links and modes of POSIX")
-    def test_links_and_modes_are_respected(self, tmp_path):
-        (tmp_path / "real").mkdir()
-        target = tmp_path / "real" / "t.bin"
-        target.write_bytes(b"old")
-        target.chmod(0o640)
-        (tmp_path / "link.bin").symlink_to(target)
-        with atomic_write(tmp_path / "link.bin") as stream:
-            stream.write(b"new")
-        assert (tmp_path / "link.bin").is_symlink()
-        assert target.read_bytes() == b"new"
-        assert target.stat().st_mode & 0o777 == 0o640
-        with pytest.raises(MeshFileError, match="not an ordinary file"), atomic_write("/dev/null"):
-            pass

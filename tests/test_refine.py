@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapes
+from scaled import noisy, with_cones, with_scale
 
 from coneflat import TriangleMesh, check_mesh, cut_open, edge_lengths, errors, find_seams, mollify, read_mesh
 from coneflat.conformal.exact import exact_metric
@@ -21,34 +22,6 @@ TETRAHEDRON = (
     np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]]),
     np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]),
 )
-
-
-def noisy(shape, amount, seed=0):
-    vertices, faces = shape
-    return vertices + amount * np.random.default_rng(seed).normal(size=vertices.shape), faces
-
-
-def with_scale(shape, spread, seed=0):
-    """A mesh, and its metric with a random log scale: the larger its spread, the more flips."""
-    mesh = TriangleMesh(*shape)
-    n = len(mesh.vertices)
-    phi = spread * np.random.default_rng(seed).normal(size=n)
-    lengths = edge_lengths(mesh.vertices, mesh.faces)
-    everywhere = np.ones(n, dtype=bool)
-    return mesh, exact_metric(
-        mesh, lengths, np.zeros(n), fixed=everywhere, fixed_log_scale=phi, delaunay=False
-    )
-
-
-def with_cones(shape, count=6, seed=0, **options):
-    """A mesh with its cones, all of one curvature, and the metric."""
-    mesh = TriangleMesh(*shape)
-    inside = np.flatnonzero(~mesh.is_boundary_vertex)
-    cones = np.random.default_rng(seed).choice(inside, count, replace=False)
-    target = np.zeros(len(mesh.vertices))
-    target[cones] = 2 * np.pi * mesh.euler_characteristic / count
-    lengths = edge_lengths(mesh.vertices, mesh.faces)
-    return mesh, cones, exact_metric(mesh, lengths, target, **{"delaunay": False, **options})
 
 
 def areas(vertices, faces):

@@ -21,8 +21,8 @@ from coneflat.mesh import end_corners
 from coneflat.view import colours
 from coneflat.view.content import content_of, outline_halfedges
 from coneflat.view.picture import read_picture
+from coneflat.view.quantity import ColorScale
 from coneflat.view.raster import rasterise
-from coneflat.view.scales import Scale
 from coneflat.view.webpage import MOST_IN_NOTEBOOK, SHOWS, notebook_html, open_page, page_of
 
 TYPES = {"f4": "<f4", "u4": "<u4", "i4": "<i4", "u2": "<u2", "u1": "u1"}
@@ -152,9 +152,9 @@ class TestPictures:
             assert read_picture(tmp_path / name) == (content, kind)
 
     def test_what_is_none(self, tmp_path):
-        with pytest.raises(MeshFileError, match="there is no such picture"):
+        with pytest.raises(MeshFileError, match="there is no such file"):
             read_picture(tmp_path / "none.png")
-        with pytest.raises(MeshFileError, match="cannot be read"):
+        with pytest.raises(MeshFileError, match="is a folder, not a file"):
             read_picture(tmp_path)
         (tmp_path / "text.png").write_text("no picture")
         with pytest.raises(MeshFileError, match=r"text\.png is no PNG, JPEG, GIF or WebP picture"):
@@ -292,26 +292,29 @@ class TestColours:
 
 class TestScales:
     def test_places_on_each_kind(self):
-        linear = Scale("", "linear", 1.0, 3.0, "sequential", ())
-        assert linear.place(np.array([0.5, 1, 2, 3, 9])) == pytest.approx([0, 0, 0.5, 1, 1])
-        log = Scale("", "log", 0.25, 4.0, "diverging", ())
-        assert log.place(np.array([0.25, 0.5, 1, 2, 4, 99])) == pytest.approx([0, 0.25, 0.5, 0.75, 1, 1])
-        both = Scale("", "signed log", 1e-4, 1.0, "diverging", ())
+        linear = ColorScale(1.0, 3.0, "sequential", "linear", ())
+        assert linear.position(np.array([0.5, 1, 2, 3, 9])) == pytest.approx([0, 0, 0.5, 1, 1])
+        log = ColorScale(0.25, 4.0, "diverging", "log", ())
+        assert log.position(np.array([0.25, 0.5, 1, 2, 4, 99])) == pytest.approx([0, 0.25, 0.5, 0.75, 1, 1])
+        both = ColorScale(1e-4, 1.0, "diverging", "signed log", ())
         values = np.array([-9, -1, -1e-2, -1e-4, 0, 1e-9, 1e-2, 1])
-        assert both.place(values) == pytest.approx([0, 0, 0.25, 0.5, 0.5, 0.5, 0.75, 1])
-        assert np.isnan(both.place(np.array([np.nan])))[0]
+        assert both.position(values) == pytest.approx([0, 0, 0.25, 0.5, 0.5, 0.5, 0.75, 1])
+        assert np.isnan(both.position(np.array([np.nan])))[0]
 
     def test_ticks_say_what_lies_there(self, result):
         scales = content_of(result, 10**6).scales
-        assert set(scales) < set(SHOWS)
+        in_page = unpack(page_of(result))[0]["scales"]
+        assert set(scales) == set(in_page) < set(SHOWS)
         for name in ("qc", "area"):
-            for place, label in scales[name].ticks:
-                assert scales[name].place(np.array([float(label)]))[0] == pytest.approx(place, abs=0.02)
+            for place, label in in_page[name]["ticks"]:
+                assert scales[name].position(np.array([float(label)]))[0] == pytest.approx(place, abs=0.02)
         plain = str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")
-        for place, label in scales["flat"].ticks:
+        places = [place for place, _ in in_page["flat"]["ticks"]]
+        assert places == pytest.approx([0, 0.25, 0.5, 0.75, 1])
+        for place, label in in_page["flat"]["ticks"]:
             sign, _, power = label.translate(plain).rpartition("10")
             value = float(f"{sign}1e{power}") if "10" in label else float(label.translate(plain))
-            assert scales["flat"].place(np.array([value]))[0] == pytest.approx(place)
+            assert scales["flat"].position(np.array([value]))[0] == pytest.approx(place)
 
 
 class TestFiles:
@@ -342,7 +345,7 @@ class TestFiles:
             result.view(tmp_path / "out.png")
         with pytest.raises(MeshFileError, match="there is no folder"):
             result.view(tmp_path / "none" / "out.html")
-        with pytest.raises(MeshFileError, match="there is no such picture"):
+        with pytest.raises(MeshFileError, match="there is no such file"):
             result.view(tmp_path / "out.html", texture=tmp_path / "none.jpg")
         assert list(tmp_path.iterdir()) == []
 
@@ -381,7 +384,7 @@ class TestCommand:
             np.savez(tmp_path / "bare.npz", **{k: v for k, v in archive.items() if k != "uv"})
         for arguments, message in (
             (("bare.npz",), "holds no UVs"),
-            ((saved, "--texture", "none.png"), "none.png: there is no such picture"),
+            ((saved, "--texture", "none.png"), "none.png: there is no such file"),
             ((saved, "--show", "heat"), "'heat' is not one of"),
             ((saved, "-o", "page.pdf"), "ends with '.pdf'"),
             ((saved, "--most-triangles", "9"), "too many for a page of 9"),

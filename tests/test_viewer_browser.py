@@ -147,7 +147,7 @@ def test_the_browser_has_the_numbers_of_the_result(visit, result):
     values = {"qc": content.qc, "area": content.area_scale, "curvature": content.curvature}
     for name, scale in content.scales.items():
         there = np.array(visit.run(f"Array.from(coneflat.model.tones('{name}'))"))
-        expected = np.nan_to_num(scale.place(values.get(name, content.flat_curvature)), nan=-1)
+        expected = np.nan_to_num(scale.position(values.get(name, content.flat_curvature)), nan=-1)
         np.testing.assert_allclose(there, expected, atol=1e-5)
 
 

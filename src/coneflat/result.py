@@ -13,6 +13,7 @@ from .distortion import Distortion
 from .figures import SolveFigures
 from .io.model import MeshFile
 from .rotations import Rotations
+from .text import plural
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +142,6 @@ class Flattening:
 
     def __repr__(self) -> str:
         return (
-            f"<Flattening: {len(self.faces)} triangles, {len(self.cones)} cones, "
-            f"{self.distortion.charts} charts, QC {self.distortion.qc_mean:.4f}>"
+            f"<Flattening: {plural(len(self.faces), 'triangle')}, {plural(len(self.cones), 'cone')}, "
+            f"{plural(self.distortion.charts, 'chart')}, QC {self.distortion.qc_mean:.4f}>"
         )

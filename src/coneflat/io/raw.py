@@ -47,9 +47,9 @@ def read_bytes(path: Path) -> bytes:
     except FileNotFoundError as error:
         raise MeshFileError(f"{path}: there is no such file") from error
     except IsADirectoryError as error:
-        raise MeshFileError(f"{path} is a folder, not a mesh file") from error
+        raise MeshFileError(f"{path} is a folder, not a file") from error
     except PermissionError as error:
-        reason = "is a folder, not a mesh file" if os.path.isdir(path) else "may not be read (no permission)"
+        reason = "is a folder, not a file" if os.path.isdir(path) else "may not be read (no permission)"
         raise MeshFileError(f"{path} {reason}") from error
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)

@@ -12,8 +12,8 @@ from ..checker import cell_side
 from ..errors import ArrayShapeError, OptionError
 from ..io.uv_split import split_at_seams
 from ..mesh import TriangleMesh, end_corners, label_components
-from .quantity import conformal_distortion, missing_angles, stretch
-from .scales import Scale, page_scales
+from .quantity import ColorScale, conformal_distortion, missing_angles, stretch
+from .scales import page_scales
 from .thin import cross, sides, thin
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Content:
     face_numbers: IntArray
     outward: int
     left_out: int
-    scales: dict[str, Scale]
+    scales: dict[str, ColorScale]
 
 
 def content_of(result: Flattening, most: int) -> Content:

@@ -6,7 +6,7 @@ import base64
 import json
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from .colours import diverging, sequential
 from .content import Content
 from .demo import title
 from .layout import CHART_COLORS
+from .scales import as_plain
 
 if TYPE_CHECKING:
     from ..result import Flattening
@@ -65,7 +66,7 @@ def payload_of(
         "uv_high": high.tolist(),
         "uv_side": content.uv_side,
         "squares": CELLS,
-        "scales": {key: asdict(scale) for key, scale in content.scales.items()},
+        "scales": {key: as_plain(key, scale) for key, scale in content.scales.items()},
         "picture": None if picture is None else picture.kind,
         "show": show,
         "arrays": listed,

@@ -6,6 +6,7 @@ from os import PathLike
 from pathlib import Path
 
 from ..errors import MeshFileError
+from ..io.raw import read_bytes
 from ..io.texture import Texture
 
 MOST_BYTES = 32 * 2**20
@@ -21,13 +22,7 @@ def read_picture(path: str | PathLike[str]) -> Texture:
         MeshFileError: it cannot be read, is no such picture, or is too large.
     """
     path = Path(path)
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError as error:
-        raise MeshFileError(f"{path}: there is no such picture") from error
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise MeshFileError(f"the picture {path} cannot be read: {reason}") from error
+    content = read_bytes(path)
     kind = next((kind for beginning, kind in _BEGINNINGS if content.startswith(beginning)), None)
     if content[:4] == b"RIFF" and content[8:12] == b"WEBP":
         kind = "image/webp"

@@ -33,25 +33,31 @@ ROUND_FACTORS = (1.0, 1.01, 1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 100.
 
 @dataclass(frozen=True)
 class ColorScale:
-    """A map from numbers to colours, even in them or in their logarithms.
+    """A map from numbers to colours.
 
     Attributes:
-        low, high: what the first and the last colour stand for; beyond them nothing changes.
-        colors: name of a colour map of matplotlib.
-        log: whether equal factors, not equal differences, are equal steps.
+        low, high: what the first and the last colour stand for; beyond them nothing changes. Of a signed logarithm,
+            the smallest and the largest amount.
+        colors: name of a colour map of matplotlib; in a page, "sequential" or "diverging".
+        kind: "linear"; "log", where equal factors are equal steps; "signed log", which is so to both sides of a
+            middle where less than `low` is zero.
         ticks: numbers to be marked, and what to write there.
     """
 
     low: float
     high: float
     colors: str
-    log: bool
+    kind: str
     ticks: tuple[tuple[float, str], ...]
 
     def position(self, values: FloatArray) -> FloatArray:
-        """Return where numbers are on the scale, 0 at its low end and 1 at its high one."""
-        low, high, values = self.low, self.high, np.clip(values, self.low, self.high)
-        if self.log:
+        """Return where numbers are on the scale, 0 at its low end and 1 at its high one; NaN of NaN."""
+        low, high = self.low, self.high
+        if self.kind == "signed log":
+            amount = np.clip(np.abs(values), low, high)
+            return np.asarray(0.5 + np.sign(values) * 0.5 * np.log(amount / low) / np.log(high / low))
+        values = np.clip(values, low, high)
+        if self.kind == "log":
             low, high, values = np.log(low), np.log(high), np.log(values)
         return np.asarray((values - low) / (high - low))
 
@@ -69,7 +75,9 @@ class ColorScale:
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import LogNorm, Normalize
 
-        return ScalarMappable((LogNorm if self.log else Normalize)(self.low, self.high), self.colors)
+        return ScalarMappable(
+            (LogNorm if self.kind == "log" else Normalize)(self.low, self.high), self.colors
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +136,7 @@ def conformal_distortion(result: Flattening) -> Quantity:
     qc, areas = result.distortion.qc, _areas(result)
     top = qc_top(qc, areas)
     ticks = [(float(x), f"{x:.4g}") for x in np.linspace(1.0, top, 3)]
-    scale = ColorScale(1.0, top, "viridis_r", False, tuple(ticks))
+    scale = ColorScale(1.0, top, "viridis_r", "linear", tuple(ticks))
     return Quantity("QC distortion", qc, areas, scale, ".3f")
 
 
@@ -142,7 +150,7 @@ def stretch(result: Flattening) -> Quantity:
     reached = max(float(np.exp(extreme)), LEAST_STRETCH) * (1 - 1e-9)
     top = next((each for each in ROUND_FACTORS if each >= reached), reached)
     ticks = ((1 / top, f"{1 / top:.3g}"), (1.0, "1"), (top, f"{top:.3g}"))
-    return Quantity("Scale", factor, areas, ColorScale(1 / top, top, "PuOr_r", True, ticks), ".3f")
+    return Quantity("Scale", factor, areas, ColorScale(1 / top, top, "PuOr_r", "log", ticks), ".3f")
 
 
 def curvature(result: Flattening, flat: bool) -> Quantity:
@@ -155,7 +163,7 @@ def curvature(result: Flattening, flat: bool) -> Quantity:
     if flat:
         counts[result.cones] = 0.0
     ticks = tuple((10.0**k, f"$10^{{{k}}}$") for k in (-15, -10, -5, 0))
-    scale = ColorScale(1e-16, 1.0, "YlGnBu", True, ticks)
+    scale = ColorScale(1e-16, 1.0, "YlGnBu", "log", ticks)
     label = "|K| after, cones aside" if flat else "|K| before"
     return Quantity(label, np.abs(values), counts, scale, ".1e", result.faces)
 
