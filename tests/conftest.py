@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import pytest
+from browsing import browser, open_visit, viewed, viewed_page, visit  # noqa: F401
 from shapes import SHARED
 
 
