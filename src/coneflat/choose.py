@@ -75,7 +75,7 @@ def choose_cones(
     mesh = surface.mesh
     if pursues(mesh, options):
         corners = corners_alone(surface, wishes, options)
-        return _pursued(surface, wishes, options, turned) if corners is None else corners
+        return _pursued(surface, wishes, options, stages, turned) if corners is None else corners
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     if options.method == "greedy":
         solution = greedy_cones(
@@ -115,7 +115,9 @@ def corners_alone(surface: Surface, wishes: Wishes, options: Options) -> ConeSol
     return cones_with_curvature(*given, corners, curvature[corners])
 
 
-def _pursued(surface: Surface, wishes: Wishes, options: Options, turned: Turned | None) -> ConeSolution:
+def _pursued(
+    surface: Surface, wishes: Wishes, options: Options, stages: Stages, turned: Turned | None
+) -> ConeSolution:
     """Return the fewest cones for the distortion allowed, or the best of the number asked for."""
     from .cones.align import align_handles
     from .cones.pursuit import pursue
@@ -126,7 +128,7 @@ def _pursued(surface: Surface, wishes: Wishes, options: Options, turned: Turned 
     only = only_choice(surface, wishes, options)
     if only is not None:
         return only
-    search = search_on(surface, wishes, options)
+    search = search_on(surface, wishes, options, stages)
 
     distortion, count = options.distortion, options.cone_count
     if options.quantum is None:
@@ -154,7 +156,7 @@ def only_choice(surface: Surface, wishes: Wishes, options: Options) -> ConeSolut
     return cones_at(*given, np.empty(0, dtype=np.int64))
 
 
-def search_on(surface: Surface, wishes: Wishes, options: Options) -> ConeSearch:
+def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages) -> ConeSearch:
     """Return a search for cones as the options and the user's wishes have it."""
     from .cones.pursuit import open_search
 
@@ -163,7 +165,7 @@ def search_on(surface: Surface, wishes: Wishes, options: Options) -> ConeSearch:
     room = (
         ROOM * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)) + np.pi * mesh.is_boundary_vertex
     )
-    return open_search(
+    search = open_search(
         surface.laplacian,
         surface.curvature,
         surface.areas,
@@ -180,3 +182,5 @@ def search_on(surface: Surface, wishes: Wishes, options: Options) -> ConeSearch:
         allowed=wishes.is_allowed,
         room=None if options.refine else room.astype(np.float64),
     )
+    search.tell = stages.tell
+    return search

@@ -17,6 +17,7 @@ from .errors import OptionError
 from .geometry.areas import area_distortion, weighted_areas
 from .options import Options
 from .prepare import Component, prepare
+from .stages import Progress, Stages
 from .threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -80,10 +81,12 @@ def find_cones(
     forbidden_cones: Iterable[int] = (),
     allowed_cones: Iterable[int] | None = None,
     repair: bool = False,
+    progress: Progress | None = None,
 ) -> FoundCones:
     """Find the cones of the largest component of a mesh, without flattening it.
 
-    Arguments are those of `coneflat.flatten`, and so are the errors.
+    Arguments are those of `coneflat.flatten`, and so are the errors; `progress` is called with what is being done
+    and the fraction that is done.
     """
     from .cones.pursuit import pursue
 
@@ -99,12 +102,14 @@ def find_cones(
         allowed_cones=allowed_cones,
         repair=repair,
     )
+    stages = Stages(progress)
     with one_blas_thread():
-        opened = _open(mesh, faces, options)
+        opened = _open(mesh, faces, options, stages)
         if isinstance(opened, FoundCones):
             return opened
         search, part = opened
-        found = pursue(search, distortion=options.distortion, count=options.cone_count)
+        with stages("cones"):
+            found = pursue(search, distortion=options.distortion, count=options.cone_count)
     return _named(found.solution, found.distortion, part)
 
 
@@ -121,6 +126,7 @@ def cone_curve(
     forbidden_cones: Iterable[int] = (),
     allowed_cones: Iterable[int] | None = None,
     repair: bool = False,
+    progress: Progress | None = None,
 ) -> ConeCurve:
     """Search for the best cones of every number up to `most`, on the largest component of a mesh.
 
@@ -138,26 +144,33 @@ def cone_curve(
         allowed_cones=allowed_cones,
         repair=repair,
     )
+    stages = Stages(progress)
     with one_blas_thread():
-        opened = _open(mesh, faces, options)
+        opened = _open(mesh, faces, options, stages)
         if isinstance(opened, FoundCones):
             return ConeCurve((opened,))
         search, part = opened
-        found = search.best_of_sizes(int(most))
+        with stages("cones"):
+            found = search.best_of_sizes(int(most))
     if not found:
         raise OptionError(f"no set of up to {most} cones carries this surface's curvature; allow more")
     return ConeCurve(tuple(_named(search.solution(members), energy, part) for energy, members in found))
 
 
-def _open(mesh: Any, faces: ArrayLike | None, options: Options) -> tuple[ConeSearch, Component] | FoundCones:
+def _open(
+    mesh: Any, faces: ArrayLike | None, options: Options, stages: Stages
+) -> tuple[ConeSearch, Component] | FoundCones:
     """Return a search on the largest component, or what there is where no vertex of it may be a cone."""
-    part = max(prepare(mesh, faces, options).components, key=lambda each: len(each.faces))
+    with stages("check"):
+        part = max(prepare(mesh, faces, options).components, key=lambda each: len(each.faces))
     surface = Surface.of(part.mesh, part.lengths)
     only = only_choice(surface, part.wishes, options)
     if only is not None:
         share = weighted_areas(surface.areas, part.wishes.weights)
         return _named(only, area_distortion(only.log_scale, share), part)
-    return search_on(surface, part.wishes, options), part
+    stages.share = 1.0
+    with stages("cones", 0.3):
+        return search_on(surface, part.wishes, options, stages), part
 
 
 def _named(solution: ConeSolution, distortion: float, part: Component) -> FoundCones:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
+from ..text import plural
 from .method import check_combinations, method_keywords, method_options
+from .talk import talk_options
 
 FAILED = 1
+LONGEST = 3  # meshes that are named
 
 
 @click.command(short_help="Flatten many meshes, on this machine or on a Dask cluster.")
@@ -45,7 +49,7 @@ FAILED = 1
 )
 @click.option("--redo", is_flag=True, help="Flatten again what is done.")
 @method_options
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@talk_options
 @click.pass_context
 def batch(
     context: click.Context,
@@ -59,7 +63,7 @@ def batch(
     dask: str | None,
     redo: bool,
     weld: bool | None,
-    quiet: bool,
+    talk: str | None,
     **method: Any,
 ) -> None:
     """Flatten all meshes that the patterns name: files, folders, or *, ? and ** in quotes.
@@ -75,6 +79,7 @@ def batch(
     from ..batch import find_jobs, run_batch
     from ..errors import MeshFileError
     from ..options import Options
+    from .console import Console
 
     check_combinations(context)
     if jobs is not None and dask is not None:
@@ -88,30 +93,50 @@ def batch(
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise MeshFileError(f"{out} cannot be made: {error.strerror}") from error
-    found = run_batch(
-        todo,
-        out.absolute(),
-        processes=jobs,
-        limit=time_limit,
-        dask=dask,
-        redo=redo,
-        summary=summary,
-        listener=None if quiet else _tell,
-    )
-    if not quiet:
+    rows = []
+    with Console(talk) as console:
+
+        def tell(row: dict[str, Any], done: int, count: int) -> None:
+            rows.append(row)
+            what, *more = _lines(row, console.verbose)
+            console.say([f"{done:>{len(str(count))}}/{count}  {Path(row['mesh']).name}  {what}", *more])
+            console.progress(f"{done} of {plural(count, 'mesh', 'meshes')}", done / count)
+
+        console.say([f"flattening {plural(len(todo), 'mesh', 'meshes')} into {out}"])
+        found = run_batch(
+            todo,
+            out.absolute(),
+            processes=jobs,
+            limit=time_limit,
+            dask=dask,
+            redo=redo,
+            summary=summary,
+            listener=tell,
+        )
         before = f", {found.skipped:,} of them before" if found.skipped else ""
         failed = f"; {found.failed:,} failed" if found.failed else ""
-        click.echo(f"{len(todo) - found.failed:,} of {len(todo):,} meshes are flattened{before}{failed}")
-        click.echo(f"wrote {summary or out / 'summary.csv'}")
+        console.say([f"{len(todo) - found.failed:,} of {len(todo):,} meshes are flattened{before}{failed}"])
+        console.say(_slowest(rows, console.elapsed))
+        console.finish([summary or out / "summary.csv"])
     if found.failed:
         sys.exit(FAILED)
 
 
-def _tell(row: dict[str, Any], done: int, count: int) -> None:
-    """Print a line for a mesh."""
-    what = (
-        f"{row['triangles']:,} triangles, {row['cones']} cones, QC {row['qc_mean']:.4f}, {row['seconds']:.1f} s"
-        if row["status"] == "done"
-        else f"failed: {row['error']}"
-    )
-    click.echo(f"{done:>{len(str(count))}}/{count}  {Path(row['mesh']).name}  {what}")
+def _lines(row: dict[str, Any], verbose: bool) -> Iterator[str]:
+    """Yield what became of a mesh; if verbose, also where the result is, and the notes on it."""
+    if row["status"] != "done":
+        yield f"failed: {row['error']}"
+        return
+    counts = f"{plural(row['triangles'], 'triangle')}, {plural(row['cones'], 'cone')}"
+    yield f"{counts}, QC {row['qc_mean']:.4f}, {row['seconds']:.1f} s"
+    if verbose:
+        yield f"wrote {row['output']}"
+        yield from [f"note: {row['notes']}"] * bool(row["notes"])
+
+
+def _slowest(rows: Sequence[dict[str, Any]], elapsed: float) -> Iterator[str]:
+    """Yield where the time went, if anything was done."""
+    took = sorted(((row["seconds"] or 0.0, Path(row["mesh"]).name) for row in rows), reverse=True)
+    if took:
+        longest = ", ".join(f"{name} {seconds:.1f}" for seconds, name in took[:LONGEST])
+        yield f"time {elapsed:.1f} s, {sum(seconds for seconds, _ in took):.1f} s of work; the longest: {longest}"

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
+from ..text import plural
 from .search import as_keywords, place_options, search_options
+from .talk import talk_options
+
+if TYPE_CHECKING:
+    from ..curve import ConeCurve, FoundCones
 
 
 @click.command(short_help="Find cones, or show what how many of them gain.")
@@ -34,7 +40,7 @@ from .search import as_keywords, place_options, search_options
     help="With --curve: the picture to write.  [default: MESH's name with _cones, as .png]",
 )
 @click.option("--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces.")
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@talk_options
 @click.pass_context
 def cones(
     context: click.Context,
@@ -45,7 +51,7 @@ def cones(
     most: int,
     picture: Path | None,
     repair: bool,
-    quiet: bool,
+    talk: str | None,
     **search: Any,
 ) -> None:
     """Find the cones of MESH's largest component, without flattening it.
@@ -59,6 +65,8 @@ def cones(
     from ..io import atomic_write, read_mesh
     from ..io.atomic import check_target
     from ..view import check_figure_target, make_figure, new_figure, save_figure
+    from .console import Console
+    from .run import FLATTENED, READ
 
     if curve:
         new_figure(1, 1)  # says what is missing before the work
@@ -75,36 +83,44 @@ def cones(
     if picture is not None:
         check_figure_target(picture)
     keywords = {**as_keywords(search), "repair": repair}
-    source = read_mesh(mesh)
-    chosen = find_cones(source, **keywords)
-    if curve:
-        wanted = keywords.pop("distortion")
-        del keywords["cone_count"]
-        found = cone_curve(source, most=max(most, len(chosen.vertices)), **keywords)
-        lines = ["cones  area distortion E"]
-        for each in found.sets:
-            number = len(each.vertices)
-            marks = ["knee"] * (number == found.knee) + [f"<= {wanted:g}"] * (each.distortion <= wanted)
-            lines.append(f"{number:5d}  {each.distortion:.4f}  {', '.join(marks)}".rstrip())
-    else:
-        lines = [
-            f"vertex {vertex:8d}  curvature {curvature / math.pi:+.4f} pi"
-            for vertex, curvature in zip(chosen.vertices, chosen.curvatures, strict=True)
-        ]
-        lines.append(f"{len(chosen.vertices)} cones, area distortion {chosen.distortion:.4f}")
-        if keywords["cone_count"] is None and chosen.distortion > keywords["distortion"] * (1 + 1e-9):
-            lines.append(
-                f"note: above the {keywords['distortion']:g} allowed: no better was found within the bounds given"
+    with Console(talk) as console:
+        with console.stage("read", 0.0):
+            source = read_mesh(mesh)
+        with console.stage("cones", READ):
+            chosen = find_cones(source, progress=console.part(READ, 0.5 if curve else FLATTENED), **keywords)
+        if curve:
+            wanted = keywords.pop("distortion")
+            del keywords["cone_count"]
+            with console.stage("curve", 0.5):
+                most = max(most, len(chosen.vertices))
+                found = cone_curve(source, most=most, progress=console.part(0.5, FLATTENED), **keywords)
+            console.say(_curve_lines(found, wanted))
+        else:
+            console.say(
+                _cone_lines(chosen, None if keywords["cone_count"] is not None else keywords["distortion"])
             )
-    if not quiet:
-        click.echo("\n".join(lines))
-    if picture is not None:
-        save_figure(make_figure(found, "curve", distortion=wanted, title=mesh.name), picture)
-    if output is not None:
-        with atomic_write(output, "w") as file:
-            for vertex, curvature in zip(chosen.vertices, chosen.curvatures, strict=True):
-                file.write(f"{vertex} {float(curvature)!r}\n")
-    if not quiet:
-        for path in (picture, output):
-            if path is not None:
-                click.echo(f"wrote {path}")
+        if picture is not None:
+            with console.stage("draw", FLATTENED):
+                save_figure(make_figure(found, "curve", distortion=wanted, title=mesh.name), picture)
+        if output is not None:
+            with atomic_write(output, "w") as file:
+                for vertex, curvature in zip(chosen.vertices, chosen.curvatures, strict=True):
+                    file.write(f"{vertex} {float(curvature)!r}\n")
+        console.finish([path for path in (picture, output) if path is not None])
+
+
+def _curve_lines(curve: ConeCurve, wanted: float) -> Iterator[str]:
+    yield "cones  area distortion E"
+    for each in curve.sets:
+        number = len(each.vertices)
+        marks = ["knee"] * (number == curve.knee) + [f"<= {wanted:g}"] * (each.distortion <= wanted)
+        yield f"{number:5d}  {each.distortion:.4f}  {', '.join(marks)}".rstrip()
+
+
+def _cone_lines(cones: FoundCones, allowed: float | None) -> Iterator[str]:
+    """Yield a line for each cone; allowed: the distortion that was to be reached, if one was."""
+    for vertex, curvature in zip(cones.vertices, cones.curvatures, strict=True):
+        yield f"vertex {vertex:8d}  curvature {curvature / math.pi:+.4f} pi"
+    yield f"{plural(len(cones.vertices), 'cone')}, area distortion {cones.distortion:.4f}"
+    if allowed is not None and cones.distortion > allowed * (1 + 1e-9):
+        yield f"note: above the {allowed:g} allowed: no better was found within the bounds given"

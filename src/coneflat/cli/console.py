@@ -1,10 +1,12 @@
-"""What the commands print: progress on stderr, the table on stdout."""
+"""What the commands print: progress on stderr, results on stdout."""
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
 
@@ -15,6 +17,9 @@ from rich.table import Table
 
 from ..report import as_rows
 from ..result import Flattening
+from ..stages import Progress as Listener
+from ..stages import Stages
+from .talk import QUIET, VERBOSE
 
 PATIENCE = 1.0  # seconds between the plain lines that say what is going on
 PLAIN_WIDTH = 110
@@ -22,14 +27,22 @@ EXTREME_QC = 2.0  # far from conformal, on average
 
 
 class Console:
-    """Progress while a command runs, a table when it is done; nothing if quiet."""
+    """Progress while a command runs, what came out when it is done; nothing if quiet.
 
-    def __init__(self, quiet: bool) -> None:
-        self.quiet = quiet
+    Progress is a bar in a terminal, else a line about every second; if verbose, a line for every step.
+
+    Attributes:
+        seconds: wall time of each stage.
+    """
+
+    def __init__(self, talk: str | None = None) -> None:
+        self.quiet, self.verbose = talk == QUIET, talk == VERBOSE
+        self._stages = Stages(self.progress)
+        self.seconds = self._stages.seconds
         self._start = time.perf_counter()
         self._last_line = 0.0
         self._bar: Progress | None = None
-        if not quiet and sys.stderr.isatty():
+        if talk is None and sys.stderr.isatty():
             self._bar = Progress(
                 SpinnerColumn(),
                 TextColumn("{task.description:28}"),
@@ -51,54 +64,83 @@ class Console:
         if self._bar:
             self._bar.stop()
 
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the start."""
+        return time.perf_counter() - self._start
+
     def progress(self, stage: str, fraction: float) -> None:
         """Show what is being done, and the fraction of the whole that is done."""
-        elapsed = time.perf_counter() - self._start
         if self._bar:
             self._bar.update(self._task, description=stage, completed=fraction)
-        elif not self.quiet and elapsed - self._last_line > PATIENCE:
-            self._last_line = elapsed
-            click.echo(f"{elapsed:6.1f} s  {fraction:4.0%}  {stage}", err=True)
+        elif not self.quiet and (self.verbose or self.elapsed - self._last_line > PATIENCE):
+            self._last_line = self.elapsed
+            click.echo(f"{self.elapsed:6.1f} s  {fraction:4.0%}  {stage}", err=True)
 
-    def finish(self, result: Flattening, written: Sequence[Path]) -> None:
-        """Print notes, measures, where the time went, and what was written."""
-        if self._bar:
-            self._bar.stop()
+    def part(self, begin: float, end: float) -> Listener:
+        """Return a listener to a part of the work, which makes up these fractions of the whole."""
+        return lambda stage, fraction: self.progress(stage, begin + (end - begin) * fraction)
+
+    @contextmanager
+    def stage(self, name: str, done: float) -> Iterator[None]:
+        """Show and time a stage, at the beginning of which so much of the whole is done."""
+        self._stages.done = done
+        with self._stages(name):
+            yield
+
+    def say(self, lines: Iterable[str], style: str | None = None) -> None:
+        """Print lines of what came out."""
         if self.quiet:
             return
-        out = RichConsole(highlight=False, width=None if sys.stdout.isatty() else PLAIN_WIDTH)
-        for note in result.notes:
-            out.print(f"note: {note}", markup=False)
+        if self._bar:
+            self._bar.stop()
+        for line in lines:
+            click.secho(line, fg=style)
+        self._last_line = self.elapsed
+        if self._bar:
+            self._bar.start()
+
+    def finish(self, written: Sequence[Path], result: Flattening | None = None) -> None:
+        """Print notes and measures of a result if there is one, where the time went, and what was written."""
+        if self._bar:
+            self._bar.stop()
+            self._bar = None
+        if result is not None:
+            self.say(f"note: {note}" for note in result.notes)
+            self._print_table(result)
+        if self.seconds:
+            self.say([f"time             {self._spent(() if result is None else result.solvers)}"])
+        self.say(f"wrote {path}" for path in written)
+        if result is not None:
+            self.say((f"warning: {each}" for each in _warnings(result)), "yellow")
+
+    def _spent(self, solvers: Sequence[str]) -> str:
+        each = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in self.seconds.items())
+        by = f" (solved by {', '.join(solvers)})" if solvers else ""
+        return f"{sum(self.seconds.values()):.2f} s: {each}{by}"
+
+    def _print_table(self, result: Flattening) -> None:
+        if self.quiet:
+            return
+        rows = as_rows(result)
+        if self.verbose:
+            found = asdict(result.solve)
+            rows += [(name.replace("_", " "), f"{value:.3g}", "") for name, value in found.items()]
         table = Table(box=None, show_header=False, pad_edge=False)
         table.add_column(style="bold")
         table.add_column()
         table.add_column(style="dim")
-        for row in as_rows(result):
+        for row in rows:
             table.add_row(*row)
-        out.print(table)
-        total = sum(result.seconds.values())
-        spent = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in result.seconds.items())
-        by = f" (solved by {', '.join(result.solvers)})" if result.solvers else ""
-        out.print(f"time             {total:.2f} s: {spent}{by}", markup=False, soft_wrap=True)
-        for path in written:
-            out.print(f"wrote {path}", markup=False)
-        self._warn(out, result)
+        width = None if sys.stdout.isatty() else PLAIN_WIDTH
+        RichConsole(highlight=False, markup=False, width=width).print(table)
 
-    def _warn(self, out: RichConsole, result: Flattening) -> None:
-        measures, solve = result.distortion, result.solve
-        bad = measures.flipped + measures.degenerate
-        if bad:
-            broken = (
-                f"; {solve.broken:,} break the triangle inequality in this metric" if solve.broken else ""
-            )
-            out.print(
-                f"warning: {bad:,} of {len(result.faces):,} triangles are flipped or collapsed in the plane{broken}",
-                style="yellow",
-                soft_wrap=True,
-            )
-        if measures.qc_mean > EXTREME_QC:
-            out.print(
-                f"warning: the mean QC distortion of {measures.qc_mean:.3g} is extreme; more cones would lower it",
-                style="yellow",
-                soft_wrap=True,
-            )
+
+def _warnings(result: Flattening) -> Iterator[str]:
+    measures, solve = result.distortion, result.solve
+    bad = measures.flipped + measures.degenerate
+    if bad:
+        broken = f"; {solve.broken:,} break the triangle inequality in this metric" if solve.broken else ""
+        yield f"{bad:,} of {len(result.faces):,} triangles are flipped or collapsed in the plane{broken}"
+    if measures.qc_mean > EXTREME_QC:
+        yield f"the mean QC distortion of {measures.qc_mean:.3g} is extreme; more cones would lower it"

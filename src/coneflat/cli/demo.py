@@ -6,6 +6,10 @@ from pathlib import Path
 
 import click
 
+from .talk import talk_options
+
+DRAWING = 0.95  # The fraction of the whole that is done before.
+
 
 @click.command(short_help="Flatten a sample model, and draw it.")
 @click.option(
@@ -16,24 +20,25 @@ import click
     show_default=True,
     help="Folder to write to; made if it is missing.",
 )
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
-def demo(output: Path, quiet: bool) -> None:
+@talk_options
+def demo(output: Path, talk: str | None) -> None:
     """Flatten the sample that comes with coneflat; write the textured mesh, its report and a picture."""
     from ..errors import MeshFileError
     from ..sample import sample_path
     from ..view import demo_figure, new_figure, save_figure
-    from .run import run
+    from .console import Console
+    from .run import flatten_file, save
 
     new_figure(1, 1)  # says what is missing before the work
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise MeshFileError(f"cannot make the folder {output}: {error.strerror}") from error
-    result = run(
-        sample_path(), output / "sample.obj", {"charts": "atlas"}, report=output / "sample.json", quiet=quiet
-    )
-
-    picture = output / "sample.png"
-    save_figure(demo_figure(result), picture)
-    if not quiet:
-        click.echo(f"wrote {picture}\n\nNow try your own:  coneflat flatten MESH -o OUT.obj")
+    mesh, report, picture = (output / f"sample.{ending}" for ending in ("obj", "json", "png"))
+    with Console(talk) as console:
+        result = flatten_file(sample_path(), console, {"charts": "atlas"})
+        result = save(result, console, mesh, report)
+        with console.stage("draw", DRAWING):
+            save_figure(demo_figure(result), picture)
+        console.finish([mesh, report, picture], result)
+        console.say(["", "Now try your own:  coneflat flatten MESH -o OUT.obj"])

@@ -8,6 +8,8 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from .talk import talk_options
+
 KINDS = ("layout", "checker", "quality", "cones", "curvature", "curve")
 
 _VIEWS = ("checker", "quality", "cones", "curvature")
@@ -85,7 +87,7 @@ class Eye(click.ParamType):  # type: ignore[type-arg]
 )
 @click.option("--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces.")
 @click.option("--title", default="", help="A line above all.")
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@talk_options
 @click.pass_context
 def figure(
     context: click.Context,
@@ -96,7 +98,7 @@ def figure(
     eye: tuple[Any, ...],
     most: int,
     repair: bool,
-    quiet: bool,
+    talk: str | None,
     **look: Any,
 ) -> None:
     """Draw MESH for print: a mesh, which is flattened first with all defaults, or a result of coneflat (.npz).
@@ -108,10 +110,9 @@ def figure(
       coneflat flatten horse.ply -o horse.npz --distortion 0.1 && coneflat figure horse.npz --kind quality
     """
     from ..curve import cone_curve
-    from ..io import read_flattening, read_mesh
-    from ..pipeline import flatten
     from ..view import Look, check_figure_target, make_figure, new_figure, save_figure
     from .console import Console
+    from .run import FLATTENED, READ, open_result
 
     _check_combinations(context, kind)
     # What can fail at the end is looked at before the work.
@@ -119,23 +120,29 @@ def figure(
     output = check_figure_target(output or Path(f"{mesh.stem}_{kind}.png"))
     look |= {"eyes": eye or ("front-right",), "size": look["size"] or None}
     Look(**look)
-    with Console(quiet) as console:
-        console.progress("read", 0.0)
-        shown: Any = (read_flattening if mesh.suffix.lower() == ".npz" else read_mesh)(mesh)
+    with Console(talk) as console:
+        shown: Any
         if kind == "curve":
-            console.progress("cones", 0.1)
-            shown = cone_curve(_surface(shown), most=most, repair=repair)
-        elif mesh.suffix.lower() != ".npz":
-            shown = flatten(shown, charts="atlas", repair=repair, progress=console.progress)
-        console.progress("draw", 1.0)
-        save_figure(make_figure(shown, kind, **look), output)
-    if not quiet:
-        click.echo(f"wrote {output}")
+            with console.stage("read", 0.0):
+                surface = _surface(mesh)
+            with console.stage("cones", READ):
+                shown = cone_curve(surface, most=most, repair=repair, progress=console.part(READ, FLATTENED))
+        else:
+            shown = open_result(mesh, console, repair=repair)
+            console.say(f"note: {note}" for note in shown.notes)
+        with console.stage("draw", FLATTENED):
+            save_figure(make_figure(shown, kind, **look), output)
+        console.finish([output])
 
 
-def _surface(shown: Any) -> Any:
+def _surface(file: Path) -> Any:
     """Return what a search for cones takes: a mesh file as it is, of a result its mesh."""
-    return (shown.vertices, shown.faces) if hasattr(shown, "uv") else shown
+    from ..io import read_flattening, read_mesh
+
+    if file.suffix.lower() != ".npz":
+        return read_mesh(file)
+    result = read_flattening(file)
+    return result.vertices, result.faces
 
 
 def _check_combinations(context: click.Context, kind: str) -> None:

@@ -9,6 +9,7 @@ import click
 
 from .method import check_combinations, method_keywords, method_options
 from .search import place_options
+from .talk import talk_options
 
 
 @click.command(short_help="Flatten a mesh and write it with UV coordinates.")
@@ -55,7 +56,7 @@ from .search import place_options
     help="Of a .glb: the texture that it carries, a checkerboard or an image file.",
 )
 @click.option("--report", type=click.Path(path_type=Path), help="Write all measures to this JSON file.")
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@talk_options
 @click.pass_context
 def flatten(
     context: click.Context,
@@ -70,7 +71,7 @@ def flatten(
     weld: bool | None,
     texture: str | None,
     report: Path | None,
-    quiet: bool,
+    talk: str | None,
     **method: Any,
 ) -> None:
     """Flatten MESH (.obj, .ply, .stl, .off, .gltf, .glb) and write it with UV coordinates.
@@ -102,4 +103,4 @@ def flatten(
         options["forbidden_seams"] = read_pairs(forbidden_seams)
     if corners:
         options["boundary"] = corners
-    run(mesh, output, options, weld=weld, report=report, texture=texture, quiet=quiet)
+    run(mesh, output, options, weld=weld, report=report, texture=texture, talk=talk)

@@ -1,4 +1,4 @@
-"""From a file to a file, with progress and a table at the end."""
+"""From a file to a result, and to files, with progress and a table at the end."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import OptionError
-from ..io import atomic_write, check_output, read_mesh
+from ..io import atomic_write, check_output, read_flattening, read_mesh
 from ..io.atomic import check_target
 from ..pipeline import flatten
 from ..result import Flattening
-from ..stages import Stages
 from .console import Console
+
+READ, FLATTENED = 0.03, 0.92
+"""Fractions of the whole that are done when the mesh is read, and when it is flattened, about."""
 
 
 def run(
@@ -26,8 +28,8 @@ def run(
     weld: bool | None = None,
     report: Path | None = None,
     texture: str | None = None,
-    quiet: bool = False,
-) -> Flattening:
+    talk: str | None = None,
+) -> None:
     """Flatten a mesh file, write the result and its report, and print what came out.
 
     Args:
@@ -37,7 +39,7 @@ def run(
         weld: merge vertices at the same position; None for the format's default.
         report: JSON file for the measures.
         texture: of a .glb: "checker", or an image file.
-        quiet: print nothing.
+        talk: how much to print, see `talk_options`.
     """
     output = Path(f"{mesh.stem}_uv.obj") if output is None else output
     # What can fail at the end is looked at before the work.
@@ -46,24 +48,44 @@ def run(
         check_target(report)
     _require_distinct({"input": mesh, "output": output, "report": report})
 
-    with Console(quiet) as console:
-        stages = Stages(console.progress)
-        with stages("read"):
-            source = read_mesh(mesh, weld)
-        result = flatten(source, progress=console.progress, **options)
-        stages.seconds.update(result.seconds)
-        if source.welded:
-            note = f"Merged {source.welded:,} vertices at the same positions."
-            result = replace(result, notes=(note, *result.notes))
-        stages.done = 1.0
-        with stages("write"):
-            result.save(output, texture=texture)
-        result = replace(result, seconds=dict(stages.seconds))
-        if report is not None:
-            with atomic_write(report, "w") as file:
-                json.dump(result.report(), file, indent=2)
-                file.write("\n")
-        console.finish(result, [path for path in (output, report) if path is not None])
+    with Console(talk) as console:
+        result = save(flatten_file(mesh, console, options, weld), console, output, report, texture)
+        console.finish([path for path in (output, report) if path is not None], result)
+
+
+def open_result(file: Path, console: Console, **options: Any) -> Flattening:
+    """Return the result that a .npz file holds, or that of a mesh, flattened without overlaps."""
+    if file.suffix.lower() != ".npz":
+        return flatten_file(file, console, {"charts": "atlas", **options})
+    with console.stage("read", 0.0):
+        return read_flattening(file)
+
+
+def flatten_file(
+    mesh: Path, console: Console, options: Mapping[str, Any], weld: bool | None = None
+) -> Flattening:
+    """Return the result of a mesh file, and show how it is made."""
+    with console.stage("read", 0.0):
+        source = read_mesh(mesh, weld)
+    result = flatten(source, progress=console.part(READ, FLATTENED), **options)
+    console.seconds.update(result.seconds)
+    if source.welded:
+        note = f"Merged {source.welded:,} vertices at the same positions."
+        result = replace(result, notes=(note, *result.notes))
+    return result
+
+
+def save(
+    result: Flattening, console: Console, output: Path, report: Path | None, texture: str | None = None
+) -> Flattening:
+    """Write a result and its report, and return it with the time that everything took."""
+    with console.stage("write", FLATTENED):
+        result.save(output, texture=texture)
+    result = replace(result, seconds=dict(console.seconds))
+    if report is not None:
+        with atomic_write(report, "w") as file:
+            json.dump(result.report(), file, indent=2)
+            file.write("\n")
     return result
 
 

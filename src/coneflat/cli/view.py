@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from .talk import talk_options
+
 
 @click.command(short_help="Show a mesh and its layout in the browser.")
 @click.argument("file", type=click.Path(path_type=Path))
@@ -37,7 +39,7 @@ import click
     show_default=True,
     help="Thin a larger mesh to so many, for display only.",
 )
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@talk_options
 def view(
     file: Path,
     output: Path | None,
@@ -45,7 +47,7 @@ def view(
     show: str | None,
     up: str,
     most_triangles: int,
-    quiet: bool,
+    talk: str | None,
 ) -> None:
     """Write a page, one HTML file, that shows FILE and its layout side by side.
 
@@ -58,30 +60,22 @@ def view(
       coneflat view horse.npz -o horse.html --show qc
       coneflat view hand.obj -o hand.html --texture leather.jpg
     """
-    from ..io import read_flattening, read_mesh
-    from ..pipeline import flatten
-    from ..stages import Stages
     from ..view.picture import read_picture
     from ..view.webpage import check_page, open_page, page_of, write_page
     from .console import Console
+    from .run import FLATTENED, open_result
 
     # What can fail at the end is looked at before the work.
     page = check_page(Path(f"{file.stem}_view.html") if output is None else output)
     if texture is not None:
         read_picture(texture)
-    with Console(quiet) as console:
-        if file.suffix.lower() == ".npz":
-            result = read_flattening(file)
-        else:
-            stages = Stages(console.progress)
-            with stages("read"):
-                source = read_mesh(file)
-            result = flatten(source, charts="atlas", progress=console.progress)
-        console.progress("page", 1.0)
-        text = page_of(
-            result, name=file.name, texture=texture, up=up, show=show, most_triangles=most_triangles
-        )
-        write_page(text, page)
-        console.finish(result, [page])
-    if output is None and not open_page(page) and not quiet:
-        click.echo("open it in any browser")
+    with Console(talk) as console:
+        result = open_result(file, console)
+        with console.stage("page", FLATTENED):
+            text = page_of(
+                result, name=file.name, texture=texture, up=up, show=show, most_triangles=most_triangles
+            )
+            write_page(text, page)
+        console.finish([page], result)
+        if output is None and not open_page(page):
+            console.say(["open it in any browser"])

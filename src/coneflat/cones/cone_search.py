@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 from scipy.sparse import csc_matrix
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..text import plural
 from ..threads import meanwhile
 from .coarse_model import candidates, coarse_model
 from .dense_model import MANY, Limits
@@ -50,6 +52,9 @@ class ConeSearch:
         required: (r,) vertices that are cones in any case.
         usable: (n,) mask of the vertices that may be cones.
         room: (n,) the widest angle of a cone at each vertex, radians; None: any that the limits allow.
+
+    Attributes:
+        tell: called with what is being tried.
     """
 
     def __init__(
@@ -66,6 +71,7 @@ class ConeSearch:
     ) -> None:
         self._laplacian, self.curvature, self._is_boundary = laplacian, curvature, is_boundary
         self.limits = limits
+        self.tell: Callable[[str], None] = lambda _: None
         self.operator = GreenOperator(laplacian, areas, is_boundary, order)
         vertices = self.operator.vertices
         unknown = np.full(len(curvature), -1, dtype=np.int64)
@@ -222,6 +228,7 @@ class ConeSearch:
         Starts are the coarse model's set, and neighbours in size of what is known. Unless it is rough, more is tried
         where the goal is missed narrowly.
         """
+        self.tell(plural(count, "cone"))
         pool, model = self.pool, self.pool.model
         starts = []
         if count in self.coarse.best:

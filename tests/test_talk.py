@@ -1,0 +1,102 @@
+"""What the commands say of their work: all in the same way."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+import shapes
+from click.testing import CliRunner
+
+from coneflat.cli.console import Console
+from coneflat.cli.main import cli
+
+COMMANDS = {
+    "flatten": ("flatten", "model.obj", "-o", "out.obj"),
+    "view": ("view", "model.obj", "-o", "out.html"),
+    "figure": ("figure", "model.obj", "-o", "out.png", "--dpi", "50"),
+    "curve figure": ("figure", "model.obj", "--kind", "curve", "--most", "6", "-o", "out.png", "--dpi", "50"),
+    "cones": ("cones", "model.obj", "-o", "out.txt"),
+    "curve": ("cones", "model.obj", "--curve", "--most", "6", "--picture", "out.png"),
+    "batch": ("batch", "model.obj", "--out", "out", "--jobs", "1"),
+    "demo": ("demo", "-o", "out"),
+}
+LINE = r" +\d+\.\d s +(\d+)%  \w+.*"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    vertices, faces = shapes.sphere(2)
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
+    (tmp_path / "model.obj").write_text("\n".join(lines))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(words):
+    done = CliRunner().invoke(cli, words, catch_exceptions=False)
+    assert done.exit_code == 0, done.stderr
+    return done
+
+
+def needed(name):
+    if "figure" in name or name in ("curve", "demo"):
+        pytest.importorskip("matplotlib")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_verbose_tells_each_step_and_where_the_time_went(folder, name):
+    needed(name)
+    done = run((*COMMANDS[name], "-v"))
+    told = [re.fullmatch(LINE, line) for line in done.stderr.splitlines()]
+    assert len(told) > (0 if name == "batch" else 2)
+    assert all(told)
+    percents = [int(each[1]) for each in told]
+    assert percents == sorted(percents)
+    assert re.search(r"^time +\d+\.\d+ s", done.stdout, re.MULTILINE)
+    assert "wrote " in done.stdout
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_quiet_says_nothing(folder, name):
+    needed(name)
+    done = run((*COMMANDS[name], "-q"))
+    assert (done.stdout, done.stderr) == ("", "")
+    assert len(list(folder.iterdir())) == 2
+
+
+def test_every_command_takes_both():
+    for command in cli.commands.values():
+        options = {option for parameter in command.params for option in parameter.opts}
+        assert {"-q", "--quiet", "-v", "--verbose"} <= options
+
+
+def test_stages_add_up_and_parts_lie_within_the_whole(capsys):
+    with Console("verbose") as console:
+        with console.stage("read", 0.0):
+            pass
+        console.part(0.2, 0.6)("middle", 0.5)
+        with console.stage("write", 0.9):
+            pass
+        console.finish([])
+    out, err = capsys.readouterr()
+    assert [line.split()[2:] for line in err.splitlines()] == [
+        ["0%", "read"],
+        ["40%", "middle"],
+        ["90%", "write"],
+    ]
+    assert list(console.seconds) == ["read", "write"]
+    assert out.startswith("time  ")
+
+
+def test_lines_come_a_second_apart(capsys, monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("coneflat.cli.console.time.perf_counter", lambda: now[0])
+    with Console() as console:
+        for now[0] in (0.0, 0.4, 0.9, 1.1, 1.9, 2.3, 2.4):
+            console.progress(f"step {now[0]}", now[0] / 3)
+        console.say(["said"])
+        for now[0] in (3.0, 3.5):
+            console.progress(f"step {now[0]}", now[0] / 4)
+    assert re.findall(r"step (\S+)", capsys.readouterr().err) == ["1.1", "2.3", "3.5"]
