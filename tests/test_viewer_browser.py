@@ -108,6 +108,11 @@ def test_report_help_and_theme(visit, viewed):
     visit.page.click("#report")
     assert "seam mismatch" in visit.page.inner_text("#table")
     assert 0.1 < visit.drawn_share("layout") < 0.95  # it has made room
+    box, whole = visit.box("layout"), visit.picture()
+    gap = whole[
+        round(box["y"]) + 5 : round(box["y"] + box["height"]) - 5, round(box["x"]) - 6 : round(box["x"]) - 2
+    ]
+    assert np.ptp(gap.reshape(-1, 3), axis=0).max() == 0  # nothing is left of what was there
     visit.page.click("#report")
     visit.page.click("#help")
     assert visit.page.is_visible("#keys")

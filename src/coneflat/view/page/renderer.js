@@ -86,9 +86,17 @@ class Renderer {
   /** Fill what lies between the panes. */
   clear() {
     const gl = this.gl;
+    if (gl.isContextLost()) return;
+    const ground = [...this.look.colours.ground, 1];
+    // Some drivers show all of a target of several samples, whatever the box: what was between them must not come back.
+    this.fineTarget().begin(ground, [0, 0, this.canvas.width, this.canvas.height]);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.clearColor(...this.look.colours.ground, 1);
+    gl.clearColor(...ground);
     gl.clear(gl.COLOR_BUFFER_BIT);
+  }
+
+  fineTarget() {
+    return this.targetOf("fine", this.canvas.width, this.canvas.height, this.samples);
   }
 
   /**
@@ -102,9 +110,7 @@ class Renderer {
     const [top, bottom] = [pane.top, pane.top + pane.height].map((y) => Math.round(y * this.pixel));
     const box = [left, this.canvas.height - bottom, Math.max(1, right - left), Math.max(1, bottom - top)];
     const part = rough ? [0, 0, Math.ceil(ROUGH * box[2]), Math.ceil(ROUGH * box[3])] : box;
-    const target = rough
-      ? this.targetOf(`${pane.name} rough`, part[2], part[3], 0)
-      : this.targetOf("fine", this.canvas.width, this.canvas.height, this.samples);
+    const target = rough ? this.targetOf(`${pane.name} rough`, part[2], part[3], 0) : this.fineTarget();
     target.begin([...this.look.colours.pane, 1], part);
     this.drawInto(pane, state, part[2] / pane.width);
     target.show(part, box);

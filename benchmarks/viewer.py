@@ -1,0 +1,82 @@
+"""What the viewer's page weighs and how fast it is: `python benchmarks/viewer.py [MODEL:SPLITS...]`.
+
+A split makes four triangles of each. The page is opened in a headless Chromium: the seconds are from the request of the
+file until the numbers are unpacked and both views drawn once, and between frames while the model turns. Without a
+graphics card the processor draws, which says least about the last.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from common import model
+
+import coneflat
+
+SIZE = {"width": 1366, "height": 768}
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+# Turns the model by a little, frame after frame, and returns the milliseconds that each took.
+TURN = """
+new Promise((done) => {
+  const times = [];
+  const step = (time) => {
+    times.push(time);
+    if (times.length > 40) return done(times.slice(1).map((time, i) => time - times[i]));
+    coneflat.panes[0].camera.rotate(0.05, 0.01);
+    requestAnimationFrame(step);
+  };
+  requestAnimationFrame(step);
+})
+"""
+
+
+def write_page(result: coneflat.Flattening, path: Path) -> float:
+    """Write a page, and return the seconds that it took."""
+    start = time.perf_counter()
+    result.view(path, most_triangles=10**7)
+    return time.perf_counter() - start
+
+
+def load(browser: object, path: Path) -> tuple[float, float]:
+    """Return the seconds until a page is drawn, and the milliseconds of a frame while it turns."""
+    page = browser.new_page(viewport=SIZE)  # type: ignore[attr-defined]
+    page.goto(path.as_uri())
+    page.wait_for_selector("html[data-ready]", timeout=300_000)
+    seconds = int(page.get_attribute("html", "data-ready")) / 1000
+    frames = page.evaluate(TURN)
+    page.close()
+    return seconds, statistics.median(frames)
+
+
+def main(words: list[str]) -> None:
+    from playwright.sync_api import sync_playwright
+
+    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+    print("| model | triangles | page, MB | written, s | loaded, s | frame, ms |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    with sync_playwright() as driver, tempfile.TemporaryDirectory() as folder:
+        browser = driver.chromium.launch(
+            executable_path=path, args=["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+        )
+        for word in words or ["fandisk:0", "horse:0", "horse:1"]:
+            name, _, splits = word.partition(":")
+            result = coneflat.flatten(*model(name, int(splits or 0)), charts="atlas")
+            page = Path(folder) / f"{name}.html"
+            wrote = min(write_page(result, page) for _ in range(3))
+            loaded, frame = map(min, zip(*(load(browser, page) for _ in range(3)), strict=True))
+            size = page.stat().st_size / 1e6
+            print(
+                f"| {name} | {len(result.faces):,} | {size:.2f} | {wrote:.2f} | {loaded:.2f} | {frame:.0f} |",
+                flush=True,
+            )
+        browser.close()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
