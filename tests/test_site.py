@@ -1,0 +1,85 @@
+"""The documentation's site: built with warnings as errors, complete, and loading nothing from anywhere."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+import coneflat
+
+ROOT = Path(__file__).resolve().parents[1]
+IMAGES = ROOT / "docs" / "images"
+MOST_EACH, MOST_TOGETHER = 250_000, 6_000_000  # bytes
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    for module in ("mkdocs", "material", "mkdocstrings", "mkdocstrings_handlers.python"):
+        pytest.importorskip(module, reason="the site's tools are not installed (extra docs)")
+    folder = tmp_path_factory.mktemp("site")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)],
+        cwd=ROOT,
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr
+    return folder
+
+
+class Loads(HTMLParser):
+    """What a page loads when it is opened, and the names of its parts."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.loads, self.parts = [], set()
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        self.parts.add(given.get("id"))
+        is_loaded = tag in ("script", "img", "iframe", "source")
+        if tag == "link" and given.get("rel") in ("stylesheet", "icon", "preconnect", "preload"):
+            is_loaded = True
+        if is_loaded:
+            self.loads += [given[name] for name in ("src", "href") if given.get(name)]
+
+
+def test_every_page_is_there(site):
+    for page in (ROOT / "docs").glob("**/*.md"):
+        assert (site / page.relative_to(ROOT / "docs")).with_suffix(".html").exists()
+
+
+def test_nothing_is_loaded_from_elsewhere(site):
+    for page in site.glob("**/*.html"):
+        for target in Loads(page).loads:
+            assert not re.match(r"[a-z]+:|//", target), (page.name, target)
+            if page.name != "404.html":  # which knows not from where it is seen
+                assert (page.parent / target.split("?")[0].split("#")[0]).exists(), (page.name, target)
+    for style in site.glob("**/*.css"):
+        assert not re.search(r"(?:@import|url\()\s*[\"']?(?:https?:)?//", style.read_text(encoding="utf-8"))
+
+
+def test_all_public_names_are_described(site):
+    parts = Loads(site / "api.html").parts
+    missing = [f"coneflat.{name}" for name in coneflat.__all__ if name not in ("__version__", "errors", "ConeflatError")]
+    assert [name for name in missing if name not in parts] == []
+
+
+def test_pictures_are_small_and_used():
+    text = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").glob("**/*.md"))
+    text += (ROOT / "README.md").read_text(encoding="utf-8")
+    sizes = {path.name: path.stat().st_size for path in IMAGES.iterdir()}
+    assert {name: size for name, size in sizes.items() if size > MOST_EACH} == {}
+    assert sum(sizes.values()) < MOST_TOGETHER
+    assert [name for name in sizes if f"images/{name}" not in text] == []
