@@ -72,7 +72,11 @@ def test_nothing_is_loaded_from_elsewhere(site):
 
 def test_all_public_names_are_described(site):
     parts = Loads(site / "api.html").parts
-    missing = [f"coneflat.{name}" for name in coneflat.__all__ if name not in ("__version__", "errors", "ConeflatError")]
+    missing = [
+        f"coneflat.{name}"
+        for name in coneflat.__all__
+        if name not in ("__version__", "errors", "ConeflatError")
+    ]
     assert [name for name in missing if name not in parts] == []
 
 
