@@ -27,7 +27,7 @@ new Promise((done) => {
   const times = [];
   const step = (time) => {
     times.push(time);
-    if (times.length > 40) return done(times.slice(1).map((time, i) => time - times[i]));
+    if (times.length > 12) return done(times.slice(1).map((time, i) => time - times[i]));
     coneflat.panes[0].camera.rotate(0.05, 0.01);
     requestAnimationFrame(step);
   };

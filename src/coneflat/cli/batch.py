@@ -103,6 +103,7 @@ def batch(
             console.progress(f"{done} of {plural(count, 'mesh', 'meshes')}", done / count)
 
         console.say([f"flattening {plural(len(todo), 'mesh', 'meshes')} into {out}"])
+        console.progress("flatten", 0.0)
         found = run_batch(
             todo,
             out.absolute(),
