@@ -8,6 +8,7 @@ import shapes
 
 import coneflat
 from coneflat import errors
+from coneflat.atlas import find_overlaps
 from coneflat.geometry.dihedral import dihedral_angles
 from coneflat.mesh import TriangleMesh, end_corners
 
@@ -30,6 +31,16 @@ def test_a_closed_cylinder_is_a_strip_and_two_disks():
     result = coneflat.flatten(*shapes.cylinder(caps=True), sharp_angle=1.0)
     assert result.distortion.charts == 3
     assert result.distortion.qc_max == pytest.approx(1, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", [10, 26, 28])
+def test_charts_that_touch_themselves_do_not_overlap(seed):
+    """Flat pieces of a box lie beside their own sides, which rounding must not push across each other."""
+    vertices, faces = shapes.box()
+    edges = TriangleMesh(vertices, faces).edges
+    seams = edges[np.random.default_rng(seed).random(len(edges)) < 0.5]
+    result = coneflat.flatten(vertices, faces, charts="atlas", seams=seams)
+    assert result.distortion.overlapping_pairs == len(find_overlaps(result.corner_uv).pairs) == 0
 
 
 def test_named_seams_are_cut_and_act_like_a_boundary():
