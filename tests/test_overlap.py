@@ -10,6 +10,7 @@ import shapes
 import coneflat
 from coneflat import errors
 from coneflat.atlas import coverage, find_overlaps, overlap_regions, part_touching
+from coneflat.atlas.boxes import snug_boxes
 from coneflat.atlas.orientation_kernel import fill_orientations
 
 UNIT = [[0, 0], [1, 0], [0, 1]]
@@ -272,6 +273,20 @@ def test_what_overlaps_is_not_parted():
     assert np.array_equal(parted, points)
     np.testing.assert_array_equal(overlaps.pairs, find_overlaps(points, triangles).pairs)
     assert len(overlaps.pairs) > 0
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, np.pi / 4, 2.0])
+def test_long_triangles_askew(angle):
+    """Beside one another, every tenth lying on the one after."""
+    count = 400
+    way = np.array([np.cos(angle), np.sin(angle)])
+    start = np.arange(count)[:, None] * [-way[1], way[0]] / count
+    wide = np.where(np.arange(count) % 10 == 5, 1.5, 0.9)[:, None] * [-way[1], way[0]] / count
+    corners = np.stack([start, start + 2 * way, start + way + wide], axis=1)
+    boxes = snug_boxes(corners / 4)
+    assert (-boxes[:, 3] - boxes[:, 1]).max() < 0.01
+    expected = np.arange(5, count - 1, 10)
+    np.testing.assert_array_equal(find_overlaps(corners).pairs, np.stack([expected, expected + 1], axis=1))
 
 
 def test_regions():

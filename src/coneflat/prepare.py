@@ -118,7 +118,4 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
 
 def _nothing_cut(pairs: IntArray) -> str:
     names = list_some([f"{a}-{b}" for a, b in pairs[:5].tolist()], len(pairs))
-    return (
-        f"{plural(len(pairs), 'edge')} to be cut, between vertices {names}, without another one next to it: it has the "
-        "same ends on both sides and was left."
-    )
+    return f"Not cut: {plural(len(pairs), 'edge')} ({names}) that no other one meets, so both sides have the same ends."
