@@ -62,9 +62,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         distortion = measure(scaled, uv[corners], errors, cones).rescaled(checked.exponent * np.log(2))
         if options.charts == "atlas" and distortion.overlapping_pairs:
             uv, overlaps = part_touching(uv, corners)
-            distortion = replace(
-                distortion, overlap=overlaps.fraction, overlapping_pairs=len(overlaps.pairs)
-            )
+            distortion = replace(distortion, overlap=overlaps.fraction, overlapping_pairs=len(overlaps.pairs))
     refined = any(one.figures.refined_triangles for one in laid_out)
     lost: tuple[str, ...] = ()
     if refined and given.source is not None:
