@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import maximum_flow
 import coneflat
 from coneflat.atlas import Layout, Seams, find_overlaps, injective_charts, overlap_layers
 from coneflat.atlas.glue import glue_charts
+from coneflat.atlas.regions import largest_layers
 from coneflat.atlas.separate import border_edges, separate, widen
 from coneflat.atlas.split import split_overlaps
 from coneflat.mesh import TriangleMesh
@@ -148,6 +149,31 @@ class TestSplit:
         assert (np.isin(pairs[:, 0], one) != np.isin(pairs[:, 0], other)).all()
         assert overlap_layers(pairs[:0], faces) == []
 
+    @pytest.mark.parametrize("seed", range(4))
+    def test_the_largest_layers_are_those_of_all_regions(self, seed):
+        """Of crumpled paper, whose overlaps are many, and some of them wound up."""
+        disk = flat_grid(18, 18)
+        bends = np.random.default_rng(seed).normal(size=(4, 2, 2))
+        points = disk.vertices + 0.5 * np.sin(5 * disk.vertices @ bends).sum(axis=0)
+        pairs = find_overlaps(points, disk.faces).pairs
+        areas = np.random.default_rng(seed).uniform(1, 2, len(disk.faces))
+        every = overlap_layers(pairs, disk.faces)
+        assert len(every) > 2
+        sizes = [min(areas[one].sum(), areas[other].sum()) for one, other in every]
+        for found, largest in zip(
+            largest_layers(pairs, disk.faces, areas), every[int(np.argmax(sizes))], strict=True
+        ):
+            assert np.array_equal(found, largest)
+
+    def test_too_many_charts_are_given_up(self):
+        points, faces = spiral(3.5, 300)
+        mesh = TriangleMesh(np.column_stack([points, np.zeros(len(points))]), faces)
+        given = points, faces, lengths_of(mesh)[mesh.halfedge_edges], np.ones(len(faces))
+        pairs = find_overlaps(points, faces).pairs
+        count = split_overlaps(*given, pairs).max() + 1
+        assert split_overlaps(*given, pairs, most=2) is None
+        assert split_overlaps(*given, pairs, most=count).max() + 1 == count
+
 
 class TestGlue:
     def test_sides_that_lie_on_each_other_are_joined(self):
@@ -171,6 +197,23 @@ class TestGlue:
         layout = glue_charts(TriangleMesh(result.vertices, result.faces), whole.split(chart), length)
         assert len(np.unique(layout.chart)) == 1
         assert overlapping(layout) == 0
+
+    def test_many_pieces_are_put_together_again(self):
+        """Of a sheet torn into pieces, each of them somewhere else, turned, one after the other finds its place."""
+        disk = flat_grid()
+        middle = disk.vertices[disk.faces].mean(axis=1)
+        chart = (5 * middle[:, 0]).astype(int) * 3 + (3 * middle[:, 1]).astype(int)
+        torn = Layout(disk.vertices, disk.faces, np.zeros(len(chart), dtype=np.int64)).split(chart)
+        piece = np.empty(len(torn.points), dtype=np.int64)
+        piece[torn.corners] = chart[:, None]
+        places = torn.places * np.exp(1j * piece) + 3 * piece
+        scattered = Layout(np.stack([places.real, places.imag], axis=1), torn.corners, chart)
+        layout = glue_charts(disk, scattered, lengths_of(disk)).numbered_anew()
+        assert layout.chart.max() == 0
+        assert len(layout.points) == len(disk.vertices)
+        assert overlapping(layout) == 0
+        here = lengths_of(TriangleMesh(layout.points, layout.corners))
+        assert np.allclose(np.sort(here), np.sort(lengths_of(disk)))
 
 
 @pytest.mark.parametrize("seed", range(6))

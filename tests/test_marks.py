@@ -8,8 +8,9 @@ import shapes
 
 import coneflat
 from coneflat import errors
+from coneflat.atlas import find_overlaps
 from coneflat.geometry.dihedral import dihedral_angles
-from coneflat.mesh import TriangleMesh
+from coneflat.mesh import TriangleMesh, end_corners
 
 
 def seam_pairs(result):
@@ -30,6 +31,16 @@ def test_a_closed_cylinder_is_a_strip_and_two_disks():
     result = coneflat.flatten(*shapes.cylinder(caps=True), sharp_angle=1.0)
     assert result.distortion.charts == 3
     assert result.distortion.qc_max == pytest.approx(1, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", [10, 26, 28])
+def test_charts_that_touch_themselves_do_not_overlap(seed):
+    """Flat pieces of a box lie beside their own sides, which rounding must not push across each other."""
+    vertices, faces = shapes.box()
+    edges = TriangleMesh(vertices, faces).edges
+    seams = edges[np.random.default_rng(seed).random(len(edges)) < 0.5]
+    result = coneflat.flatten(vertices, faces, charts="atlas", seams=seams)
+    assert result.distortion.overlapping_pairs == len(find_overlaps(result.corner_uv).pairs) == 0
 
 
 def test_named_seams_are_cut_and_act_like_a_boundary():
@@ -74,6 +85,10 @@ def test_dihedral_angles():
         ({"seams": [[0, 99999], [0, 1]]}, "no edge connects: 0-99999"),
         ({"seams": [0, 1]}, "pairs of vertices"),
         ({"seams": [[0.5, 1.0]]}, "pairs of vertices"),
+        ({"seams": [[0, 1], [2]]}, "seams: setting an array"),
+        ({"creases": np.ones(2)}, "creases must be a number"),
+        ({"hide_seams": np.nan}, "hide_seams must be a number from 0 up"),
+        ({"up": [[1], [1, 2]]}, "up: setting an array"),
         ({"seams": "uv"}, "unknown seams"),
         ({"seams": "input"}, "no UV coordinates"),
         ({"sharp_angle": 0}, "between 0 and pi"),
@@ -86,11 +101,83 @@ def test_what_makes_no_sense(options, message):
         coneflat.flatten(*shapes.torus(), **options)
 
 
+def two_edges(mesh):
+    """Two inner edges at one vertex."""
+    middle = mesh.edges[len(mesh.edges) // 2, 0]
+    return mesh.edges[(mesh.edges == middle).any(axis=1)][:2]
+
+
 def test_a_cone_cannot_lie_on_a_marked_seam():
     vertices, faces = shapes.torus()
-    edge = TriangleMesh(vertices, faces).edges[:1]
+    slit = two_edges(TriangleMesh(vertices, faces))
     with pytest.raises(errors.OptionError, match="lies on a seam"):
-        coneflat.flatten(vertices, faces, seams=edge, required_cones=edge[0, :1])
+        coneflat.flatten(vertices, faces, seams=slit, required_cones=slit[0, :1])
+
+
+@pytest.mark.parametrize("charts", ["one", "atlas"])
+@pytest.mark.parametrize("shape", ["sphere", "hill", "torus"])
+def test_seams_are_the_edges_with_two_places(shape, charts):
+    """Also where some of those marked meet no other, or are tied to others."""
+    vertices, faces = getattr(shapes, shape)()
+    mesh = TriangleMesh(vertices, faces)
+    chosen = np.random.default_rng(3).choice(len(mesh.edges), 40, replace=False)
+    result = coneflat.flatten(vertices, faces, seams=mesh.edges[chosen], charts=charts)
+    pairs = seam_pairs(result)
+    assert len(pairs) == len(result.seams)
+    inside = np.flatnonzero(~mesh.is_boundary_edge)
+    here, there = (
+        result.uv_faces.ravel()[np.stack(end_corners(h), axis=1)] for h in mesh.edge_halfedges[inside].T
+    )
+    cut = (here != there[:, ::-1]).any(axis=1)
+    assert {tuple(pair) for pair in mesh.edges[inside[cut]].tolist()} == pairs
+
+
+def test_an_edge_alone_is_no_cut():
+    vertices, faces = shapes.sphere(2)
+    mesh = TriangleMesh(vertices, faces)
+    plain, marked = (coneflat.flatten(vertices, faces, seams=seams) for seams in (None, mesh.edges[100:101]))
+    a, b = mesh.edges[100]
+    assert [note for note in marked.notes if f"Not cut: 1 edge ({a}-{b})" in note]
+    assert np.array_equal(plain.cones, marked.cones)
+    assert seam_pairs(plain) == seam_pairs(marked)
+    # Two are a slit.
+    assert {tuple(pair) for pair in two_edges(mesh).tolist()} <= seam_pairs(
+        coneflat.flatten(vertices, faces, seams=two_edges(mesh))
+    )
+
+
+def test_forbidden_edges_are_not_marked():
+    vertices, faces = shapes.box()
+    mesh = TriangleMesh(vertices, faces)
+    sharp = mesh.edges[dihedral_angles(mesh) > 1]
+    top = sharp[(vertices[sharp][:, :, 2] == 3).all(axis=1)]
+    result = coneflat.flatten(vertices, faces, sharp_angle=1.0, forbidden_seams=top)
+    assert not {tuple(pair) for pair in top.tolist()} & seam_pairs(result)
+    assert {tuple(pair) for pair in sharp.tolist()} - {tuple(pair) for pair in top.tolist()} <= seam_pairs(
+        result
+    )
+    with pytest.raises(errors.OptionError, match=f"1 edge given as seams and .* {top[0, 0]}-{top[0, 1]}"):
+        coneflat.flatten(vertices, faces, seams=top, forbidden_seams=top[:1])
+
+
+def test_one_part_may_weigh_nothing():
+    """Weights that are 0 all over one of the components say nothing about it."""
+    one, other = shapes.sphere(2, seed=1), shapes.sphere(2, seed=2)
+    vertices, faces = shapes.join(one, (other[0] + 5, other[1]))
+    weights = (vertices[:, 0] < 2.5).astype(float)
+    plain = coneflat.flatten(vertices, faces)
+    weighed = coneflat.flatten(vertices, faces, weights=weights, seam_weights=weights)
+    assert seam_pairs(weighed) == seam_pairs(plain)
+
+
+def test_errors_name_the_component():
+    vertices, faces = shapes.join(shapes.hill(), shapes.tetrahedron())
+    edges = TriangleMesh(vertices, faces).edges
+    barred = edges[(edges >= len(vertices) - 4).all(axis=1)]
+    with pytest.raises(
+        errors.SeamError, match=r"component of vertex 525 \(4 triangles\): 3 edges of 6 are needed"
+    ):
+        coneflat.flatten(vertices, faces, forbidden_seams=barred)
 
 
 def test_no_seams_change_nothing():

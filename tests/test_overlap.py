@@ -9,7 +9,8 @@ import shapes
 
 import coneflat
 from coneflat import errors
-from coneflat.atlas import coverage, find_overlaps, overlap_regions
+from coneflat.atlas import coverage, find_overlaps, overlap_regions, part_touching
+from coneflat.atlas.boxes import snug_boxes
 from coneflat.atlas.orientation_kernel import fill_orientations
 
 UNIT = [[0, 0], [1, 0], [0, 1]]
@@ -240,6 +241,52 @@ def test_limit():
     assert len(find_overlaps(corners[:1]).pairs) == 0
     assert find_overlaps(0 * corners).fraction == 0  # no triangle has area
     assert find_overlaps(corners[:2], limit=1).complete
+
+
+def separate_cells(columns=12, rows=9):
+    """Squares in rows, each with points of its own, which touch along their sides or parts of them."""
+    low = np.stack(
+        np.meshgrid(np.arange(columns, dtype=float), np.arange(rows, dtype=float), indexing="ij"), -1
+    )
+    low[..., 0] += 0.37 * (np.arange(rows) % 2)
+    quads = low.reshape(-1, 1, 2) + np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    corners = np.arange(4 * columns * rows).reshape(-1, 4)
+    return quads.reshape(-1, 2), np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+
+
+@pytest.mark.parametrize("angle", [0.1, 0.7, 2.5])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_what_touches_is_parted(angle, mirrored):
+    points, triangles = separate_cells()
+    turned = points @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]) / 31
+    triangles = triangles[:, ::-1] if mirrored else triangles
+    assert len(find_overlaps(turned, triangles).pairs) > 0  # by rounding
+    parted, overlaps = part_touching(turned, triangles)
+    assert len(overlaps.pairs) == len(find_overlaps(parted, triangles).pairs) == 0
+    assert np.abs(parted - turned).max() < 1e-13
+
+
+def test_what_overlaps_is_not_parted():
+    points, triangles = separate_cells(2, 1)
+    points[4:, 0] -= 1e-6
+    parted, overlaps = part_touching(points, triangles)
+    assert np.array_equal(parted, points)
+    np.testing.assert_array_equal(overlaps.pairs, find_overlaps(points, triangles).pairs)
+    assert len(overlaps.pairs) > 0
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, np.pi / 4, 2.0])
+def test_long_triangles_askew(angle):
+    """Beside one another, every tenth lying on the one after."""
+    count = 400
+    way = np.array([np.cos(angle), np.sin(angle)])
+    start = np.arange(count)[:, None] * [-way[1], way[0]] / count
+    wide = np.where(np.arange(count) % 10 == 5, 1.5, 0.9)[:, None] * [-way[1], way[0]] / count
+    corners = np.stack([start, start + 2 * way, start + way + wide], axis=1)
+    boxes = snug_boxes(corners / 4)
+    assert (-boxes[:, 3] - boxes[:, 1]).max() < 0.01
+    expected = np.arange(5, count - 1, 10)
+    np.testing.assert_array_equal(find_overlaps(corners).pairs, np.stack([expected, expected + 1], axis=1))
 
 
 def test_regions():

@@ -5,8 +5,9 @@ import pytest
 import shapes
 
 import coneflat
-from coneflat import errors
+from coneflat import TriangleMesh, errors
 from coneflat.atlas import find_overlaps
+from coneflat.distortion import measure
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +34,30 @@ def test_charts_of_several_meshes_share_a_texture(results):
         ]
         np.testing.assert_allclose(*sides, rtol=1e-9)
         assert after.packing_efficiency == together[0].packing_efficiency
+
+
+def test_what_a_result_tells_of_itself_fits_its_new_place(results):
+    for one in coneflat.pack_together(results, resolution=512, padding=4, rotate="none"):
+        again = measure(TriangleMesh(one.vertices, one.faces), one.corner_uv)
+        np.testing.assert_allclose(one.distortion.log_area_scale, again.log_area_scale, rtol=1e-6)
+        assert one.distortion.overlapping_pairs == again.overlapping_pairs == 0
+        assert (one.settings["resolution"], one.settings["padding"], one.settings["tiles"]) == (512, 4, 1)
+
+
+def test_areas_are_those_of_the_model():
+    """Whatever its unit is."""
+    vertices, faces = shapes.sphere(2)
+    for size in (1e-3, 7.0):
+        one = coneflat.flatten(vertices * size, faces)
+        again = measure(TriangleMesh(one.vertices, one.faces), one.corner_uv)
+        np.testing.assert_allclose(one.distortion.log_area_scale, again.log_area_scale, atol=1e-9)
+
+
+def test_charts_that_are_not_turned(results):
+    for before, after in zip(results, coneflat.pack_together(results, rotate="none"), strict=True):
+        sides = [one.corner_uv[:, 1] - one.corner_uv[:, 0] for one in (before, after)]
+        ratio = after.uv_scale / before.uv_scale
+        np.testing.assert_allclose(sides[0] * ratio, sides[1], atol=1e-9)
 
 
 def test_tiles(results):

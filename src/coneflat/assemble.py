@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ._arrays import FloatArray, IntArray
-from .atlas import Packed, orient_charts, pack_charts
+from .atlas import Packed, orient_charts, pack_charts, part_touching
 from .distortion import curvature_errors, measure
 from .figures import SolveFigures
 from .mesh import TriangleMesh
@@ -58,7 +59,10 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     with stages("measure"):
         scaled = TriangleMesh(np.ldexp(positions, checked.exponent), faces)
         errors = curvature_errors(residual[np.isfinite(residual)])
-        distortion = measure(scaled, uv[corners], errors, cones)
+        distortion = measure(scaled, uv[corners], errors, cones).rescaled(checked.exponent * np.log(2))
+        if options.charts == "atlas" and distortion.overlapping_pairs:
+            uv, overlaps = part_touching(uv, corners)
+            distortion = replace(distortion, overlap=overlaps.fraction, overlapping_pairs=len(overlaps.pairs))
     refined = any(one.figures.refined_triangles for one in laid_out)
     lost: tuple[str, ...] = ()
     if refined and given.source is not None:

@@ -67,6 +67,10 @@ class Distortion:
     curvature_error: float = float("nan")
     curvature_error_max: float = float("nan")
 
+    def rescaled(self, log_factor: float) -> Distortion:
+        """Return the measures of the same layout at another scale, given by the log of that over the one measured."""
+        return replace(self, log_area_scale=self.log_area_scale + log_factor)
+
 
 def curvature_errors(residual: FloatArray) -> tuple[float, float]:
     """Return ||target - K||_2 / n as in Table 1 of the paper, and the largest |target - K|, both over pi.

@@ -8,28 +8,49 @@ from ._arrays import BoolArray, IntArray
 from .errors import OptionError
 from .geometry.dihedral import dihedral_angles
 from .inputs import InputMesh
-from .mesh import end_corners
+from .mesh import TriangleMesh, end_corners
 from .numbering import turn_corners
 from .options import Options
 from .text import list_some, plural
 from .validation import CheckedMesh
 
 
-def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh) -> BoolArray:
+def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh, forbidden: BoolArray) -> BoolArray:
     """Return (e,) True for inner edges that are to be seams: named, sharp, or seams of the input's own UVs.
 
+    forbidden: (e,) edges that are not to be cut, sharp or not.
+
     Raises:
-        OptionError: a pair of vertices is no edge; the input has no UVs.
+        OptionError: a pair of vertices is no edge, or is forbidden; the input has no UVs.
     """
     mesh = checked.mesh
     marked = np.zeros(len(mesh.edges), dtype=bool)
     if isinstance(options.seams, str):
         marked |= _seams_of_input(checked, given)
-    elif options.seams is not None:
-        marked[named_edges(checked, np.asarray(options.seams))] = True
     if options.sharp_angle is not None:
         marked |= np.abs(dihedral_angles(mesh)) > options.sharp_angle
+    marked &= ~forbidden
+    if options.seams is not None and not isinstance(options.seams, str):
+        named = named_edges(checked, np.asarray(options.seams))
+        both = named[forbidden[named]]
+        if len(both):
+            pair = checked.vertex_origin[mesh.edges[both[0]]]
+            raise OptionError(
+                f"{plural(len(both), 'edge')} given as seams and as forbidden seams: the first is {pair[0]}-{pair[1]}"
+            )
+        marked[named] = True
     return marked & ~mesh.is_boundary_edge
+
+
+def effective_marks(mesh: TriangleMesh, marked: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return the marked edges that cut something, and those that do not: alone, their ends are the same on both sides.
+
+    marked: (e,) inner edges.
+    """
+    at = np.bincount(mesh.edges[marked].ravel(), minlength=len(mesh.vertices))
+    falls_apart = (at > 1) | mesh.is_boundary_vertex
+    cuts = falls_apart[mesh.edges].any(axis=1)
+    return np.flatnonzero(marked & cuts), np.flatnonzero(marked & ~cuts)
 
 
 def named_edges(checked: CheckedMesh, pairs: IntArray) -> IntArray:

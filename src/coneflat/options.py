@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ._arrays import IntArray
 from .errors import OptionError
@@ -162,7 +162,7 @@ class Options:
             )
         object.__setattr__(self, "padding", padding)
         if self.up is not None:
-            up = np.asarray(self.up)
+            up = _array("up", self.up)
             if up.shape != (3,) or up.dtype.kind not in "fiu" or not (np.isfinite(up).all() and up.any()):
                 raise OptionError(
                     f"up must be a direction, three numbers that are not all 0, not {self.up!r}"
@@ -178,15 +178,14 @@ class Options:
             elif given is not None:
                 object.__setattr__(self, name, _pairs(name.replace("_", " "), given))
         for name in ("creases", "hide_seams"):
-            strength = (
-                float(getattr(self, name)) if getattr(self, name) in (True, False) else getattr(self, name)
-            )
-            object.__setattr__(self, name, _number(name, strength))
-            if not 0 <= getattr(self, name) < math.inf:
+            given = getattr(self, name)
+            strength = float(given) if isinstance(given, (bool, np.bool_)) else _number(name, given)
+            object.__setattr__(self, name, strength)
+            if not 0 <= strength < math.inf:
                 raise OptionError(f"{name} must be a number from 0 up, not {strength:g}")
         if self.sharp_angle is not None:
             object.__setattr__(self, "sharp_angle", _number("sharp_angle", self.sharp_angle))
-            if not 0 < _number("sharp_angle", self.sharp_angle) < math.pi:
+            if not 0 < self.sharp_angle < math.pi:
                 raise OptionError(
                     f"the sharp angle must be between 0 and pi, not {self.sharp_angle:g} radians"
                 )
@@ -286,9 +285,16 @@ def _whole(name: str, value: object) -> int:
     return int(number)
 
 
+def _array(name: str, value: object) -> NDArray[Any]:
+    try:
+        return np.asarray(value)
+    except ValueError as error:
+        raise OptionError(f"{name}: {error}") from error
+
+
 def _pairs(noun: str, given: object) -> IntArray:
     """Return (k, 2) pairs of vertices."""
-    pairs = np.asarray(list(given) if isinstance(given, (set, frozenset)) else given)
+    pairs = _array(noun, list(given) if isinstance(given, (set, frozenset)) else given)
     if not pairs.size:
         return np.empty((0, 2), dtype=np.int64)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":

@@ -18,7 +18,7 @@ from .cones import ConeSolution
 from .conformal.boundary import prescribed_boundary, straight_boundary
 from .conformal.turning import open_turning
 from .distortion import measure
-from .errors import ConvergenceError, CurvatureError
+from .errors import CurvatureError, MetricError, SeamError
 from .geometry.areas import area_distortion, weighted_areas
 from .mesh import TriangleMesh
 from .methods import ExactChoices, FlatMetric, LaidOut, exact_flattening, linear_flattening
@@ -134,10 +134,11 @@ def flatten(
         charts: "one" lays every component out as a single disk, which may overlap itself, as the paper does; "atlas"
             moves its seams, and cuts where it must, so that nothing overlaps.
         seams: edges to be cut in any case: (k, 2) pairs of vertices, or "input" for the seams of the file's own UVs.
-            They act like a boundary; where they close curves, the mesh falls into several charts.
+            They act like a boundary; where they close curves, the mesh falls into several charts. A single edge
+            inside, which no other meets, has the same ends on both sides: it is no cut.
         sharp_angle: edges whose faces' normals differ by more than this are cut, too, radians.
-        forbidden_seams: (k, 2) pairs of vertices between which the first cut must not run; what is cut later so that
-            nothing overlaps avoids them where it can.
+        forbidden_seams: (k, 2) pairs of vertices between which the first cut must not run, not for sharp edges or
+            seams of the file either; what is cut later so that nothing overlaps avoids them where it can.
         creases: how much seams prefer sharp edges, 0 and up: at 1, one of 60 degrees and more costs a tenth of its
             length.
         hide_seams: how much they prefer what can hardly be seen, 0 and up: at 1, it costs a tenth of its length.
@@ -152,6 +153,7 @@ def flatten(
         MeshError: the mesh cannot be flattened; see `coneflat.errors` for its kinds.
         CurvatureError: no metric has the curvatures asked for.
         OptionError: an option makes no sense.
+        SeamError: every set of seams needs forbidden edges.
         MetricError: the computation found no finite result.
     """
     options = Options(
@@ -204,7 +206,7 @@ def _flatten_components(prepared: Prepared, options: Options, stages: Stages) ->
         stages.share = len(part.faces) / len(prepared.checked.mesh.faces)
         try:
             pieces.append(flatten_component(part, options, stages))
-        except (CurvatureError, ConvergenceError) as error:
+        except (CurvatureError, MetricError, SeamError) as error:
             if len(prepared.components) == 1:
                 raise
             where = f"in the component of vertex {part.wishes.names[0]} ({len(part.faces):,} triangles)"

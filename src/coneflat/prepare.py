@@ -13,11 +13,12 @@ from ._arrays import BoolArray, FloatArray, IntArray
 from .geometry import edge_lengths, mollify
 from .geometry.visibility import visible_share
 from .inputs import InputMesh, as_input
-from .marks import marked_edges, named_edges
+from .marks import effective_marks, marked_edges, named_edges
 from .mesh import TriangleMesh
 from .numbering import at_unit_size, turn_corners
 from .options import Options
 from .seams import CutMesh, open_along
+from .text import list_some, plural
 from .validation import CheckedMesh, check_mesh
 from .wishes import Wishes, locate_wishes
 
@@ -53,7 +54,7 @@ class Prepared:
     Attributes:
         given: the input.
         checked: the mesh, at a size of about one.
-        notes: what was done to triangles without area.
+        notes: what was done to triangles without area, and which marks cut nothing.
         components: its connected parts, apart also where seams are marked.
         seams: (k, 2) vertices of the edges marked as seams.
     """
@@ -81,16 +82,18 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
     )
     is_diagonal = turn_corners(checked, ~given.is_side())
     wishes = locate_wishes(checked, options, given)
-    marked = np.empty(0, dtype=np.int64)
-    opened = CutMesh(checked.mesh, np.arange(len(checked.mesh.vertices)))
-    if options.marks_seams:
-        marked = np.flatnonzero(marked_edges(checked, options, given))
-        wishes.keep_off(checked.mesh.edges[marked])
-        opened = open_along(checked.mesh, marked)
-
+    notes = [] if note is None else [note]
     forbidden = np.zeros(len(checked.mesh.edges), dtype=bool)
     if options.forbidden_seams is not None:
         forbidden[named_edges(checked, np.asarray(options.forbidden_seams))] = True
+    marked = np.empty(0, dtype=np.int64)
+    opened = CutMesh(checked.mesh, np.arange(len(checked.mesh.vertices)))
+    if options.marks_seams:
+        marked, alone = effective_marks(checked.mesh, marked_edges(checked, options, given, forbidden))
+        if len(alone):
+            notes.append(_nothing_cut(wishes.names[checked.mesh.edges[alone]]))
+        wishes.keep_off(checked.mesh.edges[marked])
+        opened = open_along(checked.mesh, marked)
     seen = None
     if options.hide_seams:
         up = None if options.up is None else np.array(options.up)
@@ -110,5 +113,9 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
                 wishes.within(origin),
             )
 
-    notes = () if note is None else (note,)
-    return Prepared(given, checked, notes, tuple(components()), checked.mesh.edges[marked])
+    return Prepared(given, checked, tuple(notes), tuple(components()), checked.mesh.edges[marked])
+
+
+def _nothing_cut(pairs: IntArray) -> str:
+    names = list_some([f"{a}-{b}" for a, b in pairs[:5].tolist()], len(pairs))
+    return f"Not cut: {plural(len(pairs), 'edge')} ({names}) that no other one meets, so both sides have the same ends."

@@ -83,9 +83,14 @@ class Wishes:
             self.corners.within(component),
             self.required.within(component),
             self.is_allowed[component],
-            None if self.weights is None else self.weights[component],
-            None if self.seam_weights is None else self.seam_weights[component],
+            _weights_within(self.weights, component),
+            _weights_within(self.seam_weights, component),
         )
+
+
+def _weights_within(weights: FloatArray | None, component: IntArray) -> FloatArray | None:
+    """Return the weights of a component; None where all are 0, which there says no more than that they are equal."""
+    return None if weights is None or not weights[component].any() else weights[component]
 
 
 def locate_wishes(checked: CheckedMesh, options: Options, given: InputMesh) -> Wishes:

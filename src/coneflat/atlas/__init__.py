@@ -7,6 +7,7 @@ from .overlap import Overlaps, find_overlaps
 from .pack import Packed, pack_charts
 from .regions import overlap_layers, overlap_regions
 from .together import pack_together
+from .touch import part_touching
 
 __all__ = [
     "Layout",
@@ -20,4 +21,5 @@ __all__ = [
     "overlap_regions",
     "pack_charts",
     "pack_together",
+    "part_touching",
 ]

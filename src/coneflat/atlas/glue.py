@@ -7,10 +7,11 @@ any seam between them. So what was split off where it was in the way may have it
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..mesh import TriangleMesh
-from .layout import Layout, Seams
+from .layout import Layout, Seams, same_points
 from .overlap import find_overlaps
 
 # Relative to the length of a seam edge: how far its two sides may be apart, moved together, to be glued.
@@ -29,51 +30,58 @@ def glue_charts(mesh: TriangleMesh, layout: Layout, lengths: FloatArray) -> Layo
     inner = np.flatnonzero(seams.charts[:, 0] == seams.charts[:, 1])
     layout = layout.joined(seams.coinciding(layout.places, inner, CONGRUENT))
     refused: set[tuple[int, ...]] = set()
-    while (found := _glued_once(mesh, layout, lengths, refused)) is not None:
-        layout = found
-    return layout
+    gluing = _Gluing(mesh, layout)
+    # What is glued changes which seams are stretches of one.
+    while gluing.glue_longest(lengths, refused):
+        gluing = _Gluing(mesh, gluing.layout)
+    return gluing.layout
 
 
-def _glued_once(
-    mesh: TriangleMesh, layout: Layout, lengths: FloatArray, refused: set[tuple[int, ...]]
-) -> Layout | None:
-    """Return the layout with two charts glued at the longest stretch of seam where they fit; None if none do.
+class _Gluing:
+    """Charts of a layout that are glued one by one, at the expense of what is near only."""
 
-    refused: stretches, with the sizes of their charts, at which they do not; added to.
-    """
-    seams = Seams(mesh, layout)
-    between = np.flatnonzero(seams.charts[:, 0] != seams.charts[:, 1])
-    if not len(between):
-        return None
-    stretch = seams.stretches(mesh)[between]
-    fitting = _Fitting(layout, seams)
-    total = np.bincount(stretch, weights=lengths[seams.edges[between]])
-    for best in np.argsort(-total, kind="stable")[: np.count_nonzero(total)]:
-        members = between[stretch == best]
-        sizes = (len(fitting.faces[chart]) for chart in seams.charts[members[0]])
-        key = (int(seams.edges[members[0]]), len(members), *sizes)
-        if key in refused:
-            continue
-        found = fitting.glued_at(members)
-        if found is not None:
-            return found
-        refused.add(key)
-    return None
-
-
-class _Fitting:
-    """Tries charts of a layout in other places, at the expense of what is near only."""
-
-    def __init__(self, layout: Layout, seams: Seams) -> None:
-        self.layout, self.seams, self.places = layout, seams, layout.places
-        order = np.argsort(layout.chart, kind="stable")
-        self.faces = np.split(order, np.cumsum(np.bincount(layout.chart))[:-1])
+    def __init__(self, mesh: TriangleMesh, layout: Layout) -> None:
+        self.seams, self.places = Seams(mesh, layout), layout.places
+        between = np.flatnonzero(self.seams.charts[:, 0] != self.seams.charts[:, 1])
+        stretches = _members(self.seams.stretches(mesh)[between], between)
+        self.stretches = [members for members in stretches if len(members)]
+        self.corners, self.chart = layout.corners.copy(), layout.chart.copy()
+        self.faces = _members(layout.chart, np.arange(len(layout.chart)))
         corners = layout.points[layout.corners]
         self.low, self.high = corners.min(axis=1), corners.max(axis=1)
 
-    def glued_at(self, members: IntArray) -> Layout | None:
-        """Return the layout with the smaller of two charts moved to continue the other; None if it does not fit."""
-        layout, seams = self.layout, self.seams
+    @property
+    def layout(self) -> Layout:
+        """What they are now."""
+        return Layout(_pairs(self.places), self.corners, self.chart)
+
+    def glue_longest(self, lengths: FloatArray, refused: set[tuple[int, ...]]) -> bool:
+        """Glue charts at their stretches of seam, the longest first, where they fit; return whether any did.
+
+        refused: stretches, with the sizes of their charts, at which they do not; added to.
+        """
+        glued = False
+        total = np.array([lengths[self.seams.edges[members]].sum() for members in self.stretches])
+        for best in np.argsort(-total, kind="stable"):
+            members = self.stretches[best]
+            one, other = self.seams.charts[members[0]]
+            key = (
+                int(self.seams.edges[members[0]]),
+                len(members),
+                len(self.faces[one]),
+                len(self.faces[other]),
+            )
+            if one == other or key in refused:
+                continue
+            if self._glue_at(members):
+                glued = True
+            else:
+                refused.add(key)
+        return glued
+
+    def _glue_at(self, members: IntArray) -> bool:
+        """Move the smaller of two charts to continue the other, if it fits there; return whether it does."""
+        seams = self.seams
         here, there = self.places[seams.here[members]], self.places[seams.there[members]]
         longest = np.argmax(np.abs(here[:, 1] - here[:, 0]))
         (kept, moved), here, there = seams.charts[members[longest]], here[longest], there[longest]
@@ -82,25 +90,33 @@ class _Fitting:
         across = there[1] - there[0]
         turn = (here[1] - here[0]) / across if across else 0.0
         if not abs(abs(turn) - 1) <= CONGRUENT:
-            return None
-        places = self.places.copy()
-        is_moved = np.zeros(len(places), dtype=bool)
-        is_moved[layout.corners[self.faces[moved]]] = True
-        places[is_moved] = (places[is_moved] - there.mean()) * (turn / abs(turn)) + here.mean()
-        pairs = seams.coinciding(places, seams.within(kept, moved), CONGRUENT)
+            return False
+        points = np.unique(self.corners[self.faces[moved]])
+        before, self.places = self.places, self.places.copy()
+        self.places[points] = (before[points] - there.mean()) * (turn / abs(turn)) + here.mean()
+        pairs = seams.coinciding(self.places, seams.within(kept, moved), CONGRUENT)
         # To the last digit: both of a pair are to be one point.
-        pairs = np.where(is_moved[pairs[:, :1]], pairs[:, ::-1], pairs)
-        places[pairs[:, 1]] = places[pairs[:, 0]]
-        points = np.stack([places.real, places.imag], axis=1)
-        if not self._fits(points, kept, moved):
-            return None
-        chart = layout.chart.copy()
-        chart[self.faces[moved]] = kept
-        return Layout(points, layout.corners, chart).joined(pairs)
+        pairs = np.where(np.isin(pairs[:, :1], points), pairs[:, ::-1], pairs)
+        self.places[pairs[:, 1]] = self.places[pairs[:, 0]]
+        joined = same_points(len(before), pairs)
+        self.places = self.places[joined]
+        if not self._fits(kept, moved):
+            self.places = before
+            return False
+        self.corners, seams.here, seams.there = joined[self.corners], joined[seams.here], joined[seams.there]
+        seams.charts[seams.charts == moved] = self.chart[self.faces[moved]] = kept
+        self.faces[kept] = np.concatenate([self.faces[kept], self.faces[moved]])
+        self.faces[moved] = self.faces[moved][:0]
+        corners = self._corners(self.faces[kept])
+        self.low[self.faces[kept]], self.high[self.faces[kept]] = corners.min(axis=1), corners.max(axis=1)
+        return True
 
-    def _fits(self, points: FloatArray, kept: int, moved: int) -> bool:
+    def _corners(self, faces: IntArray) -> FloatArray:
+        return _pairs(self.places[self.corners[faces]])
+
+    def _fits(self, kept: int, moved: int) -> bool:
         """Whether the triangles of a chart are upright in their new places, and overlap none of the other's."""
-        corners = points[self.layout.corners[self.faces[moved]]]
+        corners = self._corners(self.faces[moved])
         sides = corners[:, 1:] - corners[:, :1]
         if not (sides[:, 0, 0] * sides[:, 1, 1] > sides[:, 0, 1] * sides[:, 1, 0]).all():
             return False
@@ -110,8 +126,18 @@ class _Fitting:
         if not len(others):
             return True
         near = _touches(low, high, self.low[others].min(axis=0), self.high[others].max(axis=0))
-        together = np.concatenate([corners[near], points[self.layout.corners[others]]])
+        together = np.concatenate([corners[near], self._corners(others)])
         return not len(find_overlaps(together, limit=1).pairs)
+
+
+def _members(label: IntArray, numbers: IntArray) -> list[IntArray]:
+    """Return the numbers that have each label."""
+    return np.split(numbers[np.argsort(label, kind="stable")], np.cumsum(np.bincount(label))[:-1])
+
+
+def _pairs(places: NDArray[np.complex128]) -> FloatArray:
+    """Return complex numbers as pairs of their parts, along a last axis more."""
+    return np.stack([places.real, places.imag], axis=-1)
 
 
 def _touches(low: FloatArray, high: FloatArray, least: FloatArray, most: FloatArray) -> BoolArray:

@@ -16,6 +16,8 @@ from .split import split_overlaps
 LEAST_PARTS = (0.0, 0.002, 0.01)
 # On larger meshes, triangles, only where there are slivers.
 LARGE = 50_000
+# Where so many charts are split off, larger pieces are tried first: most would only have to be glued on again.
+MANY = 64
 # Below this part of the area a chart is a sliver.
 SLIVER = 0.001
 
@@ -46,7 +48,12 @@ def injective_charts(
     found: list[tuple[tuple[int, int, float], int, Layout]] = []
     for part in LEAST_PARTS:
         least = part * float(np.abs(areas).sum())
-        chart = split_overlaps(points, corners, lengths[mesh.halfedge_edges], np.abs(areas), pairs, least)
+        most = MANY if part < LEAST_PARTS[-1] else np.inf
+        chart = split_overlaps(
+            points, corners, lengths[mesh.halfedge_edges], np.abs(areas), pairs, least, most
+        )
+        if chart is None:
+            continue
         layout = glue_charts(mesh, whole.split(chart), lengths).numbered_anew()
         sizes = np.bincount(layout.chart, weights=np.abs(areas))
         slivers = int((sizes < SLIVER * sizes.sum()).sum())

@@ -38,19 +38,23 @@ class Layout:
 
     def joined(self, pairs: IntArray) -> Layout:
         """Return the layout with pairs of points (k, 2) made one, whichever has the smallest index."""
-        if not len(pairs):
-            return self
-        count = len(self.points)
-        number, label = label_components(count, pairs[:, 0], pairs[:, 1])
-        first = np.full(number, count)
-        np.minimum.at(first, label, np.arange(count))
-        return Layout(self.points, first[label][self.corners], self.chart)
+        return Layout(self.points, same_points(len(self.points), pairs)[self.corners], self.chart)
 
     def numbered_anew(self) -> Layout:
         """Return the layout without unused points, charts counted from 0."""
         used, corners = np.unique(self.corners, return_inverse=True)
         _, chart = np.unique(self.chart, return_inverse=True)
         return Layout(self.points[used], corners.reshape(-1, 3), chart)
+
+
+def same_points(count: int, pairs: IntArray) -> IntArray:
+    """Return (count,) for each point the smallest of those that it is one with, by a chain of pairs (k, 2)."""
+    same = np.arange(count)
+    used, index = np.unique(pairs, return_inverse=True)
+    _, label = label_components(len(used), *index.reshape(-1, 2).T)
+    _, first = np.unique(label, return_index=True)
+    same[used] = used[first[label]]
+    return same
 
 
 class Seams:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .._arrays import FloatArray, IntArray
 from ..errors import ArrayShapeError, OptionError
 from ..validation import as_faces, require_finite
-from .boxes import bounding_boxes, box_tree, z_order
+from .boxes import box_tree, snug_boxes, z_order
 from .coverage import covered_twice
 
 # Of the largest coordinate: what is smaller counts as 0, lest products underflow.
@@ -57,8 +57,8 @@ def find_overlaps(
         of a seam that should coincide, but are an ulp apart the wrong way, do overlap; `area` then is what
         rounding makes of it, about 1e-16 of the layout's extent times the length of the seam.
 
-        Candidates come from a binary tree of boxes, which takes n log n; long triangles askew in large numbers,
-        whose boxes all overlap, take more.
+        Candidates come from a binary tree of boxes, which takes n log n; large numbers of long triangles in many
+        directions, whose boxes all overlap, take more.
     """
     if limit is not None and limit < 1:
         raise OptionError(f"the limit must be 1 or more, not {limit}")
@@ -116,7 +116,7 @@ def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tup
 
     if len(chosen) < 2:
         return np.empty((0, 2), dtype=np.int64), True
-    boxes = bounding_boxes(corners[chosen])
+    boxes = snug_boxes(corners[chosen])
     order = z_order(boxes)
     tree, chosen = box_tree(boxes[order]), chosen[order]
     arrays = tree, corners[chosen].reshape(-1, 6), np.empty(12)

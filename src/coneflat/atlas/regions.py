@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import IntArray
+from .._arrays import FloatArray, IntArray
 from ..mesh import NEXT, label_components, sort_by_counting, sort_pairs
 
 
@@ -29,22 +29,47 @@ def overlap_layers(pairs: IntArray, triangles: IntArray) -> list[tuple[IntArray,
     """
     if not len(pairs):
         return []
+    count, label = _label_ways(pairs, triangles)
+    order = sort_by_counting(label, count)
+    regions = np.split(order, np.cumsum(np.bincount(label, minlength=count))[:-1])
+    # An odd one is the same region the other way round.
+    return [_layers(pairs, members) for members in regions if members[0] % 2 == 0]
+
+
+def largest_layers(pairs: IntArray, triangles: IntArray, areas: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return the layers of the region of which the smaller layer has the most area.
+
+    areas: (m,) of the triangles.
+    """
+    count, label = _label_ways(pairs, triangles)
+    kept, moved = pairs.ravel(), pairs[:, ::-1].ravel()
+    layers = [np.unique(label * len(areas) + side) for side in (kept, moved)]
+    sizes = [np.bincount(one // len(areas), areas[one % len(areas)], count) for one in layers]
+    size = np.minimum(*sizes)
+    _, first = np.unique(label, return_index=True)
+    wound = np.unique(layers[0][np.isin(layers[0], layers[1])] // len(areas))
+    size[wound] = np.minimum(areas[kept], areas[moved])[first[wound]]
+    size[first % 2 == 1] = -1.0
+    return _layers(pairs, np.flatnonzero(label == np.argmax(size)))
+
+
+def _label_ways(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray]:
+    """Return how many parts the pairs form, each both ways round, and the part of each; numbered as in `_steps`.
+
+    Which triangle is in which layer goes on with the overlap: a region has two parts, one the other way round, unless
+    it is wound up.
+    """
     source, place = _steps(pairs, triangles)
-    # Pairs the right way round and the other way round: which triangle is in which layer goes on with the overlap.
-    count, label = label_components(
+    return label_components(
         2 * len(pairs), np.concatenate([source, source ^ 1]), np.concatenate([place, place ^ 1])
     )
-    kept, moved = pairs.ravel(), pairs[:, ::-1].ravel()
-    order = sort_by_counting(label, count)
-    layers = []
-    for members in np.split(order, np.cumsum(np.bincount(label, minlength=count))[:-1]):
-        if members[0] % 2:  # the same region the other way round
-            continue
-        one, other = np.unique(kept[members]), np.unique(moved[members])
-        if len(np.intersect1d(one, other)):
-            one, other = kept[members[:1]], moved[members[:1]]
-        layers.append((one, other))
-    return layers
+
+
+def _layers(pairs: IntArray, members: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the first and second triangles of pairs, numbered as in `_steps`; of one pair if they share any."""
+    kept, moved = pairs.ravel()[members], pairs.ravel()[members ^ 1]
+    one, other = np.unique(kept), np.unique(moved)
+    return (kept[:1], moved[:1]) if len(np.intersect1d(one, other)) else (one, other)
 
 
 def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:

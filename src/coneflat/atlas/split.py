@@ -6,7 +6,7 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..mesh import TriangleMesh, corner_fans
-from .regions import overlap_layers
+from .regions import largest_layers
 from .separate import separate, widen
 
 
@@ -17,32 +17,43 @@ def split_overlaps(
     areas: FloatArray,
     pairs: IntArray,
     least: float = 0.0,
-) -> IntArray:
-    """Return (m,) the chart of each triangle, numbered from 0, so that no chart has both of a pair.
+    most: float = np.inf,
+) -> IntArray | None:
+    """Return (m,) the chart of each triangle, numbered from 0, so that no chart has both of a pair; None if too many.
 
-    The two layers of the largest overlap are separated by the cheapest cut, then those of the next that is left.
+    The two layers of the largest overlap are separated by the cheapest cut, then those of the largest that is left in
+    each piece.
 
     Args:
         points: (u, 2) of the plane.
         corners: (m, 3) indices of points; the triangles of a connected disk.
         costs: (3m,) positive, what it costs to cut the side opposite each corner.
         areas: (m,) by which overlaps are compared.
-        pairs: (k, 2) of triangles to be separated.
+        pairs: (k, 2) of triangles to be separated, in lexicographic order.
         least: the area that a chart should have at least.
+        most: the number of charts that are too many.
     """
-    chart = np.zeros(len(corners), dtype=np.int64)
-    while len(pairs):
-        one, other = _largest(pairs, corners, areas)
-        faces = np.flatnonzero(chart == chart[one[0]])
+    chart, count = np.zeros(len(corners), dtype=np.int64), 1
+    waiting = [(np.arange(len(corners)), pairs)] if len(pairs) else []
+    while waiting and count < most:
+        faces, pairs = waiting.pop()
         disk = as_disk(points, corners[faces])
-        layers = np.isin(faces, one), np.isin(faces, other)
+        one, other = np.zeros((2, len(faces)), dtype=bool)
+        for layer, members in zip((one, other), largest_layers(pairs, disk.faces, areas[faces]), strict=True):
+            layer[members] = True
         if least > 0:
-            layers = widen(disk, *layers, areas[faces], least)
+            one, other = widen(disk, one, other, areas[faces], least)
         sides = disk.edge_halfedges[:, 0]
-        pieces = separate(disk, *layers, costs[3 * faces[sides // 3] + sides % 3])
-        chart[faces] = np.where(pieces == 0, chart[faces], chart.max() + pieces)
-        pairs = pairs[chart[pairs[:, 0]] == chart[pairs[:, 1]]]
-    return chart
+        pieces = separate(disk, one, other, costs[3 * faces[sides // 3] + sides % 3])
+        left = np.where(pieces[pairs[:, 0]] == pieces[pairs[:, 1]], pieces[pairs[:, 0]], -1)
+        for piece in range(int(pieces.max()) + 1):
+            members = np.flatnonzero(pieces == piece)
+            if piece:
+                chart[faces[members]] = count
+                count += 1
+            if (left == piece).any():
+                waiting.append((faces[members], np.searchsorted(members, pairs[left == piece])))
+    return None if waiting else chart
 
 
 def as_disk(points: FloatArray, corners: IntArray) -> TriangleMesh:
@@ -57,13 +68,3 @@ def as_disk(points: FloatArray, corners: IntArray) -> TriangleMesh:
     vertices = np.empty((count, 2))
     vertices[fans] = pinched.vertices[pinched.faces]
     return TriangleMesh(vertices, fans)
-
-
-def _largest(pairs: IntArray, corners: IntArray, areas: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return the triangles of the two layers of the overlap in which most area is involved."""
-    best, most = (pairs[0, :1], pairs[0, 1:]), -1.0
-    for one, other in overlap_layers(pairs, corners):
-        size = float(min(areas[one].sum(), areas[other].sum()))
-        if size > most:
-            best, most = (one, other), size
-    return best

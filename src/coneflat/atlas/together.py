@@ -12,13 +12,19 @@ from .._arrays import IntArray
 from ..errors import EmptyMeshError
 from ..mesh import TriangleMesh, label_components
 from .pack import pack_charts
+from .touch import part_touching
 
 if TYPE_CHECKING:
     from ..result import Flattening
 
 
 def pack_together(
-    results: Sequence[Flattening], *, resolution: int = 1024, padding: float = 2.0, tiles: int = 1
+    results: Sequence[Flattening],
+    *,
+    resolution: int = 1024,
+    padding: float = 2.0,
+    rotate: str = "any",
+    tiles: int = 1,
 ) -> list[Flattening]:
     """Return results whose charts share one texture, or several (UDIM tiles), all at one scale of their models.
 
@@ -26,6 +32,8 @@ def pack_together(
         results: flattened meshes, in the same unit of length.
         resolution: texels along a side of the texture.
         padding: texels between charts, at least.
+        rotate: "any" turns charts so that they fill the texture best, "quarter" lays them straight, "none" leaves them
+            as they are, so what is upright stays so.
         tiles: number of textures.
 
     Raises:
@@ -41,15 +49,26 @@ def pack_together(
         np.concatenate([label + start for label, start in zip(labels, first[:-1], strict=True)]),
         resolution=resolution,
         padding=padding,
+        rotate=rotate,
         tiles=tiles,
     )
-    ends = np.cumsum([len(result.faces) for result in results])[:-1]
-    together = []
-    for result, corner_uv in zip(results, np.split(packed.corner_uv, ends), strict=True):
-        uv = np.empty_like(result.uv)
-        uv[result.uv_faces] = corner_uv
-        together.append(replace(result, uv=uv, uv_scale=packed.scale, packing_efficiency=packed.efficiency))
-    return together
+    points = np.cumsum([0, *(len(result.uv) for result in results)])
+    corners = [result.uv_faces + start for result, start in zip(results, points[:-1], strict=True)]
+    uv = np.empty((points[-1], 2))
+    uv[np.concatenate(corners)] = packed.corner_uv
+    uv, _ = part_touching(uv, np.concatenate(corners))
+    texture = {"resolution": resolution, "padding": padding, "tiles": tiles}
+    return [
+        replace(
+            result,
+            uv=own,
+            uv_scale=packed.scale,
+            packing_efficiency=packed.efficiency,
+            settings={**result.settings, **texture},
+            distortion=result.distortion.rescaled(np.log(packed.scale / result.uv_scale)),
+        )
+        for result, own in zip(results, np.split(uv, points[1:-1]), strict=True)
+    ]
 
 
 def _charts(result: Flattening) -> IntArray:

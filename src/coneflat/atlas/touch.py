@@ -1,0 +1,79 @@
+"""Triangles that only touch, but for rounding, moved apart by what rounding needs.
+
+Polyhedra unfold to charts that touch themselves along edges, and charts without padding touch each other. Turned and
+scaled, such edges may come to lie across each other by a digit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import FloatArray, IntArray
+from ..mesh import NEXT
+from .overlap import Overlaps, find_overlaps
+
+# Of the extent of the layout: what overlaps by less touches, and is then moved by so much more than it overlaps.
+TOUCHING, APART = 1e-11, 2.0**-49
+# What is moved may touch something else then.
+ROUNDS = 10
+
+
+def part_touching(points: FloatArray, corners: IntArray) -> tuple[FloatArray, Overlaps]:
+    """Return points of the plane at which triangles that touch do not overlap, and what overlaps nevertheless.
+
+    Args:
+        points: (u, 2).
+        corners: (m, 3) indices of points.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    extent = float((high - low).max())
+    for _ in range(ROUNDS):
+        overlaps = find_overlaps(points, corners)
+        moves = _moves(points @ np.array([1, 1j]), corners, overlaps.pairs, extent)
+        if not moves.any():
+            break
+        points = np.clip(points + np.stack([moves.real, moves.imag], axis=1), low, high)
+    return points, overlaps
+
+
+def _moves(
+    places: NDArray[np.complex128], corners: IntArray, pairs: IntArray, extent: float
+) -> NDArray[np.complex128]:
+    """Return (u,) by what points are to be moved so that triangles that hardly overlap are apart."""
+    moves = np.zeros(len(places), dtype=np.complex128)
+    if not len(pairs):
+        return moves
+    both = corners[pairs]
+    across, depth = _least_depth(places[both])
+    touching = depth < TOUCHING * extent
+    both, across, way = both[touching], across[touching], depth[touching] / 2 + APART * extent
+    # Where they have a point in common, it stays.
+    shared = (
+        (both[:, 0, :, None] == both[:, 1, None, :]).any(axis=2),
+        (both[:, 1, :, None] == both[:, 0, None, :]).any(axis=2),
+    )
+    for side, sign in ((0, -1.0), (1, 1.0)):
+        ahead = sign * (np.conj(across[:, None]) * places[both[:, side]]).real
+        reaches = (ahead - ahead.min(axis=1, keepdims=True) < 2 * way[:, None]) & ~shared[side]
+        step = np.broadcast_to((sign * way * across)[:, None], reaches.shape)
+        np.add.at(moves, both[:, side][reaches], step[reaches])
+    return moves
+
+
+def _least_depth(corners: NDArray[np.complex128]) -> tuple[NDArray[np.complex128], FloatArray]:
+    """Return (k,) unit vectors along which the second of two triangles (k, 2, 3) is out of the first soonest, and when.
+
+    They are across a side of either (as for `overlap_kernel.join`).
+    """
+    sides = corners[..., NEXT] - corners
+    turned = (np.conj(sides[..., 0]) * sides[..., 1]).imag < 0
+    outward = -1j * sides / np.maximum(np.abs(sides), np.finfo(float).tiny)
+    outward = np.where(turned[..., None], -outward, outward)
+    # Across the sides of the first away from it, and of the second towards it.
+    across = np.concatenate([outward[:, 0], -outward[:, 1]], axis=1)
+    heights = (np.conj(across)[:, None, :, None] * corners[:, :, None, :]).real
+    depths = heights[:, 0].max(axis=2) - heights[:, 1].min(axis=2)
+    best = depths.argmin(axis=1)
+    chosen = np.arange(len(best)), best
+    return across[chosen], np.maximum(depths[chosen], 0.0)
