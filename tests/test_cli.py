@@ -76,7 +76,7 @@ def test_paper_is_the_published_method(model, tmp_path):
     assert done.returncode == 0, done.stderr
     settings = json.loads((tmp_path / "paper.json").read_text())["settings"]
     assert settings["cones"] == "greedy"
-    assert settings["metric"] == "linear"
+    assert settings["method"] == "linear"
     assert settings["epsilon"] == 1.0
 
 

@@ -112,7 +112,7 @@ def test_measured_rotations_of_a_cut_square():
         ({"quantum": QUARTER, "cones": "greedy"}, errors.OptionError, "pursuit"),
         ({"correct_handles": True}, errors.OptionError, "quantum"),
         (
-            {"quantum": QUARTER, "correct_handles": True, "metric": "linear"},
+            {"quantum": QUARTER, "correct_handles": True, "method": "linear"},
             errors.OptionError,
             "exact metric",
         ),

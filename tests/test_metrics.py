@@ -131,10 +131,10 @@ def test_boundary_lengths_are_kept():
         ({"boundary": [0, 1, 40]}, errors.OptionError, "corner 40 does not lie on the boundary"),
         ({"boundary": [0, 1]}, errors.CurvatureError, "corner 0 would have a curvature of 1 pi"),
         ({"boundary": {0: 3.0, 1: 3.0}}, errors.CurvatureError, r"must sum to 2 pi, but sum to 1\.90986 pi"),
-        ({"boundary": "disk", "metric": "linear"}, errors.OptionError, "linear metric has a free boundary"),
+        ({"boundary": "disk", "method": "linear"}, errors.OptionError, "has a free boundary"),
         ({"boundary": "disk", "at_cones": "scale"}, errors.OptionError, "prescribed boundary needs"),
         ({"cones": {40: 1.0}, "at_cones": "scale"}, errors.OptionError, "give positions only"),
-        ({"refine": True, "metric": "linear"}, errors.OptionError, "no common subdivision"),
+        ({"refine": True, "method": "linear"}, errors.OptionError, "no common subdivision"),
         ({"at_cones": "both"}, errors.OptionError, "unknown at_cones 'both'"),
     ],
 )

@@ -57,7 +57,7 @@ flat = one = coneflat.flatten(vertices, faces, charts="atlas")
 coneflat.pack_together([one, one])
 coneflat.flatten(coneflat.read_mesh(flat.save(sys.argv[1] + ".obj"), weld=True))
 coneflat.flatten(vertices, faces[5:], min_cone_angle=0.3, max_cones=6)
-coneflat.flatten(coneflat.sample_path(), metric="linear")
+coneflat.flatten(coneflat.sample_path(), method="linear")
 """
     subprocess.run([sys.executable, "-m", "coneflat.ahead"], check=True)
     compiled = subprocess.run(

@@ -122,7 +122,7 @@ def test_cones_of_the_users_own():
             errors.OptionError,
             "unknown cones 'magic': choose from auto, pursuit, greedy, none",
         ),
-        ({"metric": "magic"}, errors.OptionError, "unknown metric"),
+        ({"method": "magic"}, errors.OptionError, "unknown method"),
         ({"length_rule": 3}, errors.OptionError, "unknown length_rule 3"),
         ({"epsilon": 0}, errors.OptionError, "epsilon must be a positive number, not 0"),
         ({"epsilon": "x"}, errors.OptionError, "epsilon must be a number"),
@@ -131,7 +131,7 @@ def test_cones_of_the_users_own():
         ({"max_cones": 2.5}, errors.OptionError, "max_cones must be a whole number"),
         ({"cones": "greedy", "max_cones": 0}, errors.CurvatureError, "at most 0"),
         ({"cones": "greedy", "max_cones": 2}, errors.CurvatureError, "2 cones cannot carry"),
-        ({"cones": "greedy", "max_cones": 2, "metric": "linear"}, errors.CurvatureError, "2 pi or more"),
+        ({"cones": "greedy", "max_cones": 2, "method": "linear"}, errors.CurvatureError, "2 pi or more"),
         ({"cones": "none"}, errors.CurvatureError, "none is given"),
         ({"cones": [1, 2, 3, 3]}, errors.OptionError, "vertex 3 is given as a cone twice"),
         ({"cones": [1, 2, 642]}, errors.OptionError, "cone 642 is no vertex .* 0 to 641"),
@@ -226,12 +226,12 @@ def test_mirror_images_are_told_apart():
 
 def test_extreme_metrics_are_refused_in_one_line():
     with pytest.raises(errors.MetricError, match="more than numbers can hold"):
-        flatten(*shapes.hill(20, 20), cones={200: 1.0, 220: -1e6}, metric="linear")
+        flatten(*shapes.hill(20, 20), cones={200: 1.0, 220: -1e6}, method="linear")
 
 
 def test_search_for_very_many_cones_ends():
     vertices, faces = SHAPES["sphere"]
-    result = flatten(vertices, faces, cones="greedy", epsilon=1e-3, metric="linear")
+    result = flatten(vertices, faces, cones="greedy", epsilon=1e-3, method="linear")
     assert len(result.cones) > 256  # so that it has started over from its cones
     assert np.ptp(result.log_scale) < 1e-3
 

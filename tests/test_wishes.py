@@ -184,7 +184,7 @@ def test_distortion_that_is_missed_is_noted():
 def test_the_linear_metric_takes_the_cones_of_the_search():
     vertices, faces = shapes.sphere(3)
     found = find_cones(vertices, faces, distortion=0.1)
-    linear = flatten(vertices, faces, distortion=0.1, metric="linear")
+    linear = flatten(vertices, faces, distortion=0.1, method="linear")
     assert set(linear.cones) == set(found.vertices)
     assert not linear.notes
 

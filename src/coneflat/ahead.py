@@ -27,7 +27,7 @@ def compile_kernels() -> None:
     pack_together([sample, sample])
     with TemporaryDirectory() as folder:
         read_mesh(sample.save(Path(folder) / "flat.obj"), weld=True)
-    flatten(sample_path(), cones="greedy", metric="linear")
+    flatten(sample_path(), cones="greedy", method="linear")
     for mesh in (_tube(closed=True), _tube(closed=False)):
         flatten(*mesh)
         flatten(*mesh, cones="greedy", refine=True)

@@ -1,4 +1,4 @@
-"""Cones of a connected mesh by the method that the options name."""
+"""Cones of a connected mesh in the way that the options name."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ class Surface:
 def pursues(mesh: TriangleMesh, options: Options) -> bool:
     """Whether the pursuit finds the cones of a mesh."""
     is_prescribed = options.boundary_kind in ("disk", "polygon") and mesh.is_boundary_vertex.any()
-    return options.method == "pursuit" or (
-        options.method == "auto" and (options.wishes_cones or not is_prescribed)
+    return options.cone_choice == "pursuit" or (
+        options.cone_choice == "auto" and (options.wishes_cones or not is_prescribed)
     )
 
 
@@ -77,7 +77,7 @@ def choose_cones(
         corners = corners_alone(surface, wishes, options)
         return _pursued(surface, wishes, options, stages, turned) if corners is None else corners
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
-    if options.method == "greedy":
+    if options.cone_choice == "greedy":
         solution = greedy_cones(
             *given,
             epsilon=options.epsilon,
@@ -89,11 +89,13 @@ def choose_cones(
         solution = cones_with_curvature(*given, wishes.cones.vertices, wishes.cones.curvatures)
     else:
         solution = cones_at(*given, wishes.cones.vertices)
-    if options.scale_at_cones and options.metric == "exact":
+    if options.scale_at_cones and options.method == "exact":
         check_enough(len(solution.cones), mesh)
     else:
         advice = (
-            "allow more of them (--max-cones)" if options.method == "greedy" else "add cones or move them"
+            "allow more of them (--max-cones)"
+            if options.cone_choice == "greedy"
+            else "add cones or move them"
         )
         check_feasible(solution.cones, solution.curvatures, wishes.names, advice)
     return solution
@@ -101,7 +103,7 @@ def choose_cones(
 
 def corners_alone(surface: Surface, wishes: Wishes, options: Options) -> ConeSolution | None:
     """Return a polyhedron's corners as cones if they are few: it unfolds without any distortion. Else None."""
-    if options.method != "auto" or options.wishes_cones or options.boundary_kind == "straight":
+    if options.cone_choice != "auto" or options.wishes_cones or options.boundary_kind == "straight":
         return None
     mesh, curvature = surface.mesh, surface.curvature
     corners = np.flatnonzero((np.abs(curvature) > FLAT) & ~mesh.is_boundary_vertex)

@@ -14,7 +14,10 @@ from ._arrays import IntArray
 from .errors import OptionError
 
 CONES = ("auto", "pursuit", "greedy", "none")
-METRICS = ("exact", "linear")
+#: From cones to a layout: this package's own, the paper's, and those that it compares with.
+METHODS = ("exact", "linear", "circle-patterns", "ricci", "linear-abf", "abf++", "lscm", "spectral", "bff")
+# Those that solve what need not converge.
+ITERATIVE = ("exact", "circle-patterns", "ricci", "abf++")
 LENGTH_RULES = ("integral", "mean")
 AT_CONES = ("auto", "scale", "curvature")
 SOLVERS = ("auto", "pardiso", "scikit-sparse", "cholespy", "scipy", "amg")
@@ -40,7 +43,7 @@ PAPER: Mapping[str, Any] = {
     "cones": "greedy",
     "epsilon": 1.0,
     "max_cones": None,
-    "metric": "linear",
+    "method": "linear",
     "length_rule": "integral",
 }
 
@@ -67,7 +70,7 @@ class Options:
     quantum: float | None = None
     correct_handles: bool = False
     epsilon: float = 1.0
-    metric: str = "exact"
+    method: str = "exact"
     length_rule: str = "integral"
     at_cones: str = "auto"
     boundary: Boundary = "free"
@@ -102,19 +105,24 @@ class Options:
             if not self.corners:
                 raise OptionError("boundary names no corners; for a round boundary, say 'disk'")
         _choice("at_cones", self.at_cones, AT_CONES)
-        if self.metric == "linear" and (self.boundary_kind != "free" or self.at_cones != "auto"):
-            raise OptionError(
-                "the linear metric has a free boundary and no choice at cones: use metric 'exact'"
-            )
-        if self.metric == "linear" and self.refine:
-            raise OptionError("the linear metric has no common subdivision to refine to: use metric 'exact'")
+        _choice("method", self.method, METHODS)
+        if self.method != "exact":
+            if self.boundary_kind != "free" or self.at_cones != "auto":
+                raise OptionError(
+                    f"method {self.method!r} has a free boundary and no choice at cones: use method 'exact'"
+                )
+            if self.best_effort and self.method not in ITERATIVE:
+                raise OptionError(f"method {self.method!r} does not iterate: there is no best effort")
+            if self.refine:
+                raise OptionError(
+                    f"method {self.method!r} has no common subdivision to refine to: use method 'exact'"
+                )
         if self.at_cones == "scale" and any(k is not None for k in self.given_cones.values()):
             raise OptionError("with the scale fixed at cones their curvatures come out: give positions only")
         if self.at_cones == "scale" and self.boundary_kind not in ("free", "lengths"):
             raise OptionError(
                 "a prescribed boundary needs prescribed curvatures at cones: at_cones 'curvature'"
             )
-        _choice("metric", self.metric, METRICS)
         _choice("length_rule", self.length_rule, LENGTH_RULES)
         _choice("solver", self.solver, SOLVERS)
         _choice("charts", self.charts, CHARTS)
@@ -199,7 +207,7 @@ class Options:
         """Check the options that only a pursuit takes, and those of whole quanta."""
         if self.wishes_cones and not self.searches_cones:
             given = next(name for name in PURSUIT_FIELDS if self._is_set(name))
-            raise OptionError(f"{given} is an option of cones 'pursuit', not of cones {self.method!r}")
+            raise OptionError(f"{given} is an option of cones 'pursuit', not of cones {self.cone_choice!r}")
         if self.boundary_kind == "straight" and not self.searches_cones:
             raise OptionError("a straight boundary gets its corners from the search: use cones 'pursuit'")
         if self.quantum is None:
@@ -210,11 +218,11 @@ class Options:
             return
         if not 0 < _number("quantum", self.quantum) <= 2 * math.pi * (1 + 1e-6):
             raise OptionError(f"the quantum must be positive and at most 2 pi, not {self.quantum:g} radians")
-        if self.correct_handles and self.metric != "exact":
-            raise OptionError("rotations along handles are corrected in the exact metric only")
+        if self.correct_handles and self.method != "exact":
+            raise OptionError("rotations along handles are corrected by method 'exact' only")
 
     @property
-    def method(self) -> str:
+    def cone_choice(self) -> str:
         """The way cones are found: "auto", "pursuit", "greedy", "none" or "given"."""
         return self.cones if isinstance(self.cones, str) else "given"
 
@@ -237,7 +245,7 @@ class Options:
     @property
     def searches_cones(self) -> bool:
         """Whether the pursuit finds the cones, where the boundary is not prescribed."""
-        return self.method in ("auto", "pursuit")
+        return self.cone_choice in ("auto", "pursuit")
 
     @property
     def scale_at_cones(self) -> bool:

@@ -24,6 +24,7 @@ from .mesh import TriangleMesh
 from .methods import ExactChoices, FlatMetric, LaidOut, exact_flattening, linear_flattening
 from .methods.exact import ExactFlatMetric
 from .methods.handles import corrected_flattening
+from .methods.others import other_method
 from .options import Boundary, Cones, Options
 from .prepare import Component, Prepared, prepare
 from .result import Flattening
@@ -64,7 +65,7 @@ def flatten(
     quantum: float | None = None,
     correct_handles: bool = False,
     epsilon: float = 1.0,
-    metric: str = "exact",
+    method: str = "exact",
     length_rule: str = "integral",
     at_cones: str = "auto",
     boundary: Boundary = "free",
@@ -113,7 +114,7 @@ def flatten(
         correct_handles: of quanta and the exact metric: change the metric, as little as can be, so that
             rotations along handles are multiples, too; it is then not quite conformal.
         epsilon: the greedy search stops when log scale factors differ by at most this.
-        metric: "exact" has no curvature error and no flipped triangle, "linear" is the paper's.
+        method: "exact" has no curvature error and no flipped triangle, "linear" is the paper's.
         length_rule: of the linear metric: "integral" scales an edge by the mean of exp(phi) along it, "mean"
             by exp of the mean.
         at_cones: of the exact metric: "scale" prescribes phi = 0 at the cones and their curvatures come out,
@@ -171,7 +172,7 @@ def flatten(
         quantum=quantum,
         correct_handles=correct_handles,
         epsilon=epsilon,
-        metric=metric,
+        method=method,
         length_rule=length_rule,
         at_cones=at_cones,
         boundary=boundary,
@@ -220,14 +221,14 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     for _ in range(SEARCHES):
         laid_out = _flatten_once(part, options, stages)
         unheld = unheld_cones(laid_out)
-        if not len(unheld) or not pursues(part.mesh, options) or options.metric != "exact":
+        if not len(unheld) or not pursues(part.mesh, options) or options.method != "exact":
             break
         part = replace(part, wishes=part.wishes.without(unheld))
     if options.charts == "atlas":
         with stages("atlas", 1.0):
             laid_out = without_overlaps(laid_out, part, options)
     notes = _missed_distortion(laid_out, part, options)
-    if options.metric == "exact":
+    if options.method == "exact":
         notes += shortfalls(laid_out, part.wishes.names)
     return replace(laid_out, notes=laid_out.notes + notes)
 
@@ -290,7 +291,7 @@ def _flatten_once(part: Component, options: Options, stages: Stages) -> LaidOut:
 
 def _turning_meter(surface: Surface, wishes: Wishes, options: Options) -> Turned | None:
     """Return what tells by how much loops across handles turn with given cones; None where nobody asks."""
-    if options.quantum is None or options.metric != "exact" or not surface.mesh.genus():
+    if options.quantum is None or options.method != "exact" or not surface.mesh.genus():
         return None
     turning, plain = open_turning(surface.mesh), replace(options, correct_handles=False, best_effort=True)
 
@@ -348,8 +349,10 @@ def _cut(part: Component, solution: ConeSolution, options: Options) -> tuple[Tri
 def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, options: Options) -> FlatMetric:
     """Return the flat metric that the options name."""
     mesh, lengths = surface.mesh, surface.lengths
-    if options.metric == "linear":
+    if options.method == "linear":
         return linear_flattening(mesh, lengths, solution, options.length_rule)
+    if options.method != "exact":
+        return other_method(options.method)(mesh, lengths, solution, options.best_effort)
     boundary = None
     if mesh.is_boundary_vertex.any():
         if options.boundary_kind == "straight":

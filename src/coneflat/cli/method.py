@@ -14,10 +14,10 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 QUANTUM_OPTIONS = ("quantise", "correct_handles")
 SEARCH_OPTIONS = ("cones", "epsilon", "max_cones", *PURSUIT_OPTIONS, *QUANTUM_OPTIONS)
-EXACT_OPTIONS = ("at_cones", "boundary", "corner", "best_effort", "refine")
+EXACT_OPTIONS = ("at_cones", "boundary", "corner", "refine")
 # Formats of models to be textured, where nothing may overlap.
 TEXTURED = (".obj", ".glb")
-METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "metric", "lengths", *EXACT_OPTIONS)
+METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "method", "lengths", *EXACT_OPTIONS)
 
 _BEFORE_SEARCH = (
     click.option("--paper", is_flag=True, help="The method exactly as published (Ben-Chen et al. 2008)."),
@@ -51,11 +51,13 @@ _AFTER_SEARCH = (
     ),
     click.option("--max-cones", type=int, help="Searches stop at this many cones."),
     click.option(
-        "--metric",
-        type=click.Choice(["exact", "linear"]),
+        "--method",
+        type=click.Choice(
+            ["exact", "linear", "circle-patterns", "ricci", "linear-abf", "abf++", "lscm", "spectral", "bff"]
+        ),
         default="exact",
         show_default=True,
-        help="exact: no curvature error, no flipped triangle.  linear: the paper's.",
+        help="exact: no curvature error, no flipped triangle.  linear: the paper's.  The others, for comparison.",
     ),
     click.option(
         "--at-cones",
@@ -184,7 +186,7 @@ def method_keywords(params: Mapping[str, Any], ending: str) -> dict[str, Any]:
         "correct_handles",
         "epsilon",
         "max_cones",
-        "metric",
+        "method",
         "at_cones",
         "boundary",
         "best_effort",
@@ -201,7 +203,7 @@ def method_keywords(params: Mapping[str, Any], ending: str) -> dict[str, Any]:
 def check_combinations(context: click.Context) -> None:
     """Refuse options that would have no effect."""
     params = context.params
-    cones, metric = params["cones"], params["metric"]
+    cones, method = params["cones"], params["method"]
     rules = [
         (params["paper"], METHOD_OPTIONS, "--paper fixes the method"),
         (
@@ -213,8 +215,8 @@ def check_combinations(context: click.Context) -> None:
         (cones == "greedy", (*PURSUIT_OPTIONS, *QUANTUM_OPTIONS), "--cones greedy has no such choice"),
         (cones in ("auto", "pursuit"), ("epsilon",), "only --cones greedy has this choice"),
         (params["cone_count"] is not None, ("distortion", "max_cones"), "the number of cones is given"),
-        (metric == "linear", EXACT_OPTIONS, "--metric linear has no such choice"),
-        (metric == "exact", ("lengths",), "only --metric linear has this choice"),
+        (method != "exact", EXACT_OPTIONS, f"--method {method} has no such choice"),
+        (method != "linear", ("lengths",), "only --method linear has this choice"),
     ]
     for applies, names, reason in rules:
         for name in names if applies else ():

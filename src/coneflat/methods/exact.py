@@ -178,7 +178,7 @@ def exact_flattening(
         )
         if not choices.best_effort:
             raise ConvergenceError(
-                f"{failure}; --best-effort takes it as it is, --metric linear needs no convergence, other cones, "
+                f"{failure}; --best-effort takes it as it is, --method linear needs no convergence, other cones, "
                 "--repair or remeshing may help"
             )
         notes = (f"{failure[0].upper()}{failure[1:]}.",)
