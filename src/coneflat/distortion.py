@@ -203,6 +203,11 @@ def _side_lengths(ends: FloatArray) -> FloatArray:
     return np.sqrt(dots(side, side))
 
 
+def seams_of(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
+    """Return the inner edges whose two sides have different UVs."""
+    return _seams_and_charts(mesh, corner_uv)[0]
+
+
 def _seams_and_charts(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[IntArray, int, IntArray]:
     """Return the interior edges whose UVs differ, the number of charts, and the chart of each face."""
     inside = np.flatnonzero(~mesh.is_boundary_edge)

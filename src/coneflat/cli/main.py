@@ -12,6 +12,7 @@ import click
 from .. import __version__
 from ..errors import ConeflatError
 from .batch import batch
+from .compare import compare, paper
 from .cones import cones
 from .demo import demo
 from .figure import figure
@@ -34,6 +35,8 @@ cli.add_command(batch)
 cli.add_command(cones)
 cli.add_command(figure)
 cli.add_command(view)
+cli.add_command(compare)
+cli.add_command(paper)
 cli.add_command(demo)
 
 

@@ -1,0 +1,151 @@
+"""`coneflat compare` and `coneflat paper`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from .figure import Eye
+from .search import as_keywords, place_options, search_options
+
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+_SIGHT = (
+    click.option(
+        "--eye",
+        type=Eye(),
+        metavar="EYE",
+        default="front-right",
+        show_default=True,
+        help="Where to look from in pictures: front, back, left, right, top, bottom, two of them, or X,Y,Z.",
+    ),
+    click.option(
+        "--up",
+        type=click.Choice(["x", "y", "z"]),
+        default="y",
+        show_default=True,
+        help="The model's upward axis in pictures.",
+    ),
+)
+
+
+def _sight(command: Command) -> Command:
+    for option in reversed(_SIGHT):
+        command = option(command)
+    return command
+
+
+@click.command(short_help="Flatten a mesh by all methods, with the same cones and cut.")
+@click.argument("mesh", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Folder for the table (Markdown and CSV) and the pictures.  [default: the table is printed only]",
+)
+@click.option(
+    "--methods",
+    metavar="NAMES",
+    help="Methods to compare, with commas: names that flatten --method takes.  [default: all]",
+)
+@click.option("--no-peers", is_flag=True, help="Leave out other packages (libigl, xatlas, uvunwrap).")
+@click.option("--paper", is_flag=True, help="The cones of the published method (greedy, epsilon 1).")
+@search_options
+@place_options
+@_sight
+@click.option("--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces.")
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+def compare(
+    mesh: Path,
+    output: Path | None,
+    methods: str | None,
+    no_peers: bool,
+    paper: bool,
+    eye: Any,
+    up: str,
+    repair: bool,
+    quiet: bool,
+    **search: Any,
+) -> None:
+    """Flatten MESH by all methods, and by other packages that are installed, and tell how they compare.
+
+    \b
+    Examples:
+      coneflat compare bunny.obj
+      coneflat compare horse.ply --up z -o horse --methods exact,linear,bff,lscm
+    """
+    from ..compare.run import compare_methods
+    from ..compare.table import comparison_csv, comparison_markdown
+    from ..io import read_mesh
+    from ..options import METHODS, PAPER
+    from .console import Console
+    from .tables import print_comparison
+
+    options = {"repair": repair, **(PAPER if paper else as_keywords(search))}
+    chosen = METHODS if methods is None else tuple(name.strip() for name in methods.split(","))
+    if output is not None:
+        from ..compare.pictures import Sight, draw_layouts, draw_qualities
+        from ..compare.write import check_folder, write_folder
+
+        check_folder(output)
+        sight = Sight(eye, up)
+    with Console(quiet) as console:
+        console.progress("read", 0.0)
+        found = compare_methods(
+            read_mesh(mesh),
+            methods=chosen,
+            peers=() if no_peers else None,
+            progress=console.progress,
+            **options,
+        )
+        written: list[Path] = []
+        if output is not None:
+            console.progress("draw", 0.95)
+            texts = {"compare.md": comparison_markdown(found), "compare.csv": comparison_csv(found)}
+            pictures = {"layouts.png": draw_layouts(found), "quality.png": draw_qualities(found, sight)}
+            written = write_folder(output, texts, pictures)
+    if not quiet:
+        print_comparison(found, written)
+
+
+@click.command(short_help="Reproduce the paper's tables and figures.")
+@click.argument("meshes", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("paper"),
+    show_default=True,
+    help="Folder for tables (Markdown and CSV) and figures.",
+)
+@_sight
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+def paper(meshes: tuple[Path, ...], output: Path, eye: Any, up: str, quiet: bool) -> None:
+    """Run the experiments of the paper (Section 5) on MESHES, files or folders, with its numbers beside ours.
+
+    Models are known by their names: fandisk, rocker-arm, foot, gargoyle, elephant, horse, hand, torso, isi-horse.
+
+    \b
+    Examples:
+      coneflat paper fandisk.obj rocker-arm.obj -o paper
+      coneflat paper models
+    """
+    from ..compare import reproduce
+    from ..compare.pictures import Sight
+    from ..compare.write import check_folder, write_folder
+    from .console import Console
+    from .tables import print_reproduction
+
+    check_folder(output)
+    with Console(quiet) as console:
+        console.progress("read", 0.0)
+        found = reproduce(meshes, progress=console.progress)
+        console.progress("draw", 0.95)
+        texts = {"paper.md": found.markdown(), **found.csv_files()}
+        written = write_folder(output, texts, found.figures(Sight(eye, up)))
+    if not quiet:
+        print_reproduction(found, written)

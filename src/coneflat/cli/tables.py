@@ -1,0 +1,45 @@
+"""Comparisons in the terminal."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from ..compare import Comparison, Reproduction
+from ..compare.table import COLUMNS, comparison_rows
+
+PLAIN_WIDTH = 150
+
+
+def print_comparison(comparison: Comparison, files: Sequence[Path]) -> None:
+    """Print a row for each method, and what was written."""
+    table = Table(box=None, pad_edge=False)
+    for heading in ("method", *COLUMNS):
+        table.add_column(heading, justify="left" if heading == "method" else "right")
+    notes = []
+    for entry, (*cells, note) in zip(comparison.entries, comparison_rows(comparison), strict=True):
+        table.add_row(*cells)
+        if note:
+            notes.append(f"{entry.method}: {note}")
+    out = Console(highlight=False, width=None if sys.stdout.isatty() else PLAIN_WIDTH)
+    out.print(table)
+    for note in notes:
+        out.print(note, markup=False, soft_wrap=True)
+    _print_files(files)
+
+
+def print_reproduction(found: Reproduction, files: Sequence[Path]) -> None:
+    """Print both tables, and what was written."""
+    text = found.markdown()
+    click.echo(text[: text.index("![")].rstrip() if "![" in text else text.rstrip())
+    _print_files(files)
+
+
+def _print_files(files: Sequence[Path]) -> None:
+    for path in files:
+        click.echo(f"wrote {path}")

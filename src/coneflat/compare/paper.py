@@ -1,0 +1,260 @@
+"""Section 5 of the paper, on given meshes: its tables and figures, with the paper's numbers beside."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import ConeflatError
+from ..io import INPUT_FORMATS, read_mesh
+from ..options import PAPER
+from ..stages import Progress
+from ..text import plural
+from .published import MODELS, NAMES, Published, model_of
+from .run import Comparison, compare_methods
+from .table import as_csv, markdown, written
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..result import Flattening
+    from .pictures import Sight
+
+#: What the paper compares, and the exact metric, which it does not have.
+METHODS = (*NAMES, "exact")
+TABLE_1 = ("model", "triangles", "of the paper", "cones", "curvature error, pi", "of the paper", "ratio")
+TABLE_2 = ("model", "method", "QC mean", "of the paper", "ratio", "time, s", "of the paper", "ratio", "note")
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A mesh and what the methods made of it.
+
+    Attributes:
+        name: the paper's where it has the model, else the file's.
+        published: the paper's numbers; None where it has none.
+        comparison: of the methods.
+    """
+
+    name: str
+    published: Published | None
+    comparison: Comparison
+
+    @property
+    def is_same(self) -> bool:
+        """Whether the mesh has the resolution of the paper's."""
+        return self.published is not None and self.published.has_as_many(self.comparison.triangles)
+
+    @property
+    def linear(self) -> Flattening:
+        """By the paper's method, which found the cones."""
+        result = self.comparison["linear"].result
+        assert result is not None
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """The paper's experiments.
+
+    Attributes:
+        models: in the paper's order, then others.
+        failed: file and what was wrong with it.
+    """
+
+    models: tuple[Model, ...]
+    failed: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """The paper's models that were not given."""
+        found = {model.name for model in self.models}
+        return tuple(name for name in MODELS if name not in found)
+
+    def table_1(self) -> list[list[object]]:
+        """Return the rows of Table 1, curvature errors."""
+        rows: list[list[object]] = []
+        for model in self.models:
+            here, there = model.linear.distortion.curvature_error, math.nan
+            thousands: float | str = ""
+            if model.published is not None:
+                there, thousands = model.published.curvature_error, f"{model.published.thousands:g}K"
+            cones = len(model.linear.cones)
+            rows.append([model.name, model.comparison.triangles, thousands, cones, here, there, here / there])
+        return rows
+
+    def table_2(self) -> list[list[object]]:
+        """Return the rows of Table 2, quasi-conformal distortion and time."""
+        rows: list[list[object]] = []
+        for model in self.models:
+            for entry in model.comparison.entries:
+                qc = math.nan if entry.result is None else entry.result.distortion.qc_mean
+                theirs, seconds = math.nan, math.nan
+                if model.published is not None:
+                    theirs = model.published.qc.get(entry.method, math.nan)
+                    seconds = model.published.seconds.get(entry.method, math.nan)
+                name = f"{entry.method} ({NAMES[entry.method]})" if entry.method in NAMES else entry.method
+                numbers = [qc, theirs, qc / theirs, entry.seconds, seconds, entry.seconds / seconds]
+                rows.append([model.name, name, *numbers, entry.note])
+        return rows
+
+    def markdown(self) -> str:
+        """Return both tables, and what is to be known of them."""
+        lines = ["# Section 5 of the paper", ""]
+        lines += [
+            "Ben-Chen, Gotsman and Bunin, Conformal flattening by curvature prescription and metric scaling, 2008. "
+            "The greedy search finds the cones (epsilon 1); these and one cut are given to every method. Times are "
+            "from there to the layout; the paper's are of a processor of 1.4 GHz.",
+            "",
+        ]
+        other = [model for model in self.models if model.published is not None and not model.is_same]
+        if other:
+            listed = ", ".join(f"{m.name} ({m.comparison.triangles:,})" for m in other)
+            lines += [f"In another resolution than the paper's, so that numbers differ: {listed}.", ""]
+        if self.missing:
+            lines += [f"Not among the files: {', '.join(self.missing)}.", ""]
+        lines += [f"Could not be flattened: {name}: {why}\n" for name, why in self.failed]
+        forms = ("", ",d", "", "d", ".2e", ".2e", ".2f")
+        lines += ["## Table 1: curvature error", "", markdown(TABLE_1, _written(self.table_1(), forms))]
+        forms = ("", "", ".4f", ".3f", ".3f", ".2f", ".3g", ".3f", "")
+        lines += [
+            "## Table 2: quasi-conformal distortion",
+            "",
+            markdown(TABLE_2, _written(self.table_2(), forms)),
+        ]
+        lines += [f"![{title}]({name})\n\n{title}\n" for name, title in FIGURES.items() if self.models]
+        return "\n".join(lines)
+
+    def csv_files(self) -> dict[str, str]:
+        """Return the tables as comma separated values, by file name."""
+        return {
+            "table1.csv": as_csv(_distinct(TABLE_1), self.table_1()),
+            "table2.csv": as_csv(_distinct(TABLE_2), self.table_2()),
+        }
+
+    def figures(self, sight: Sight) -> dict[str, Figure]:
+        """Return the paper's figures, by file name."""
+        from .pictures import (
+            cone_panel,
+            figure_of,
+            in_rows,
+            layout_panel,
+            quality_panels,
+            same_scale,
+            texture_panel,
+        )
+        from ..view.compose import Row
+
+        if not self.models:
+            return {}
+        cones = [cone_panel(m.linear, sight, f"{m.name}: {_cones(m.linear)}") for m in self.models]
+        quality, layouts, textures = [], [], []
+        for model in self.models:
+            shown = model.comparison.drawn
+            quantities = same_scale(shown)
+            panels = quality_panels(shown, quantities, sight)
+            quality.append(Row(panels, quantities[:1], tallest=2.2))
+            layouts.append(
+                Row(
+                    [
+                        layout_panel(entry.result, f"{model.name}, {entry.method}")
+                        for entry in shown
+                        if entry.result is not None
+                    ],
+                    tallest=2.2,
+                )
+            )
+            linear = [entry for entry in shown if entry.method == "linear"]
+            own = same_scale(linear)
+            textures.append(
+                Row(
+                    [texture_panel(model.linear, sight, model.name), *quality_panels(linear, own, sight)],
+                    own,
+                    tallest=2.6,
+                )
+            )
+        rows = (in_rows(cones), quality, layouts, textures)
+        marks = (self.models[0].linear, None, None, None)
+        return {
+            name: figure_of(each, marks_of=marked)
+            for name, each, marked in zip(FIGURES, rows, marks, strict=True)
+        }
+
+
+#: File and caption of each figure, numbered as in the paper.
+FIGURES = {
+    "figure2.png": "Figure 2: cones, red where their curvature is positive, black where it is negative, and seams",
+    "figure3.png": "Figure 3: quasi-conformal distortion by each method; the number is its mean",
+    "figure4.png": "Figure 4: layouts by each method, with the same cones and cut",
+    "figure5.png": "Figure 5: a checkerboard, and the distortion, by the paper's method",
+}
+
+
+def reproduce(
+    paths: Sequence[Path], *, methods: Sequence[str] = METHODS, progress: Progress | None = None
+) -> Reproduction:
+    """Run the paper's experiments on mesh files, and on those in folders.
+
+    Args:
+        paths: files, or folders of files; those named after the paper's models come first.
+        methods: to compare; the paper's own, "linear", is among them in any case.
+        progress: called with what is done and the fraction done.
+    """
+    files = sorted({file for path in paths for file in _meshes(path)}, key=_place)
+    methods = methods if "linear" in methods else ("linear", *methods)
+    models, failed = [], []
+    for number, file in enumerate(files):
+
+        def tell(what: str, fraction: float, number: int = number, name: str = file.stem) -> None:
+            if progress is not None:
+                progress(f"{name}: {what}", (number + fraction) / len(files))
+
+        tell("read", 0.0)
+        try:
+            compared = compare_methods(read_mesh(file), methods=methods, peers=(), progress=tell, **PAPER)
+        except ConeflatError as error:
+            failed.append((file.name, " ".join(str(error).split())))
+            continue
+        name = model_of(file)
+        models.append(Model(name or file.stem, MODELS[name] if name else None, compared))
+    return Reproduction(tuple(models), tuple(failed))
+
+
+def _meshes(path: Path) -> list[Path]:
+    if not path.is_dir():
+        return [path]
+    return [file for file in path.iterdir() if file.suffix.lower() in INPUT_FORMATS]
+
+
+def _place(path: Path) -> tuple[int, str, str]:
+    name = model_of(path)
+    return (len(MODELS) if name is None else list(MODELS).index(name), path.stem, str(path))
+
+
+def _cones(result: Flattening) -> str:
+    return plural(len(result.cones), "cone")
+
+
+def _written(rows: Sequence[Sequence[object]], forms: Sequence[str]) -> list[list[str]]:
+    """Return cells as they stand in a table."""
+    return [
+        [
+            str(value) if isinstance(value, str) else written(value, form)  # type: ignore[arg-type]
+            for value, form in zip(row, forms, strict=True)
+        ]
+        for row in rows
+    ]
+
+
+def _distinct(headings: Sequence[str]) -> list[str]:
+    """Return headings of which each says what it is of, as columns of a file cannot lean on their neighbours."""
+    named: list[str] = []
+    for heading in headings:
+        if heading in ("of the paper", "ratio"):
+            of = next(each for each in reversed(named) if ": " not in each)
+            heading = f"{of}: {'paper' if heading == 'of the paper' else heading}"
+        named.append(heading)
+    return named

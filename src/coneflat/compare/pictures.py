@@ -1,0 +1,130 @@
+"""Comparisons as pictures: side by side, in the same colours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..view import draw_checker, draw_cones, draw_layout
+from ..view.camera import Eye, view_aspect
+from ..view.compose import Panel, Row, compose
+from ..view.layout import fill_layout, layout_aspect
+from ..view.marks import mark_handles
+from ..view.model import draw_quantity
+from ..view.quantity import Quantity, conformal_distortion
+from .run import Comparison, Entry
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..result import Flattening
+
+DPI = 200.0
+# Inches.
+WIDTH, TALLEST = 10.0, 2.4
+IN_A_ROW = 5
+# Of a method at whose distortion the colours end, as most of the others are far better than the worst.
+MIDDLE = 0.5
+
+
+@dataclass(frozen=True)
+class Sight:
+    """From where models are looked at.
+
+    Attributes:
+        eye: direction to the eye, as in `draw_checker`.
+        up: the models' upward axis, "x", "y" or "z".
+    """
+
+    eye: Eye = "front-right"
+    up: str = "y"
+
+    def panel(self, result: Flattening, draw: Callable[..., object], label: str) -> Panel:
+        """Return a panel in which a function of axes draws the model."""
+        return Panel(view_aspect(result.vertices[np.unique(result.faces)], self.eye, self.up), draw, label)
+
+
+def draw_layouts(comparison: Comparison) -> Figure:
+    """Return the layouts of all methods, coloured by quasi-conformal distortion, on one scale."""
+    shown = comparison.drawn
+    quantities = same_scale(shown)
+    panels = [
+        Panel(
+            layout_aspect(result, crop=True), partial(_fill, result, quantity), labelled(entry.method, result)
+        )
+        for entry, quantity in zip(shown, quantities, strict=True)
+        if (result := entry.result) is not None
+    ]
+    return _grid(panels, quantities[:1])
+
+
+def draw_qualities(comparison: Comparison, sight: Sight) -> Figure:
+    """Return the model with the quasi-conformal distortion of all methods, on one scale."""
+    quantities = same_scale(comparison.drawn)
+    panels = quality_panels(comparison.drawn, quantities, sight)
+    return _grid(panels, quantities[:1])
+
+
+def quality_panels(entries: Sequence[Entry], quantities: Sequence[Quantity], sight: Sight) -> list[Panel]:
+    """Return a panel of the model with a quantity for each method."""
+    return [
+        sight.panel(
+            result,
+            partial(draw_quantity, result=result, quantity=quantity, eye=sight.eye, up=sight.up, dpi=DPI),
+            labelled(entry.method, result),
+        )
+        for entry, quantity in zip(entries, quantities, strict=True)
+        if (result := entry.result) is not None
+    ]
+
+
+def labelled(method: str, result: Flattening) -> str:
+    """Return a method and what it reached."""
+    return f"{method}: {result.distortion.qc_mean:.4f}"
+
+
+def same_scale(entries: Sequence[Entry]) -> list[Quantity]:
+    """Return the quasi-conformal distortion by each method, in colours that mean the same."""
+    quantities = [conformal_distortion(entry.result) for entry in entries if entry.result is not None]
+    if not quantities:
+        return []
+    order = np.argsort([quantity.scale.high for quantity in quantities], kind="stable")
+    scale = quantities[int(order[int(MIDDLE * (len(order) - 1))])].scale
+    return [replace(quantity, scale=scale) for quantity in quantities]
+
+
+def cone_panel(result: Flattening, sight: Sight, label: str) -> Panel:
+    """Return a panel of the model with its cones and seams."""
+    return sight.panel(result, partial(draw_cones, result, eye=sight.eye, up=sight.up, dpi=DPI), label)
+
+
+def texture_panel(result: Flattening, sight: Sight, label: str) -> Panel:
+    """Return a panel of the model with a checkerboard."""
+    return sight.panel(result, partial(draw_checker, result, eye=sight.eye, up=sight.up, dpi=DPI), label)
+
+
+def layout_panel(result: Flattening, label: str) -> Panel:
+    """Return a panel of the charts."""
+    return Panel(layout_aspect(result, crop=True), partial(draw_layout, result, crop=True), label)
+
+
+def figure_of(rows: Sequence[Row], *, marks_of: Flattening | None = None) -> Figure:
+    """Return rows of panels as wide as a page."""
+    return compose(rows, marks=[] if marks_of is None else mark_handles(marks_of), dpi=DPI, width=WIDTH)
+
+
+def in_rows(panels: Sequence[Panel], quantities: Sequence[Quantity] = (), count: int = IN_A_ROW) -> list[Row]:
+    """Return panels in rows of so many."""
+    return [Row(panels[k : k + count], quantities, tallest=TALLEST) for k in range(0, len(panels), count)]
+
+
+def _grid(panels: Sequence[Panel], quantities: Sequence[Quantity]) -> Figure:
+    return figure_of(in_rows(panels, quantities))
+
+
+def _fill(result: Flattening, quantity: Quantity, axes: object) -> None:
+    fill_layout(axes, result, quantity, DPI)  # type: ignore[arg-type]
