@@ -11,7 +11,6 @@ import click
 from .figure import Eye
 from .search import as_keywords, place_options, search_options
 
-
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 _SIGHT = (

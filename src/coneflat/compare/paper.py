@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 METHODS = (*NAMES, "exact")
 TABLE_1 = ("model", "triangles", "of the paper", "cones", "curvature error, pi", "of the paper", "ratio")
 TABLE_2 = ("model", "method", "QC mean", "of the paper", "ratio", "time, s", "of the paper", "ratio", "note")
+# How their numbers are written.
+FORMS_1 = ("", ",d", "", "d", ".2e", ".2e", ".2f")
+FORMS_2 = ("", "", ".4f", ".3f", ".3f", ".2f", ".3g", ".3f", "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +120,11 @@ class Reproduction:
         if self.missing:
             lines += [f"Not among the files: {', '.join(self.missing)}.", ""]
         lines += [f"Could not be flattened: {name}: {why}\n" for name, why in self.failed]
-        forms = ("", ",d", "", "d", ".2e", ".2e", ".2f")
-        lines += ["## Table 1: curvature error", "", markdown(TABLE_1, _written(self.table_1(), forms))]
-        forms = ("", "", ".4f", ".3f", ".3f", ".2f", ".3g", ".3f", "")
-        lines += [
-            "## Table 2: quasi-conformal distortion",
-            "",
-            markdown(TABLE_2, _written(self.table_2(), forms)),
-        ]
+        for title, headings, rows, forms in (
+            ("Table 1: curvature error", TABLE_1, self.table_1(), FORMS_1),
+            ("Table 2: quasi-conformal distortion", TABLE_2, self.table_2(), FORMS_2),
+        ):
+            lines += [f"## {title}", "", markdown(headings, _written(rows, forms))]
         lines += [f"![{title}]({name})\n\n{title}\n" for name, title in FIGURES.items() if self.models]
         return "\n".join(lines)
 
@@ -137,6 +137,7 @@ class Reproduction:
 
     def figures(self, sight: Sight) -> dict[str, Figure]:
         """Return the paper's figures, by file name."""
+        from ..view.compose import Row
         from .pictures import (
             cone_panel,
             figure_of,
@@ -146,7 +147,6 @@ class Reproduction:
             same_scale,
             texture_panel,
         )
-        from ..view.compose import Row
 
         if not self.models:
             return {}

@@ -49,7 +49,10 @@ class Sight:
 
 
 def draw_layouts(comparison: Comparison) -> Figure:
-    """Return the layouts of all methods, coloured by quasi-conformal distortion, on one scale."""
+    """Return the layouts of all methods, coloured by quasi-conformal distortion, on one scale.
+
+    Beside them stands how often it is which by the first method.
+    """
     shown = comparison.drawn
     quantities = same_scale(shown)
     panels = [
@@ -94,7 +97,8 @@ def same_scale(entries: Sequence[Entry]) -> list[Quantity]:
         return []
     order = np.argsort([quantity.scale.high for quantity in quantities], kind="stable")
     scale = quantities[int(order[int(MIDDLE * (len(order) - 1))])].scale
-    return [replace(quantity, scale=scale) for quantity in quantities]
+    names = [f"QC, {entry.method}" for entry in entries if entry.result is not None]
+    return [replace(one, scale=scale, label=name) for one, name in zip(quantities, names, strict=True)]
 
 
 def cone_panel(result: Flattening, sight: Sight, label: str) -> Panel:

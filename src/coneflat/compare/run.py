@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -111,19 +112,20 @@ def compare_methods(
                 if name not in PEERS
                 else f"{name} is not installed"
             )
-    names, done = [*methods, *chosen], 0
+    names = [*methods, *chosen]
 
-    def tell(what: str) -> None:
+    def tell(what: str, done: int) -> None:
         if progress is not None:
             progress(what, done / (len(names) + 1))
 
-    tell("cones")
+    tell("cones", 0)
+    _warm_up(options.get("method", "exact"))
     base = flatten(mesh, faces, **options)
     cones = _cones_again(base)
     shared = {name: value for name, value in options.items() if name in SHARED}
     entries = []
     for done, name in enumerate(names, 1):
-        tell(name)
+        tell(name, done)
         if name in PEERS:
             entries.append(_entry_of_peer(name, base))
         elif name == base.settings["method"]:
@@ -166,7 +168,5 @@ def _entry_of_peer(name: str, base: Flattening) -> Entry:
 
 def _warm_up(method: str) -> None:
     """Load what a method needs, so that its time is that of its work."""
-    try:
+    with suppress(ConeflatError):
         flatten(*SMALL, cones=dict.fromkeys(range(4), np.pi), method=method)
-    except ConeflatError:
-        pass

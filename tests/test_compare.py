@@ -1,0 +1,175 @@
+"""Methods side by side, and the paper's experiments."""
+
+import csv
+import io
+
+import numpy as np
+import pytest
+import shapes
+from click.testing import CliRunner
+
+from coneflat import MeshFile, errors, flatten
+from coneflat.cli.main import cli
+from coneflat.compare import compare_methods, reproduce
+from coneflat.compare.paper import METHODS as PAPER_METHODS
+from coneflat.compare.peers import PEERS, installed_peers, with_uv
+from coneflat.compare.published import MODELS, model_of
+from coneflat.compare.table import COLUMNS, comparison_csv, comparison_markdown
+from coneflat.options import METHODS
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return shapes.sphere(3)
+
+
+@pytest.fixture(scope="module")
+def compared(ball):
+    return compare_methods(*ball, peers=())
+
+
+def test_every_method_has_the_same_cones_and_cut(compared):
+    assert [entry.method for entry in compared.entries] == list(METHODS)
+    first = compared["exact"].result
+    for entry in compared.entries:
+        assert entry.result is not None, entry.note
+        assert np.array_equal(entry.result.cones, first.cones)
+        assert np.array_equal(entry.result.seams, first.seams)
+        assert "other edges" not in entry.note
+        assert entry.seconds > 0
+
+
+def test_conformal_methods_agree(compared):
+    reached = {entry.method: entry.result.distortion.qc_mean for entry in compared.entries}
+    best = min(reached.values())
+    assert all(1 <= qc < best + 0.05 for qc in reached.values()), reached
+
+
+def test_tables_hold_what_was_measured(compared):
+    table = comparison_markdown(compared)
+    assert table.count("\n") == len(METHODS) + 2
+    rows = list(csv.DictReader(io.StringIO(comparison_csv(compared))))
+    assert [row["method"] for row in rows] == list(METHODS)
+    assert set(COLUMNS) < set(rows[0])
+    assert float(rows[0]["QC mean"]) == compared["exact"].result.distortion.qc_mean
+
+
+def test_a_method_that_fails_is_named_with_its_reason(ball, monkeypatch):
+    def fail(name):
+        raise errors.ConvergenceError(f"{name} did not converge")
+
+    monkeypatch.setattr("coneflat.pipeline.other_method", fail)
+    found = compare_methods(*ball, methods=("exact", "bff"), peers=())
+    assert found["bff"].result is None
+    assert found["bff"].note == "bff did not converge"
+    assert "bff did not converge" in comparison_markdown(found)
+    assert [entry.method for entry in found.drawn] == ["exact"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"methods": ("exact", "magic")}, "unknown method 'magic'"),
+        ({"peers": ("magic",)}, "unknown peer 'magic'"),
+    ],
+)
+def test_bad_options(ball, options, message):
+    with pytest.raises(errors.OptionError, match=message):
+        compare_methods(*ball, **options)
+
+
+def test_a_peer_that_is_not_installed(ball, monkeypatch):
+    monkeypatch.setattr("coneflat.compare.run.installed_peers", tuple)
+    with pytest.raises(errors.OptionError, match="xatlas is not installed"):
+        compare_methods(*ball, peers=("xatlas",))
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_peers_are_measured_like_us(ball, name):
+    if name not in installed_peers():
+        pytest.skip(f"{name} is not installed")
+    found = compare_methods(*ball, methods=("exact",), peers=(name,))
+    assert found[name].result is not None, found[name].note
+    assert found[name].result.distortion.qc_mean < 1.5
+
+
+def test_uvs_of_others_are_welded_and_measured(ball):
+    ours = flatten(*ball)
+    theirs = with_uv(ours, ours.corner_uv * 3 - 1)
+    assert len(theirs.uv) == len(ours.uv)
+    assert theirs.distortion.qc_mean == pytest.approx(ours.distortion.qc_mean)
+    assert {tuple(edge) for edge in np.sort(theirs.seams)} == {tuple(edge) for edge in np.sort(ours.seams)}
+    assert theirs.uv.min() == 0
+    assert theirs.uv.max() == 1
+
+
+def test_models_are_known_by_their_names(tmp_path):
+    assert model_of(tmp_path / "Rocker-Arm.OBJ") == "rockerarm"
+    assert model_of(tmp_path / "isi_horse.ply") == "isi-horse"
+    assert model_of(tmp_path / "cow.obj") is None
+    assert MODELS["fandisk"].has_as_many(12_946)
+    assert not MODELS["hand"].has_as_many(15_982)
+    assert MODELS["torso"].qc == {"linear-abf": 1.004, "linear": 1.005}
+
+
+def write_mesh(path, mesh):
+    vertices, faces = mesh
+    lines = [f"v {x} {y} {z}" for x, y, z in vertices.tolist()]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_the_experiments_of_the_paper(tmp_path, ball):
+    write_mesh(tmp_path / "fandisk.obj", ball)
+    write_mesh(tmp_path / "another.obj", shapes.hill(12, 12))
+    (tmp_path / "gargoyle.obj").write_text("v 0 0 0\n")
+    found = reproduce([tmp_path])
+    assert [model.name for model in found.models] == ["fandisk", "another"]
+    assert found.failed[0][0] == "gargoyle.obj"
+    assert "gargoyle" in found.missing
+    assert "fandisk" not in found.missing
+    first, second = found.table_1()
+    assert first[4] / first[5] == pytest.approx(first[6])
+    assert np.isnan(second[5])
+    rows = [row for row in found.table_2() if row[0] == "fandisk"]
+    assert len(rows) == len(PAPER_METHODS)
+    assert rows[0][3] == 1.013
+    text = found.markdown()
+    assert "Not among the files: rockerarm, foot" in text
+    assert "gargoyle.obj" in text
+    assert "In another resolution" in text
+
+
+def test_commands(tmp_path, ball):
+    pytest.importorskip("matplotlib")
+    mesh = write_mesh(tmp_path / "ball.obj", ball)
+    run = CliRunner().invoke(
+        cli,
+        ["compare", str(mesh), "-o", str(tmp_path / "out"), "--methods", "exact,linear", "--no-peers"],
+        catch_exceptions=False,
+    )
+    assert run.exit_code == 0
+    assert "exact" in run.output
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"compare.md", "compare.csv", "layouts.png", "quality.png"}
+    run = CliRunner().invoke(cli, ["paper", str(mesh), "-o", str(tmp_path / "paper")], catch_exceptions=False)
+    assert run.exit_code == 0
+    assert "Table 2" in run.output
+    written = {path.name for path in (tmp_path / "paper").iterdir()}
+    assert written == {"paper.md", "table1.csv", "table2.csv", *(f"figure{k}.png" for k in range(2, 6))}
+
+
+def test_a_folder_that_cannot_be_made(tmp_path, ball):
+    pytest.importorskip("matplotlib")
+    mesh = write_mesh(tmp_path / "ball.obj", ball)
+    with pytest.raises(errors.MeshFileError, match="cannot make the folder"):
+        CliRunner().invoke(cli, ["compare", str(mesh), "-o", str(mesh)], catch_exceptions=False)
+
+
+def test_names_of_files_are_kept(tmp_path, ball):
+    from coneflat import read_mesh
+
+    source = read_mesh(write_mesh(tmp_path / "ball.obj", ball))
+    assert isinstance(source, MeshFile)
+    assert compare_methods(source, methods=("exact",), peers=()).name.endswith("ball.obj")
