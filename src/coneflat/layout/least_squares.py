@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import bmat, csc_matrix, csr_matrix
+from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from .._arrays import FloatArray, IntArray
@@ -11,7 +11,8 @@ from ..errors import MetricError
 from ..geometry import corner_angles, is_broken
 from ..geometry.ties import argmax_tied, tie_key
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
-from ..solver import factorize
+from ..solver import HermitianFactor
+from .complex_arrays import ComplexArray
 
 
 def least_squares_layout(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
@@ -33,27 +34,32 @@ def least_squares_layout(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
     """
     if not np.isfinite(lengths).all():
         raise MetricError(f"{int((~np.isfinite(lengths)).sum())} of the metric's lengths are not finite")
-    equations = _equations(disk, lengths)
-    pins = _pins(disk, lengths)
-    normal = csr_matrix(equations.conj().T @ equations)
-    free = np.ones(len(disk.vertices), dtype=bool)
-    free[pins] = False
-    inner = normal[free][:, free]
-    system = csc_matrix(bmat([[inner.real, -inner.imag], [inner.imag, inner.real]]))
-    points = np.zeros(len(disk.vertices), dtype=complex)
-    points[pins[1]] = 1.0
-    factor = factorize(system)
-    # The second round removes what the squared condition number of normal equations cost.
-    for _ in range(2):
-        residual = -(equations.conj().T @ (equations @ points))[free]
-        step = factor.solve(np.concatenate([residual.real, residual.imag]))
-        points[free] += step[: len(residual)] + 1j * step[len(residual) :]
+    points = pinned_least_squares(_equations(disk, lengths), far_pins(disk, lengths))
     if not np.isfinite(points).all():
         raise MetricError(
             f"the layout of {len(disk.faces)} triangles has no finite solution: "
             f"{int(is_broken(lengths).sum())} of them break the triangle inequality"
         )
     return np.stack([points.real, points.imag], axis=1)
+
+
+def pinned_least_squares(equations: csr_matrix, pins: IntArray) -> ComplexArray:
+    """Return (n,) the z that minimises |equations z| with z = 0 at the first pin and 1 at the second.
+
+    Args:
+        equations: (m, n) complex.
+        pins: (2,) columns.
+    """
+    normal = csr_matrix(equations.conj().T @ equations)
+    free = np.ones(equations.shape[1], dtype=bool)
+    free[pins] = False
+    factor = HermitianFactor(normal[free][:, free])
+    z = np.zeros(len(free), dtype=np.complex128)
+    z[pins[1]] = 1.0
+    # The second round removes what the squared condition number of normal equations cost.
+    for _ in range(2):
+        z[free] -= factor.solve((equations.conj().T @ (equations @ z))[free])
+    return z
 
 
 def _equations(disk: TriangleMesh, lengths: FloatArray) -> csr_matrix:
@@ -71,7 +77,7 @@ def _equations(disk: TriangleMesh, lengths: FloatArray) -> csr_matrix:
     )
 
 
-def _pins(disk: TriangleMesh, lengths: FloatArray) -> IntArray:
+def far_pins(disk: TriangleMesh, lengths: FloatArray) -> IntArray:
     """Return two vertices far apart, off broken triangles.
 
     Two pins close together, or held by a triangle that has no shape, leave the system nearly singular.

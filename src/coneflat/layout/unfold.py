@@ -58,7 +58,7 @@ def unfold(flat: FlatTriangles, corners: IntArray, cut: BoolArray) -> FloatArray
     while (seeds := on_cut[~reached[on_cut // 3]]).size:
         border, frames = _border(flat, cut, int(seeds[0]))
         tails = corner[_next(border)]
-        points[tails] = _closed_chain(frames * flat.sides[border])
+        points[tails] = closed_chain(frames * flat.sides[border])
         placed[tails] = pinned[tails] = True
         faces, first = np.unique(border // 3, return_index=True)
         frame[faces] = frames[first]
@@ -91,7 +91,7 @@ def _border(flat: FlatTriangles, cut: BoolArray, start: int) -> tuple[IntArray, 
     return border, frames
 
 
-def _closed_chain(steps: ComplexArray) -> ComplexArray:
+def closed_chain(steps: ComplexArray) -> ComplexArray:
     """Return the corners of a closed polygon, whose sides are the steps but for the gap they leave."""
     path = np.cumsum(np.abs(steps))
     ends = np.cumsum(steps)

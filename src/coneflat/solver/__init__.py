@@ -4,7 +4,8 @@ The ladder, best first: MKL PARDISO (pypardiso) for large systems, CHOLMOD with 
 without (cholespy), SuperLU (SciPy), and conjugate gradients with multigrid (pyamg) for what fits no factorization.
 """
 
+from .hermitian import HermitianFactor
 from .ladder import available, factorize, solving
 from .types import Factor, NotPositiveDefinite
 
-__all__ = ["Factor", "NotPositiveDefinite", "available", "factorize", "solving"]
+__all__ = ["Factor", "HermitianFactor", "NotPositiveDefinite", "available", "factorize", "solving"]

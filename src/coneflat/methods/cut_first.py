@@ -1,0 +1,43 @@
+"""Maps of a disk that prescribe no cones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .._arrays import FloatArray, IntArray
+from ..cones import ConeSolution
+from ..mesh import TriangleMesh
+from ..text import plural
+from .base import LaidOut
+from .measured import laid_out_at
+
+
+@dataclass(frozen=True, eq=False)
+class CutFirst:
+    """A map of the mesh, cut open, that takes no notice of what was cut and of what cones should have.
+
+    Attributes:
+        name: the method's.
+        place: returns (c, 2) points of a disk, at any scale, given its (m, 3) side lengths.
+        mesh: the mesh.
+        lengths: (m, 3) side lengths, model units.
+        solution: the cones, through which the mesh is cut.
+    """
+
+    name: str
+    place: Callable[[TriangleMesh, FloatArray], FloatArray]
+    mesh: TriangleMesh
+    lengths: FloatArray
+    solution: ConeSolution
+
+    def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
+        """Map the disk, and say so if the mesh is none by itself."""
+        notes: tuple[str, ...] = ()
+        if len(seams):
+            notes = (
+                f"The mesh was cut open first, along {plural(len(seams), 'edge')}, and {self.name} mapped the disk: it "
+                "prescribes no cones, and the sides of seams come out as they may.",
+            )
+        points = self.place(disk, self.lengths)
+        return laid_out_at(points, self.mesh, disk, seams, self.solution, notes=notes)
