@@ -9,6 +9,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from coneflat import check_mesh, cut_open, edge_lengths, find_seams
+
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "meshes"
 
 
@@ -258,3 +260,21 @@ def tube(around: int = 48, along: int = 12):
         distortion=SimpleNamespace(qc=qc, log_area_scale=log_scale, qc_mean=1.1, flipped=0, seam_length=0.4),
         source=None,
     )
+
+
+def similar(points, reference):
+    """Return the points after the similarity that brings them closest to the reference."""
+    z, w = points @ [1, 1j], reference @ [1, 1j]
+    z, w = z - z.mean(), w - w.mean()
+    return np.abs(z * (np.vdot(z, w) / np.vdot(z, z)) - w).max()
+
+
+def cut_disk(vertices, faces, cones=()):
+    """Return a mesh cut open."""
+    mesh = check_mesh(vertices, faces).mesh
+    costs = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
+    return cut_open(mesh, find_seams(mesh, np.array(cones, dtype=np.int64), costs)).mesh
+
+
+def lengths_of(mesh):
+    return edge_lengths(mesh.vertices, mesh.faces)

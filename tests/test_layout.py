@@ -8,24 +8,17 @@ from coneflat import TriangleMesh, edge_lengths, errors, least_squares_layout
 from coneflat.layout.pieces import triangulations
 
 
-def similar(points, reference):
-    """Return the points after the similarity that brings them closest to the reference."""
-    z, w = points @ [1, 1j], reference @ [1, 1j]
-    z, w = z - z.mean(), w - w.mean()
-    return np.abs(z * (np.vdot(z, w) / np.vdot(z, z)) - w).max()
-
-
 def test_flat_mesh_comes_back():
     vertices, faces = shapes.grid(9, 5)
     points = least_squares_layout(TriangleMesh(vertices, faces), edge_lengths(vertices, faces))
-    assert similar(points, vertices[:, :2]) < 1e-11
+    assert shapes.similar(points, vertices[:, :2]) < 1e-11
 
 
 def test_slivers_do_not_hurt():
     vertices, faces = shapes.grid(30, 30)
     vertices[:, 1] *= 1e-3
     points = least_squares_layout(TriangleMesh(vertices, faces), edge_lengths(vertices, faces))
-    assert similar(points, vertices[:, :2]) < 1e-8
+    assert shapes.similar(points, vertices[:, :2]) < 1e-8
 
 
 def test_broken_triangle_is_laid_on_a_line():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from .._arrays import FloatArray
 from ..cones import ConeSolution
@@ -55,15 +55,17 @@ def spectral_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
     border = disk.tails[walk_boundary(disk)]
     count = len(border)
     equations = conformal_equations(disk, lengths)
-    on_border = np.zeros(len(disk.vertices))
-    on_border[border] = SHIFT / count
-    factor = HermitianFactor(csr_matrix(equations.conj().T @ equations + diags(on_border)))
+    shift = np.zeros(len(disk.vertices))
+    shift[border] = SHIFT / count
+    factor = HermitianFactor(csr_matrix(equations.conj().T @ equations + diags(shift)))
 
-    def extended(source: ComplexArray) -> ComplexArray:
+    def extended(source: ComplexArray, refine: bool = False) -> ComplexArray:
         """Return (n,) the solution for a centred source on the boundary, itself centred there."""
-        right = np.zeros(len(on_border), dtype=np.complex128)
+        right = np.zeros(len(shift), dtype=np.complex128)
         right[border] = source - source.mean()
         z = factor.solve(right)
+        if refine:
+            z += factor.solve(right - shift * z - equations.conj().T @ (equations @ z))
         return z - z[border].mean()
 
     def apply(parts: FloatArray) -> FloatArray:
@@ -77,12 +79,12 @@ def spectral_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
     operator = LinearOperator((2 * count, 2 * count), matvec=apply, dtype=np.float64)
     try:
         _, vectors = eigsh(operator, k=1, which="LA", v0=start, tol=TOLERANCE, maxiter=RESTARTS)
-    except ArpackNoConvergence as error:
+    except ArpackError as error:
         raise ConvergenceError(
             f"the spectral map of {len(disk.faces):,} triangles was not found in {RESTARTS} restarts of the Lanczos "
             "iteration: another cut or method 'lscm' may help"
         ) from error
-    z = extended(vectors[:count, 0] + 1j * vectors[count:, 0])
+    z = extended(vectors[:count, 0] + 1j * vectors[count:, 0], refine=True)
     if not np.isfinite(z).all():
         raise MetricError(f"the spectral conformal map of {len(disk.faces):,} triangles is not finite")
     return np.stack([z.real, z.imag], axis=1)
