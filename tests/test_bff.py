@@ -125,7 +125,7 @@ class TestPromises:
         assert ratio.std() / ratio.mean() < 5e-3
 
     def test_comes_close_to_the_exact_metric_on_fine_meshes(self):
-        """Measured: 0.060, 0.016, 0.004 for a mesh twice as fine each time."""
+        """Measured, standard deviation of the log scale: 0.050, 0.015, 0.004 for meshes twice as fine each time."""
         off = []
         for fine in (1, 2, 4):
             shape = shapes.hill(12 * fine, 10 * fine)

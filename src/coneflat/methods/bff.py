@@ -44,10 +44,12 @@ class BoundaryFirst:
     solution: ConeSolution
 
     def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
-        """Find the boundary curve and extend both coordinates harmonically, as the paper does with cones.
+        """Find the boundary curve and extend both coordinates harmonically, as the paper does where there are cones.
 
-        Its extension for free boundaries, by conjugate harmonic functions, would need another factorization and part
-        the sides of seams, and gains nothing: 1.02675 instead of 1.02676 in mean QC distortion on a face.
+        This keeps the curve, and with it both sides of seams equal, and pays in angles. The other extension, by a
+        conjugate harmonic function (the paper's for free boundaries), needs another factorization. Measured, mean QC
+        distortion and seam mismatch: fandisk 1.063, 0 and 1.034, 0.026; bunny 1.056, 0 and 1.029, 0.054. Without
+        seams both are alike: a face 1.02676 and 1.02675.
         """
         border = walk_boundary(disk)
         inside = HarmonicExtension(disk, self.lengths)
