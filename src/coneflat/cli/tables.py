@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..compare import Comparison, Reproduction
-from ..compare.table import COLUMNS, comparison_rows
+from ..compare.table import COLUMNS, comparison_rows, notes
 
 PLAIN_WIDTH = 150
 
@@ -21,15 +21,11 @@ def print_comparison(comparison: Comparison, files: Sequence[Path]) -> None:
     table = Table(box=None, pad_edge=False)
     for heading in ("method", *COLUMNS):
         table.add_column(heading, justify="left" if heading == "method" else "right")
-    notes = []
-    for entry, (*cells, note) in zip(comparison.entries, comparison_rows(comparison), strict=True):
+    for cells in comparison_rows(comparison):
         table.add_row(*cells)
-        if note:
-            notes.append(f"{entry.method}: {note}")
     out = Console(highlight=False, width=None if sys.stdout.isatty() else PLAIN_WIDTH)
     out.print(table)
-    for note in notes:
-        out.print(note, markup=False, soft_wrap=True)
+    click.echo(notes([comparison]), nl=False)
     _print_files(files)
 
 

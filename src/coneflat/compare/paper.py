@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from ..stages import Progress
 from ..text import plural
 from .published import MODELS, NAMES, Published, model_of
 from .run import Comparison, compare_methods
-from .table import as_csv, markdown, written
+from .table import as_csv, markdown, notes, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 #: What the paper compares, and the exact metric, which it does not have.
 METHODS = (*NAMES, "exact")
 TABLE_1 = ("model", "triangles", "of the paper", "cones", "curvature error, pi", "of the paper", "ratio")
-TABLE_2 = ("model", "method", "QC mean", "of the paper", "ratio", "time, s", "of the paper", "ratio", "note")
+TABLE_2 = ("model", "method", "QC mean", "of the paper", "ratio", "time, s", "of the paper", "ratio")
 # How their numbers are written.
 FORMS_1 = ("", ",d", "", "d", ".2e", ".2e", ".2f")
-FORMS_2 = ("", "", ".4f", ".3f", ".3f", ".2f", ".3g", ".3f", "")
+FORMS_2 = ("", "", ".4f", ".3f", ".3f", ".2f", ".3g", ".3f")
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ class Reproduction:
                     seconds = model.published.seconds.get(entry.method, math.nan)
                 name = f"{entry.method} ({NAMES[entry.method]})" if entry.method in NAMES else entry.method
                 numbers = [qc, theirs, qc / theirs, entry.seconds, seconds, entry.seconds / seconds]
-                rows.append([model.name, name, *numbers, entry.note])
+                rows.append([model.name, name, *numbers])
         return rows
 
     def markdown(self) -> str:
@@ -125,6 +125,7 @@ class Reproduction:
             ("Table 2: quasi-conformal distortion", TABLE_2, self.table_2(), FORMS_2),
         ):
             lines += [f"## {title}", "", markdown(headings, _written(rows, forms))]
+        lines += [notes([replace(model.comparison, name=model.name) for model in self.models])]
         lines += [f"![{title}]({name})\n\n{title}\n" for name, title in FIGURES.items() if self.models]
         return "\n".join(lines)
 

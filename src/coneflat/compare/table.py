@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Sequence
 
+from ..text import list_some
 from .run import Comparison, Entry
 
 #: Heading of each column, and how a number below it is written.
@@ -57,20 +58,30 @@ def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def comparison_rows(comparison: Comparison) -> list[list[str]]:
-    """Return a row of text for each method."""
+    """Return a row of text for each method, without its note."""
     return [
-        [
-            entry.method,
-            *(written(n, form) for n, form in zip(numbers(entry), COLUMNS.values(), strict=True)),
-            entry.note,
-        ]
+        [entry.method, *(written(n, form) for n, form in zip(numbers(entry), COLUMNS.values(), strict=True))]
         for entry in comparison.entries
     ]
 
 
 def comparison_markdown(comparison: Comparison) -> str:
-    """Return the methods in a table."""
-    return markdown(["method", *COLUMNS, "note"], comparison_rows(comparison))
+    """Return the methods in a table, and what is to be said of them."""
+    return f"{markdown(['method', *COLUMNS], comparison_rows(comparison))}\n{notes([comparison])}"
+
+
+def notes(comparisons: Sequence[Comparison]) -> str:
+    """Return a line for each note that methods have, with the meshes that it is about where there are several."""
+    meshes: dict[tuple[str, str], list[str]] = {}
+    for comparison in comparisons:
+        for entry in comparison.entries:
+            if entry.note:
+                meshes.setdefault((entry.method, entry.note), []).append(comparison.name)
+    about = len(comparisons) > 1
+    return "".join(
+        f"- {method}{f' ({list_some(names)})' if about else ''}: {note}.\n"
+        for (method, note), names in sorted(meshes.items())
+    )
 
 
 def comparison_csv(comparison: Comparison) -> str:
