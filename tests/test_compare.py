@@ -161,6 +161,13 @@ def test_commands(tmp_path, ball):
     assert written == {"paper.md", "table1.csv", "table2.csv", *(f"figure{k}.png" for k in range(2, 6))}
 
 
+def test_cones_of_the_paper_and_others(tmp_path, ball):
+    mesh = write_mesh(tmp_path / "ball.obj", ball)
+    run = CliRunner().invoke(cli, ["compare", str(mesh), "--paper", "--cone-count", "5"])
+    assert run.exit_code == 2
+    assert "--paper says which cones: leave out --cone-count" in run.output
+
+
 def test_a_folder_that_cannot_be_made(tmp_path, ball):
     pytest.importorskip("matplotlib")
     mesh = write_mesh(tmp_path / "ball.obj", ball)

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+from click.core import ParameterSource
 
 from .figure import Eye
 from .search import as_keywords, place_options, search_options
+from .talk import talk_options
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -57,8 +59,11 @@ def _sight(command: Command) -> Command:
 @place_options
 @_sight
 @click.option("--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces.")
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@talk_options
+@click.pass_context
 def compare(
+    context: click.Context,
+    /,
     mesh: Path,
     output: Path | None,
     methods: str | None,
@@ -67,7 +72,7 @@ def compare(
     eye: Any,
     up: str,
     repair: bool,
-    quiet: bool,
+    talk: str | None,
     **search: Any,
 ) -> None:
     """Flatten MESH by all methods, and by other packages that are installed, and tell how they compare.
@@ -82,8 +87,12 @@ def compare(
     from ..io import read_mesh
     from ..options import METHODS, PAPER
     from .console import Console
-    from .tables import print_comparison
+    from .run import FLATTENED, READ
+    from .tables import comparison_lines
 
+    for name in search if paper else ():
+        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"--paper says which cones: leave out --{name.replace('_', '-')}", context)
     options = {"repair": repair, **(PAPER if paper else as_keywords(search))}
     chosen = METHODS if methods is None else tuple(name.strip() for name in methods.split(","))
     if output is not None:
@@ -92,23 +101,25 @@ def compare(
 
         check_folder(output)
         sight = Sight(eye, up)
-    with Console(quiet) as console:
-        console.progress("read", 0.0)
-        found = compare_methods(
-            read_mesh(mesh),
-            methods=chosen,
-            peers=() if no_peers else None,
-            progress=console.progress,
-            **options,
-        )
+    with Console(talk) as console:
+        with console.stage("read", 0.0):
+            source = read_mesh(mesh)
+        with console.stage("compare", READ):
+            found = compare_methods(
+                source,
+                methods=chosen,
+                peers=() if no_peers else None,
+                progress=console.part(READ, FLATTENED),
+                **options,
+            )
         written: list[Path] = []
         if output is not None:
-            console.progress("draw", 0.95)
-            texts = {"compare.md": comparison_markdown(found), "compare.csv": comparison_csv(found)}
-            pictures = {"layouts.png": draw_layouts(found), "quality.png": draw_qualities(found, sight)}
-            written = write_folder(output, texts, pictures)
-    if not quiet:
-        print_comparison(found, written)
+            with console.stage("draw", FLATTENED):
+                texts = {"compare.md": comparison_markdown(found), "compare.csv": comparison_csv(found)}
+                pictures = {"layouts.png": draw_layouts(found), "quality.png": draw_qualities(found, sight)}
+                written = write_folder(output, texts, pictures)
+        console.say(comparison_lines(found))
+        console.finish(written)
 
 
 @click.command(short_help="Reproduce the paper's tables and figures.")
@@ -122,8 +133,8 @@ def compare(
     help="Folder for tables (Markdown and CSV) and figures.",
 )
 @_sight
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
-def paper(meshes: tuple[Path, ...], output: Path, eye: Any, up: str, quiet: bool) -> None:
+@talk_options
+def paper(meshes: tuple[Path, ...], output: Path, eye: Any, up: str, talk: str | None) -> None:
     """Run the experiments of the paper (Section 5) on MESHES, files or folders, with its numbers beside ours.
 
     Models are known by their names: fandisk, rocker-arm, foot, gargoyle, elephant, horse, hand, torso, isi-horse.
@@ -137,14 +148,14 @@ def paper(meshes: tuple[Path, ...], output: Path, eye: Any, up: str, quiet: bool
     from ..compare.pictures import Sight
     from ..compare.write import check_folder, write_folder
     from .console import Console
-    from .tables import print_reproduction
+    from .run import FLATTENED
 
     check_folder(output)
-    with Console(quiet) as console:
-        console.progress("read", 0.0)
-        found = reproduce(meshes, progress=console.progress)
-        console.progress("draw", 0.95)
-        texts = {"paper.md": found.markdown(), **found.csv_files()}
-        written = write_folder(output, texts, found.figures(Sight(eye, up)))
-    if not quiet:
-        print_reproduction(found, written)
+    with Console(talk) as console:
+        with console.stage("compare", 0.0):
+            found = reproduce(meshes, progress=console.part(0.0, FLATTENED))
+        with console.stage("draw", FLATTENED):
+            texts = {"paper.md": found.markdown(), **found.csv_files()}
+            written = write_folder(output, texts, found.figures(Sight(eye, up)))
+        console.say([found.tables().rstrip()])
+        console.finish(written)

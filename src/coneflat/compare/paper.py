@@ -105,6 +105,11 @@ class Reproduction:
         return rows
 
     def markdown(self) -> str:
+        """Return both tables, what is to be known of them, and the figures."""
+        figures = [f"![{title}]({name})\n\n{title}\n" for name, title in FIGURES.items() if self.models]
+        return "\n".join([self.tables(), *figures])
+
+    def tables(self) -> str:
         """Return both tables, and what is to be known of them."""
         lines = ["# Section 5 of the paper", ""]
         lines += [
@@ -126,7 +131,6 @@ class Reproduction:
         ):
             lines += [f"## {title}", "", markdown(headings, _written(rows, forms))]
         lines += [notes([replace(model.comparison, name=model.name) for model in self.models])]
-        lines += [f"![{title}]({name})\n\n{title}\n" for name, title in FIGURES.items() if self.models]
         return "\n".join(lines)
 
     def csv_files(self) -> dict[str, str]:
