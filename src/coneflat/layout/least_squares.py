@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import MetricError
 from ..geometry import corner_angles, is_broken
 from ..geometry.ties import argmax_tied, tie_key
@@ -14,13 +16,55 @@ from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from ..solver import HermitianFactor
 from .complex_arrays import ComplexArray
 
+# Radians that an angle has which came out as none: they keep the shape of its triangle finite.
+LEAST_ANGLE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleShapes:
+    """Shapes of triangles, up to similarity.
+
+    Attributes:
+        third: (m,) the corner p3 opposite the longest side p1 p2, counterclockwise.
+        turn: (m,) the complex number (l13 / l12) e^(i a1) with p3 - p1 = turn (p2 - p1).
+        is_broken: (m,) True where there is no triangle of the lengths or angles asked for.
+    """
+
+    third: IntArray
+    turn: ComplexArray
+    is_broken: BoolArray
+
+
+def shapes_of_lengths(lengths: FloatArray) -> TriangleShapes:
+    """Return the shapes of triangles given by their (m, 3) side lengths.
+
+    Where the triangle inequality is broken, the angles are the real parts of the complex ones: p3 lies on
+    the side p1 p2 and divides it as l13 : l32.
+    """
+    rows = np.arange(len(lengths))
+    third = np.argmax(lengths, axis=1)
+    first, second = NEXT[third], PREVIOUS[third]
+    l13, l32 = lengths[rows, second], lengths[rows, first]
+    l12 = np.minimum(lengths[rows, third], l13 + l32)  # a side that is too long is as if just long enough
+    turn = l13 / l12 * np.exp(1j * corner_angles(lengths)[rows, first])
+    return TriangleShapes(third, turn, is_broken(lengths))
+
+
+def shapes_of_angles(angles: FloatArray) -> TriangleShapes:
+    """Return the shapes of triangles given by their (m, 3) corner angles, radians, which sum to pi.
+
+    Those that are not positive are taken as `LEAST_ANGLE`, and the largest makes up for it.
+    """
+    rows = np.arange(len(angles))
+    third = np.argmax(angles, axis=1)
+    near = angles[rows, NEXT[third]], angles[rows, PREVIOUS[third]]
+    one, two = (np.where(angle > 0, angle, LEAST_ANGLE) for angle in near)
+    turn = np.sin(two) / np.sin(one + two) * np.exp(1j * one)
+    return TriangleShapes(third, turn, angles.min(axis=1) <= 0)
+
 
 def least_squares_layout(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
     """Lay out a disk so that its angles fit those of a nearly flat metric in the least squares sense.
-
-    With p1 p2 the longest side of a triangle, p3 - p1 = (l13 / l12) e^(i a1) (p2 - p1) is asked of each.
-    Where the triangle inequality is broken, the angles are the real parts of the complex ones: p3 lies on
-    the side p1 p2 and divides it as l13 : l32.
 
     Args:
         disk: a topological disk.
@@ -34,11 +78,28 @@ def least_squares_layout(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
     """
     if not np.isfinite(lengths).all():
         raise MetricError(f"{int((~np.isfinite(lengths)).sum())} of the metric's lengths are not finite")
-    points = pinned_least_squares(_equations(disk, lengths), far_pins(disk, lengths))
+    return fit_shapes(disk, shapes_of_lengths(lengths), lengths)
+
+
+def fit_shapes(disk: TriangleMesh, shapes: TriangleShapes, lengths: FloatArray) -> FloatArray:
+    """Return (n, 2) points of a disk, up to a similarity, whose triangles fit given shapes in the least squares sense.
+
+    With p1 p2 the longest side of a triangle, p3 - p1 = (l13 / l12) e^(i a1) (p2 - p1) is asked of each.
+
+    Args:
+        disk: a topological disk.
+        shapes: of its triangles.
+        lengths: (m, 3) side lengths, by which it is decided what is far apart.
+
+    Raises:
+        MetricError: the system has no finite solution.
+    """
+    pins = far_pins(disk, lengths, shapes.is_broken)
+    points = pinned_least_squares(_equations(disk, shapes), pins)
     if not np.isfinite(points).all():
         raise MetricError(
             f"the layout of {len(disk.faces)} triangles has no finite solution: "
-            f"{int(is_broken(lengths).sum())} of them break the triangle inequality"
+            f"{int(shapes.is_broken.sum())} of them break the triangle inequality"
         )
     return np.stack([points.real, points.imag], axis=1)
 
@@ -62,23 +123,19 @@ def pinned_least_squares(equations: csr_matrix, pins: IntArray) -> ComplexArray:
     return z
 
 
-def _equations(disk: TriangleMesh, lengths: FloatArray) -> csr_matrix:
+def _equations(disk: TriangleMesh, shapes: TriangleShapes) -> csr_matrix:
     """Return the complex (m, n) matrix whose rows vanish on triangles of the right shape."""
     rows = np.arange(len(disk.faces))
-    third = np.argmax(lengths, axis=1)
-    first, second = NEXT[third], PREVIOUS[third]
-    l13, l32 = lengths[rows, second], lengths[rows, first]
-    l12 = np.minimum(lengths[rows, third], l13 + l32)  # a side that is too long is as if just long enough
-    turn = l13 / l12 * np.exp(1j * corner_angles(lengths)[rows, first])
-    columns = disk.faces[rows[:, None], np.stack([first, second, third], axis=1)]
+    third, turn = shapes.third, shapes.turn
+    columns = disk.faces[rows[:, None], np.stack([NEXT[third], PREVIOUS[third], third], axis=1)]
     values = np.stack([turn - 1, -turn, np.ones(len(rows))], axis=1)
     return csr_matrix(
         (values.ravel(), (np.repeat(rows, 3), columns.ravel())), shape=(len(rows), len(disk.vertices))
     )
 
 
-def far_pins(disk: TriangleMesh, lengths: FloatArray) -> IntArray:
-    """Return two vertices far apart, off broken triangles.
+def far_pins(disk: TriangleMesh, lengths: FloatArray, avoided: BoolArray | None = None) -> IntArray:
+    """Return two vertices far apart, off broken triangles, or off (m,) others that are given.
 
     Two pins close together, or held by a triangle that has no shape, leave the system nearly singular.
     """
@@ -87,7 +144,7 @@ def far_pins(disk: TriangleMesh, lengths: FloatArray) -> IntArray:
         shape=(len(disk.vertices),) * 2,
     )
     allowed = np.ones(len(disk.vertices), dtype=bool)
-    allowed[disk.faces[is_broken(lengths)]] = False
+    allowed[disk.faces[is_broken(lengths) if avoided is None else avoided]] = False
     if allowed.sum() < 2:
         allowed[:] = True
     key = tie_key(disk.vertices)

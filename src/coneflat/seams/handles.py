@@ -10,14 +10,19 @@ from ..graph import MultiGraph
 from ..mesh import TriangleMesh
 
 
-def handle_loops(mesh: TriangleMesh) -> list[IntArray]:
+def handle_loops(mesh: TriangleMesh, holes: bool = False) -> list[IntArray]:
     """Return 2 genus closed strips of triangles that no cut along one of them, or at a boundary, makes shorter.
 
     Each is given by the half-edges that it crosses, in order: out of the triangle of one, over it, into the triangle
     of its twin, which is that of the next. A tree of shortest ways between triangles and a tree of edges that these
     do not cross leave 2 genus edges (tree-cotree, D. Eppstein 2003); each closes a loop.
+
+    Args:
+        mesh: connected.
+        holes: have loops around all but one of the boundary's loops, too, so that any closed strip is a sum of
+            these and of those around inner vertices.
     """
-    if not mesh.genus():
+    if not mesh.genus() and not (holes and mesh.boundary_loops[0] > 1):
         return []
     inside = np.flatnonzero(~mesh.is_boundary_edge)
     across = mesh.edge_halfedges[inside]
@@ -30,7 +35,7 @@ def handle_loops(mesh: TriangleMesh) -> list[IntArray]:
     in_tree = np.zeros(len(inside), dtype=bool)
     in_tree[dual.edges_between(reached, before[reached])] = True
 
-    node_of = _contract_loops(mesh)
+    node_of = _contract_loops(mesh, holes)
     left = np.flatnonzero(~in_tree)
     ends = node_of[mesh.edges[inside[left]]]
     primal = MultiGraph(len(node_of), ends[:, 0], ends[:, 1], np.ones(len(left)))
@@ -39,9 +44,11 @@ def handle_loops(mesh: TriangleMesh) -> list[IntArray]:
     return [_loop(dual, across, before, edge) for edge in left[closes]]
 
 
-def _contract_loops(mesh: TriangleMesh) -> IntArray:
-    """Return (n,) a node for each vertex, the same for all of a boundary loop: its first."""
+def _contract_loops(mesh: TriangleMesh, together: bool) -> IntArray:
+    """Return (n,) a node for each vertex, the same for all of a boundary loop, or of the boundary: its first."""
     count, loop = mesh.boundary_loops
+    if together:
+        loop = np.minimum(loop, 0)
     node_of = np.arange(len(mesh.vertices))
     on_loop = np.flatnonzero(loop >= 0)
     representative = np.full(count, len(mesh.vertices))

@@ -1,0 +1,159 @@
+"""Angle based flattening, linear and to the end, with cones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from .._arrays import FloatArray, IntArray
+from ..cones import ConeSolution
+from ..conformal.abf import nearest_angles
+from ..conformal.angle_conditions import AngleConditions, FoundAngles, angle_conditions, wanted_angles
+from ..conformal.linear_abf import linear_angles
+from ..errors import ConvergenceError, OptionError
+from ..figures import SolveFigures
+from ..geometry import corner_angles
+from ..layout.least_squares import fit_shapes, shapes_of_angles
+from ..mesh import TriangleMesh
+from ..text import plural
+from .base import LaidOut
+from .measured import laid_out_at
+
+#: What is asked of the angles around cones: to sum to what is prescribed, with lengths that match across seams; or
+#: nothing, the mesh being cut first: the seams are a free boundary then.
+CONES = ("prescribed", "free")
+
+Solve: TypeAlias = Callable[[AngleConditions, FloatArray], FoundAngles]
+
+
+@dataclass(frozen=True, eq=False)
+class AngleMetric:
+    """Corner angles of a mesh, to be found before or after it is cut.
+
+    Attributes:
+        mesh: connected.
+        lengths: (m, 3) its side lengths.
+        solution: cones.
+        solve: finds the angles.
+        best_effort: take angles that did not converge.
+        found: the angles; None if the mesh is to be cut first.
+    """
+
+    mesh: TriangleMesh
+    lengths: FloatArray
+    solution: ConeSolution
+    solve: Solve
+    best_effort: bool
+    found: FoundAngles | None
+
+    def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
+        """Return the least squares reconstruction, at the mesh's area."""
+        found, notes = self.found, []
+        if found is None:
+            found = _find(disk, self.lengths, np.zeros(len(disk.vertices)), self.solve, self.best_effort)
+            if len(self.solution.cones):
+                notes.append(
+                    "The mesh was cut first: the angles of cones, and lengths along seams, were left free."
+                )
+        shapes = shapes_of_angles(found.angles.reshape(-1, 3))
+        if shapes.is_broken.any():
+            notes.append(
+                f"{plural(int(shapes.is_broken.sum()), 'triangle')} got an angle below 0: method 'abf++' allows none."
+            )
+        if not found.converged:
+            failure = _failure(found)
+            notes.append(f"{failure[0].upper()}{failure[1:]}.")
+        figures = SolveFigures(
+            newton_steps=found.steps, residual=found.residual, broken=int(shapes.is_broken.sum())
+        )
+        points = fit_shapes(disk, shapes, self.lengths)
+        return laid_out_at(points, self.mesh, disk, seams, self.solution, figures, tuple(notes))
+
+
+def linear_abf(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    solution: ConeSolution,
+    best_effort: bool,
+    cones: str = "prescribed",
+) -> AngleMetric:
+    """Return a metric by linear angle based flattening (Zayer, Levy, Seidel 2007), see `linear_angles`.
+
+    Args:
+        mesh: connected.
+        lengths: (m, 3) side lengths, model units.
+        solution: cones and their curvatures.
+        best_effort: has no effect, as there is nothing to converge.
+        cones: one of `CONES`. Cones as constraints are what the paper leaves to future work; its Table 2 is matched
+            with "free": QC means of 1.0076 on fandisk and 1.0260 on rocker-arm for its 1.007 and 1.027, where the
+            constraints make 1.0116 and 1.0279.
+
+    Raises:
+        CurvatureError: a cone is too wide for its triangles.
+        OptionError: there is no such choice for cones.
+    """
+    return _metric(mesh, lengths, solution, linear_angles, best_effort, cones)
+
+
+def abf_plus_plus(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    solution: ConeSolution,
+    best_effort: bool,
+    cones: str = "prescribed",
+) -> AngleMetric:
+    """Return a metric by ABF++ (Sheffer, Levy, Mogilnitsky, Bogomyakov 2005), see `nearest_angles`.
+
+    Args:
+        mesh: connected.
+        lengths: (m, 3) side lengths, model units.
+        solution: cones and their curvatures.
+        best_effort: return a metric that did not converge.
+        cones: one of `CONES`.
+
+    Raises:
+        ConvergenceError: the solve ends short of its tolerance, unless `best_effort`.
+        CurvatureError: a cone is too wide for its triangles.
+        OptionError: there is no such choice for cones.
+    """
+    return _metric(mesh, lengths, solution, nearest_angles, best_effort, cones)
+
+
+def _metric(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    solution: ConeSolution,
+    solve: Solve,
+    best_effort: bool,
+    cones: str,
+) -> AngleMetric:
+    if cones not in CONES:
+        raise OptionError(f"unknown choice for cones {cones!r}: choose from {', '.join(CONES)}")
+    found = None
+    if cones == "prescribed":
+        found = _find(mesh, lengths, solution.target, solve, best_effort)
+    return AngleMetric(mesh, lengths, solution, solve, best_effort, found)
+
+
+def _find(
+    mesh: TriangleMesh, lengths: FloatArray, curvature: FloatArray, solve: Solve, best_effort: bool
+) -> FoundAngles:
+    """Return the angles for the given (n,) curvature inside."""
+    wanted = wanted_angles(mesh, corner_angles(lengths), curvature)
+    found = solve(angle_conditions(mesh, curvature), wanted)
+    if not found.converged and not (best_effort and np.isfinite(found.angles).all()):
+        raise ConvergenceError(
+            f"{_failure(found)}; --best-effort takes them as they are, --method exact is surer, other cones, "
+            "--repair or remeshing may help"
+        )
+    return found
+
+
+def _failure(found: FoundAngles) -> str:
+    return (
+        f"angle based flattening did not converge: after {plural(found.steps, 'step')} the conditions on angles are "
+        f"off by {found.residual:.2g}"
+    )
