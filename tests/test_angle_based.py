@@ -272,3 +272,14 @@ def test_real_models(shared, name):
     assert result.distortion.curvature_error_max < 1e-8
     assert result.distortion.seam_mismatch_max < 1e-7
     assert result.solve.newton_steps <= 30
+
+
+def test_free_cones_are_an_option():
+    mesh = shapes.sphere(3)
+    free = flatten(*mesh, method="abf++", at_cones="free")
+    held = flatten(*mesh, method="abf++")
+    assert free.distortion.seam_mismatch > 1e-3 > 1e-9 > held.distortion.seam_mismatch
+    with pytest.raises(errors.OptionError, match="'lscm' cannot leave cones free"):
+        flatten(*mesh, method="lscm", at_cones="free")
+    with pytest.raises(errors.OptionError, match="no such choice at cones"):
+        flatten(*mesh, method="abf++", at_cones="scale")

@@ -114,7 +114,7 @@ def test_measured_rotations_of_a_cut_square():
         (
             {"quantum": QUARTER, "correct_handles": True, "method": "linear"},
             errors.OptionError,
-            "exact metric",
+            "method 'exact' only",
         ),
     ],
 )

@@ -16,10 +16,12 @@ from .errors import OptionError
 CONES = ("auto", "pursuit", "greedy", "none")
 #: From cones to a layout: this package's own, the paper's, and those that it compares with.
 METHODS = ("exact", "linear", "circle-patterns", "ricci", "linear-abf", "abf++", "lscm", "spectral", "bff")
+# Those that may leave the angles of cones free.
+ANGLE_BASED = ("linear-abf", "abf++")
 # Those that solve what need not converge.
 ITERATIVE = ("exact", "circle-patterns", "ricci", "abf++")
 LENGTH_RULES = ("integral", "mean")
-AT_CONES = ("auto", "scale", "curvature")
+AT_CONES = ("auto", "scale", "curvature", "free")
 SOLVERS = ("auto", "pardiso", "scikit-sparse", "cholespy", "scipy", "amg")
 CHARTS = ("one", "atlas")
 BOUNDARIES = ("free", "lengths", "disk", "straight")
@@ -107,9 +109,9 @@ class Options:
         _choice("at_cones", self.at_cones, AT_CONES)
         _choice("method", self.method, METHODS)
         if self.method != "exact":
-            if self.boundary_kind != "free" or self.at_cones != "auto":
+            if self.boundary_kind != "free" or self.at_cones not in ("auto", "free"):
                 raise OptionError(
-                    f"method {self.method!r} has a free boundary and no choice at cones: use method 'exact'"
+                    f"method {self.method!r} has a free boundary and no such choice at cones: use method 'exact'"
                 )
             if self.best_effort and self.method not in ITERATIVE:
                 raise OptionError(f"method {self.method!r} does not iterate: there is no best effort")
@@ -117,6 +119,8 @@ class Options:
                 raise OptionError(
                     f"method {self.method!r} has no common subdivision to refine to: use method 'exact'"
                 )
+        if self.at_cones == "free" and self.method not in ANGLE_BASED:
+            raise OptionError(f"method {self.method!r} cannot leave cones free: {', '.join(ANGLE_BASED)} can")
         if self.at_cones == "scale" and any(k is not None for k in self.given_cones.values()):
             raise OptionError("with the scale fixed at cones their curvatures come out: give positions only")
         if self.at_cones == "scale" and self.boundary_kind not in ("free", "lengths"):

@@ -14,7 +14,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 QUANTUM_OPTIONS = ("quantise", "correct_handles")
 SEARCH_OPTIONS = ("cones", "epsilon", "max_cones", *PURSUIT_OPTIONS, *QUANTUM_OPTIONS)
-EXACT_OPTIONS = ("at_cones", "boundary", "corner", "refine")
+EXACT_OPTIONS = ("boundary", "corner", "refine")
 # Formats of models to be textured, where nothing may overlap.
 TEXTURED = (".obj", ".glb")
 METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "method", "lengths", *EXACT_OPTIONS)
@@ -61,10 +61,11 @@ _AFTER_SEARCH = (
     ),
     click.option(
         "--at-cones",
-        type=click.Choice(["auto", "scale", "curvature"]),
+        type=click.Choice(["auto", "scale", "curvature", "free"]),
         default="auto",
         show_default=True,
-        help="Exact metric: prescribe scale 1 at cones, or the curvatures that the search found.",
+        help="Exact metric: prescribe scale 1 at cones, or the curvatures that the search found.  free: of linear-abf and "
+        "abf++, which then prescribe no cones.",
     ),
     click.option(
         "--boundary",

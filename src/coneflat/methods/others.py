@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TypeAlias
 
 from .._arrays import FloatArray
@@ -15,8 +16,9 @@ from .base import FlatMetric
 Method: TypeAlias = Callable[[TriangleMesh, FloatArray, ConeSolution, bool], FlatMetric]
 
 
-def other_method(name: str) -> Method:
-    """Return the method of a name."""
+def other_method(name: str, at_cones: str = "auto") -> Method:
+    """Return the method of a name; `at_cones` is "free" for those that are to leave the angles of cones free."""
+    cones = "free" if at_cones == "free" else "prescribed"
     if name == "circle-patterns":
         from .circle_patterns import circle_patterns
 
@@ -28,11 +30,11 @@ def other_method(name: str) -> Method:
     if name == "linear-abf":
         from .angle_based import linear_abf
 
-        return linear_abf
+        return partial(linear_abf, cones=cones)
     if name == "abf++":
         from .angle_based import abf_plus_plus
 
-        return abf_plus_plus
+        return partial(abf_plus_plus, cones=cones)
     if name == "lscm":
         from .lscm import lscm
 
