@@ -114,7 +114,7 @@ def flatten(
         correct_handles: of quanta and the exact metric: change the metric, as little as can be, so that
             rotations along handles are multiples, too; it is then not quite conformal.
         epsilon: the greedy search stops when log scale factors differ by at most this.
-        method: "exact" has no curvature error and no flipped triangle, "linear" is the paper's. For comparison there are
+        method: "exact" has no curvature error and no flipped triangle, "linear" is the paper's. For comparison:
             "circle-patterns" (Kharevych et al. 2006), "ricci" (Jin et al. 2007), "linear-abf" (Zayer et al. 2007),
             "abf++" (Sheffer et al. 2005), "bff" (Sawhney and Crane 2017), and, without cones on what was cut open,
             "lscm" (Levy et al. 2002) and "spectral" (Mullen et al. 2008).

@@ -64,8 +64,8 @@ _AFTER_SEARCH = (
         type=click.Choice(["auto", "scale", "curvature", "free"]),
         default="auto",
         show_default=True,
-        help="Exact metric: prescribe scale 1 at cones, or the curvatures that the search found.  free: of linear-abf and "
-        "abf++, which then prescribe no cones.",
+        help="Exact metric: prescribe scale 1 at cones, or the curvatures that the search found.  free: of linear-abf "
+        "and abf++, which then prescribe no cones.",
     ),
     click.option(
         "--boundary",
