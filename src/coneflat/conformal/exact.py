@@ -8,10 +8,9 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import CurvatureError
-from ..geometry.delaunay import make_delaunay
 from ..geometry.intrinsic import IntrinsicTriangulation, intrinsic_triangulation
 from ..geometry.triangles import double_areas
-from ..mesh import NEXT, PREVIOUS, TriangleMesh
+from ..mesh import TriangleMesh
 from .doubling import double
 from .newton import ConformalProblem, Inverse, State, minimize
 
@@ -67,6 +66,7 @@ def exact_metric(
     tolerance: float = 1e-10,
     delaunay: bool = True,
     max_steps: int = 200,
+    kind: type[ConformalProblem] = ConformalProblem,
 ) -> ExactMetric:
     """Return the metric l_ij exp((phi_i + phi_j) / 2) whose curvature is the target.
 
@@ -87,6 +87,8 @@ def exact_metric(
             class is that of the input's own triangles; the same on Delaunay meshes.
         max_steps: Newton steps after which the best metric so far is returned; counted anew if the surface
             has to be doubled.
+        kind: what scales the lengths: factors at the vertices, or the radii of circles there
+            (`coneflat.conformal.packing.PackingProblem`).
 
     Raises:
         CurvatureError: a target is 2 pi or more inside, pi or more on the boundary, or the targets of a
@@ -102,14 +104,14 @@ def exact_metric(
     """
     n = len(mesh.vertices)
     fixed = np.zeros(n, dtype=bool) if fixed is None else np.asarray(fixed, dtype=bool)
-    target, pinned = _checked_target(mesh, np.asarray(target, dtype=np.float64), fixed)
+    target, pinned = checked_target(mesh, np.asarray(target, dtype=np.float64), fixed)
     log_scale = np.zeros(n) if start is None else np.array(start, dtype=np.float64)
     log_scale[fixed] = np.broadcast_to(np.asarray(fixed_log_scale, dtype=np.float64), (n,))[fixed]
 
     triangulation = intrinsic_triangulation(mesh, lengths)
     flat_turn = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
-    problem = ConformalProblem(triangulation, flat_turn, target, fixed, pinned, preconditioner)
-    euclidean = _prepare(problem, delaunay)
+    problem = kind(triangulation, flat_turn, target, fixed, pinned, preconditioner)
+    euclidean = problem.prepare(delaunay)
     state = minimize(problem, log_scale, tolerance, max_steps)
     original = np.arange(n)
     doubled = not _is_solved(state, tolerance) and bool(mesh.is_boundary_vertex.any())
@@ -117,28 +119,20 @@ def exact_metric(
     if doubled:
         triangulation, original = double(intrinsic_triangulation(mesh, lengths))
         copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
-        problem = ConformalProblem(
+        problem = kind(
             triangulation,
             np.full(len(original), 2 * np.pi),
             (copies * target)[original],
             fixed[original],
             np.concatenate([pinned, np.zeros(len(original) - n, dtype=bool)]),
         )
-        euclidean = _prepare(problem, delaunay)
+        euclidean = problem.prepare(delaunay)
         state = minimize(problem, log_scale[original], tolerance, max_steps)
         state.curvature[:n] /= copies
         steps += problem.steps
     if pinned.any():
         state.log_scale = _keep_area(mesh, lengths, problem, state.log_scale, original)
     return _finish(problem, state, n, euclidean, steps, tolerance, doubled)
-
-
-def _prepare(problem: ConformalProblem, delaunay: bool) -> int:
-    """Flip the input to Delaunay in its own metric; return the number of flips."""
-    if not delaunay:
-        return 0
-    problem.records.append(make_delaunay(problem.triangulation))
-    return len(problem.records[0])
 
 
 def _is_solved(state: State, tolerance: float) -> bool:
@@ -164,8 +158,7 @@ def _keep_area(
     np.maximum.at(centre, component, log_scale)
     log_scale = log_scale - np.where(free, centre, 0.0)[component]
     faces = problem.triangulation.faces
-    scale = np.exp(log_scale / 2)[faces]
-    metric = problem.triangulation.length.reshape(-1, 3) * scale[:, NEXT] * scale[:, PREVIOUS]
+    metric = problem.flat_lengths(log_scale).reshape(-1, 3)
     before = np.bincount(labels[mesh.faces[:, 0]], weights=double_areas(lengths), minlength=count)
     after = np.bincount(component[faces[:, 0]], weights=double_areas(metric), minlength=count)
     copies = len(metric) / len(lengths)  # 2 if the surface was doubled
@@ -185,10 +178,7 @@ def _finish(
 ) -> ExactMetric:
     """Put the metric on the triangulation and collect the report."""
     triangulation = problem.triangulation
-    tail = triangulation.tail
-    head = tail.reshape(-1, 3)[:, [1, 2, 0]].ravel()
-    # The same bits on both sides: multiplication commutes, and the background lengths agree.
-    triangulation.length *= np.exp((state.log_scale[tail] + state.log_scale[head]) / 2)
+    triangulation.length = problem.flat_lengths(state.log_scale)
     residual = np.abs(state.residual[:n])
     records = problem.records
     return ExactMetric(
@@ -205,7 +195,7 @@ def _finish(
     )
 
 
-def _checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> tuple[FloatArray, BoolArray]:
+def checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> tuple[FloatArray, BoolArray]:
     """Return a target that satisfies Gauss-Bonnet to rounding, and a pinned vertex a component, if needed."""
     on_boundary = mesh.is_boundary_vertex
     for where, limit, name, place in (

@@ -13,6 +13,7 @@ from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import MetricError
 from ..geometry.delaunay import make_delaunay
 from ..geometry.intrinsic import IntrinsicTriangulation
+from ..mesh import NEXT
 from ..solver import Factor, factorize
 from .hessian import HessianPattern
 
@@ -106,6 +107,12 @@ class State:
         return float(np.abs(self.residual).max(initial=0.0))
 
 
+def centred(log_scale: FloatArray) -> FloatArray:
+    """Return a log scale with its middle at 0: neither huge nor tiny factors overflow, and angles see ratios only."""
+    middle: FloatArray = log_scale - (log_scale.max() + log_scale.min()) / 2
+    return middle
+
+
 @dataclass(eq=False)
 class ConformalProblem:
     """Find phi, so that the curvature of l_ij exp((phi_i + phi_j) / 2) is the target.
@@ -143,23 +150,45 @@ class ConformalProblem:
         """Whether there is a boundary, where edges cannot be flipped and triangles may stay broken."""
         return bool((self.triangulation.twin < 0).any())
 
+    def prepare(self, delaunay: bool) -> int:
+        """Flip the input to Delaunay in its own metric, if so wanted; return the number of flips."""
+        if not delaunay:
+            return 0
+        self.records.append(make_delaunay(self.triangulation))
+        return len(self.records[0])
+
+    def flat_lengths(self, log_scale: FloatArray) -> FloatArray:
+        """Return (3m,) the scaled lengths, the same bits on both sides of an edge."""
+        tail = self.triangulation.tail
+        head = tail.reshape(-1, 3)[:, NEXT].ravel()
+        # Multiplication commutes, and the background lengths agree.
+        return self.triangulation.length * np.exp((log_scale[tail] + log_scale[head]) / 2)
+
+    def sum_angles(self, log_scale: FloatArray, sums: FloatArray, cots: FloatArray) -> int:
+        """Fill the (n,) angle sums and (3m,) weights of the scaled metric; return the number of broken triangles."""
+        from .angle_kernel import sum_angles
+
+        scale = np.exp(centred(log_scale) / 2)
+        return sum_angles(self.triangulation.tail, self.triangulation.length, scale, sums, cots)
+
+    def flip(self, log_scale: FloatArray) -> IntArray:
+        """Flip to Delaunay in the scaled metric; return the half-edges flipped."""
+        return make_delaunay(self.triangulation, log_scale)
+
     def evaluate(self, log_scale: FloatArray) -> State:
         """Flip to Delaunay in the scaled metric and return the curvature there."""
-        from .angle_kernel import has_negative_weight, sum_angles
+        from .angle_kernel import has_negative_weight
 
-        # Centred, so that neither huge nor tiny factors overflow: angles see ratios only.
-        scale = np.exp((log_scale - (log_scale.max() + log_scale.min()) / 2) / 2)
         sums = np.empty(len(log_scale))
         cots = np.empty(len(self.triangulation.tail))
-        arrays = self.triangulation.tail, self.triangulation.length, scale, sums, cots
-        broken = sum_angles(*arrays)
+        broken = self.sum_angles(log_scale, sums, cots)
         # The cotangents are needed anyway and tell at a glance where there is nothing to flip.
         if broken or has_negative_weight(self.triangulation.twin, cots):
-            flipped = make_delaunay(self.triangulation, log_scale)
+            flipped = self.flip(log_scale)
             if len(flipped):
                 self.records.append(flipped)
                 self._pattern = None
-                broken = sum_angles(*arrays)
+                broken = self.sum_angles(log_scale, sums, cots)
         curvature = self.flat_turn - sums
         residual = np.where(self.fixed, 0.0, self.target - curvature)
         if not self.fixed.any() and np.count_nonzero(self.pinned) == 1:

@@ -13,7 +13,11 @@ from .intrinsic import IntrinsicTriangulation, intrinsic_triangulation
 FLIPS_PER_EDGE = 50
 
 
-def make_delaunay(triangulation: IntrinsicTriangulation, log_scale: FloatArray | None = None) -> IntArray:
+def make_delaunay(
+    triangulation: IntrinsicTriangulation,
+    log_scale: FloatArray | None = None,
+    radii: FloatArray | None = None,
+) -> IntArray:
     """Flip a triangulation, in place, until it is Delaunay; return the half-edges flipped, in order.
 
     Args:
@@ -21,22 +25,26 @@ def make_delaunay(triangulation: IntrinsicTriangulation, log_scale: FloatArray |
         log_scale: None for the triangulation's own metric and Euclidean flips. With (n,) log scale factors
             phi, the metric l_ij exp((phi_i + phi_j) / 2) is made Delaunay by Ptolemy flips of the lengths l,
             which keep the discrete conformal class (Springborn 2019; Gillespie, Springborn, Crane 2021).
+        radii: (n,) of circles at the vertices, where the triangulation has their inversive distances for lengths:
+            it is made weighted Delaunay, by flips that keep these (Bobenko, Lutz 2023).
 
     Notes:
         Where nothing fails the condition the cost is one pass over the edges. The condition is meaningful
         also where scaled lengths break the triangle inequality.
     """
-    from .flip_kernel import find_violations, flip_until_delaunay
+    from .flip_kernel import EUCLIDEAN, PACKED, SCALED, find_violations, flip_until_delaunay
 
-    euclidean = log_scale is None
-    if log_scale is None:
-        scale = np.ones(triangulation.vertex_count)
+    if radii is not None:
+        kind, scale = PACKED, radii
+    elif log_scale is None:
+        kind, scale = EUCLIDEAN, np.ones(triangulation.vertex_count)
     else:
+        kind = SCALED
         # Only ratios within a triangle matter, so the middle may go to 1, which keeps off overflow.
         scale = np.exp((log_scale - (log_scale.max() + log_scale.min()) / 2) / 2)
     arrays = triangulation.twin, triangulation.tail, triangulation.length
     stack = np.empty(len(triangulation.twin), dtype=np.int64)
-    top = find_violations(*arrays, scale, stack)
+    top = find_violations(*arrays, scale, kind, stack)
     if top == 0:
         return np.empty(0, dtype=np.int64)
     queued = np.zeros(len(stack), dtype=np.bool_)
@@ -45,7 +53,7 @@ def make_delaunay(triangulation: IntrinsicTriangulation, log_scale: FloatArray |
     records: list[IntArray] = []
     while top > 0 and left > 0:
         record = np.empty(min(left, 4 * top + 1000), dtype=np.int64)
-        top, count = flip_until_delaunay(*arrays, scale, euclidean, stack, top, queued, record)
+        top, count = flip_until_delaunay(*arrays, scale, kind, stack, top, queued, record)
         records.append(record[:count])
         left -= count
     return np.concatenate(records)

@@ -14,7 +14,10 @@ import math
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from .compiled import compiled
+from .packing_kernel import other_inversive_distance, tilts
 
+# What lengths are: those of the metric to be made Delaunay, those before scaling, inversive distances of circles.
+EUCLIDEAN, SCALED, PACKED = 0, 1, 2
 # Rounding of a slack relative to the perimeter: a few ulps of lengths that are products of three factors,
 # with a wide margin, since an edge flipped for the sake of rounding could be flipped back and forth forever.
 NOISE = 1e-14
@@ -48,11 +51,17 @@ def incircle_terms(
 
 
 @compiled
-def is_flippable(twin: IntArray, tail: IntArray, length: FloatArray, scale: FloatArray, h: int) -> bool:
+def is_flippable(
+    twin: IntArray, tail: IntArray, length: FloatArray, scale: FloatArray, kind: int, h: int
+) -> bool:
     """Return whether an edge lies between two triangles and fails the Delaunay condition."""
     t = twin[h]
     if t < 0 or t // 3 == h // 3:
         return False
+    if kind == PACKED:
+        tilt, size = tilts(tail, length, scale, h)
+        tilt2, size2 = tilts(tail, length, scale, t)
+        return tilt + tilt2 < -NOISE * (size + size2)
     x, y, dx, dy = incircle_terms(tail, length, scale, h)
     x2, y2, dx2, dy2 = incircle_terms(tail, length, scale, t)
     noise = dx * abs(x2) + dx2 * abs(x) + dx * dx2 + dy * abs(y2) + dy2 * abs(y) + dy * dy2
@@ -112,12 +121,12 @@ def relink(
 
 @compiled
 def find_violations(
-    twin: IntArray, tail: IntArray, length: FloatArray, scale: FloatArray, found: IntArray
+    twin: IntArray, tail: IntArray, length: FloatArray, scale: FloatArray, kind: int, found: IntArray
 ) -> int:
     """Write the half-edges of all edges that fail the Delaunay condition to `found`; return their number."""
     count = 0
     for h in range(len(twin)):
-        if twin[h] > h and is_flippable(twin, tail, length, scale, h):
+        if twin[h] > h and is_flippable(twin, tail, length, scale, kind, h):
             found[count] = h
             count += 1
     return count
@@ -129,7 +138,7 @@ def flip_until_delaunay(
     tail: IntArray,
     length: FloatArray,
     scale: FloatArray,
-    euclidean: bool,
+    kind: int,
     stack: IntArray,
     top: int,
     queued: BoolArray,
@@ -144,15 +153,17 @@ def flip_until_delaunay(
         top -= 1
         h = stack[top]
         queued[h] = False
-        if not is_flippable(twin, tail, length, scale, h):
+        if not is_flippable(twin, tail, length, scale, kind, h):
             continue
         t = twin[h]
         h1 = h - h % 3 + (h + 1) % 3
         h2 = h - h % 3 + (h + 2) % 3
         t1 = t - t % 3 + (t + 1) % 3
         t2 = t - t % 3 + (t + 2) % 3
-        if euclidean:
+        if kind == EUCLIDEAN:
             diagonal = euclidean_diagonal(length[h], length[h2], length[h1], length[t1], length[t2])
+        elif kind == PACKED:
+            diagonal = other_inversive_distance(length[h], length[h2], length[h1], length[t1], length[t2])
         else:  # Ptolemy's relation, which keeps the conformal class
             diagonal = (length[h1] * length[t1] + length[h2] * length[t2]) / length[h]
         record[count] = h

@@ -1,0 +1,83 @@
+"""Discrete Ricci flow: circle packings with given inversive distances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .._arrays import FloatArray, IntArray
+from ..geometry.delaunay import make_delaunay
+from ..geometry.triangles import slacks
+from ..mesh import NEXT
+from .newton import ConformalProblem, centred
+
+
+@dataclass(eq=False)
+class PackingProblem(ConformalProblem):
+    """Find u, so that circles of radii g_i exp(u_i) with the inversive distances of the input have the curvature.
+
+    K(u) - target is the gradient of the Ricci energy (Jin, Kim, Gu 2007), convex for disjoint circles (Guo 2011;
+    Luo 2011), whose Hessian is the Laplacian with the weights h / l of the radical centres. Flipped to weighted
+    Delaunay by flips that keep the inversive distances, it has a minimum for all curvatures that sum to what
+    they must (Bobenko, Lutz 2023).
+
+    Attributes:
+        radii: (n,) g, model units; set by `prepare`, from when on the triangulation has inversive distances for
+            lengths.
+    """
+
+    radii: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    def prepare(self, delaunay: bool) -> int:
+        """Flip the input to Delaunay, if so wanted, and put circles on it; return the number of flips."""
+        flips = super().prepare(delaunay)
+        self.radii = packed_radii(self.triangulation.length.reshape(-1, 3), self.triangulation.faces)
+        one, two = self._ends(self.radii)
+        length = self.triangulation.length
+        # (l^2 - g_i^2 - g_j^2) / (2 g_i g_j) from the gap between the circles, which keeps its digits, is 1 and more.
+        gap, both = np.maximum(length - (one + two), 0), length + (one + two)
+        self.triangulation.length = 1 + gap * both / (2 * (one * two))
+        return flips
+
+    def flat_lengths(self, log_scale: FloatArray) -> FloatArray:
+        """Return (3m,) the lengths for the radii, the same bits on both sides of an edge."""
+        one, two = self._ends(self.radii * np.exp(log_scale))
+        product = one * two
+        lengths: FloatArray = np.sqrt((one**2 + two**2) + 2 * self.triangulation.length * product)
+        return lengths
+
+    def sum_angles(self, log_scale: FloatArray, sums: FloatArray, cots: FloatArray) -> int:
+        """Fill the (n,) angle sums and (3m,) weights for the radii; return the number of broken triangles."""
+        from .packing_kernel import sum_packing_angles
+
+        radii = self.radii * np.exp(centred(log_scale))
+        return sum_packing_angles(self.triangulation.tail, self.triangulation.length, radii, sums, cots)
+
+    def flip(self, log_scale: FloatArray) -> IntArray:
+        """Flip to weighted Delaunay for the radii; return the half-edges flipped."""
+        return make_delaunay(self.triangulation, radii=self.radii * np.exp(centred(log_scale)))
+
+    def _ends(self, radii: FloatArray) -> tuple[FloatArray, FloatArray]:
+        tail = self.triangulation.tail
+        return radii[tail], radii[tail.reshape(-1, 3)[:, NEXT].ravel()]
+
+
+@dataclass(eq=False)
+class FixedPackingProblem(PackingProblem):
+    """The same on the triangles as they are; a minimum may lie where some break the triangle inequality."""
+
+    def flip(self, log_scale: FloatArray) -> IntArray:
+        """Flip nothing."""
+        return np.empty(0, dtype=np.int64)
+
+
+def packed_radii(lengths: FloatArray, faces: IntArray) -> FloatArray:
+    """Return (n,) the radii of circles at the vertices of which no two of a triangle overlap.
+
+    Each is the least, over the triangles around, of the radius in the packing of the triangle's three tangent circles,
+    (l_ij + l_ki - l_jk) / 2: inversive distances are 1 and more.
+    """
+    radii = np.full(int(faces.max()) + 1, np.inf)
+    np.minimum.at(radii, faces.ravel(), slacks(lengths).ravel() / 2)
+    return radii
