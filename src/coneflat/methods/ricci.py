@@ -12,7 +12,7 @@ from ..geometry import is_broken
 from ..mesh import TriangleMesh
 from ..text import plural
 from .exact import ExactFlatMetric
-from .solved import at_own_area
+from .solved import at_own_area, noted
 
 
 def ricci_flow(
@@ -58,4 +58,4 @@ def ricci_flow(
             f"the Ricci flow did not converge: after {plural(solved.steps, 'step')} the curvature is off by "
             f"{solved.residual:.2g} rad, and {plural(broken, 'triangle')} broke the triangle inequality"
         )
-    return at_own_area(mesh, lengths, solution, solved, failure, best_effort)
+    return at_own_area(mesh, lengths, solution, solved, noted(failure, best_effort))

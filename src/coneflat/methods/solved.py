@@ -5,12 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import FloatArray
-from ..conformal.exact import ExactMetric
 from ..cones import ConeSolution
+from ..conformal.exact import ExactMetric
 from ..errors import ConvergenceError
 from ..geometry import double_areas
 from ..mesh import TriangleMesh
 from .exact import ExactFlatMetric
+
+
+def noted(failure: str | None, best_effort: bool) -> tuple[str, ...]:
+    """Return how a solve fell short, a clause or None, as notes if the best effort will do.
+
+    Raises:
+        ConvergenceError: it will not.
+    """
+    if failure is None:
+        return ()
+    if not best_effort:
+        raise ConvergenceError(
+            f"{failure}; --best-effort takes it as it is, --method exact is surer, other cones or remeshing may help"
+        )
+    return (f"{failure[0].upper()}{failure[1:]}.",)
 
 
 def at_own_area(
@@ -18,29 +33,17 @@ def at_own_area(
     lengths: FloatArray,
     solution: ConeSolution,
     solved: ExactMetric,
-    failure: str | None,
-    best_effort: bool,
+    notes: tuple[str, ...] = (),
 ) -> ExactFlatMetric:
-    """Return a metric, to be scaled to the area of the mesh, where the boundary is free.
+    """Return a metric, to be scaled to the area of the mesh, with what came out at the free boundary for its target.
 
     Args:
         mesh: connected.
         lengths: (m, 3) its side lengths.
         solution: its cones and their curvatures.
         solved: the metric.
-        failure: how it fell short, a clause; None if it did not.
-        best_effort: note that instead of refusing the metric.
-
-    Raises:
-        ConvergenceError: it fell short.
+        notes: how it fell short.
     """
-    notes: tuple[str, ...] = ()
-    if failure is not None:
-        if not best_effort:
-            raise ConvergenceError(
-                f"{failure}; --best-effort takes it as it is, --method exact is surer, other cones or remeshing may help"
-            )
-        notes = (f"{failure[0].upper()}{failure[1:]}.",)
     flat = solved.triangulation.length.reshape(-1, 3)
     copies = len(flat) / len(mesh.faces)  # 2 where the surface was doubled
     shrink = float(np.sqrt(copies * double_areas(lengths).sum() / double_areas(flat).sum()))

@@ -1,0 +1,160 @@
+"""Circle patterns with given intersection angles: the radii."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csc_matrix
+
+from .._arrays import FloatArray, IntArray
+from ..geometry import corner_angles
+from ..geometry.intrinsic import IntrinsicTriangulation
+from ..mesh import label_components
+from ..solver import Factor, factorize
+from .coherent_angles import CoherentAngles
+from .descent import descend
+
+# Largest error of the angles around the centre of a circle, radians, and steps of Newton's method at most.
+TOLERANCE, MAX_STEPS = 1e-11, 200
+# Largest change of a log radius in one step.
+LARGEST_STEP = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class CirclePattern:
+    """Circles around flat triangles.
+
+    Attributes:
+        log_radius: (m,) log of the radius of each triangle's circle.
+        lengths: (3m,) of the half-edges, both sides of an edge with the same bits.
+        residual: largest error of the angles around the centre of a circle, radians.
+        steps: Newton steps.
+    """
+
+    log_radius: FloatArray
+    lengths: FloatArray
+    residual: float
+    steps: int
+
+
+def circle_pattern(triangulation: IntrinsicTriangulation, coherent: CoherentAngles) -> CirclePattern:
+    """Return the circles that meet at the angles theta = pi - a - a', for a and a' opposite an edge.
+
+    Args:
+        triangulation: connected; its lengths tell where to start.
+        coherent: angles, from which alone the result follows, up to scale.
+
+    Notes:
+        L. Kharevych, B. Springborn, P. Schroeder, "Discrete conformal mappings via circle patterns", 2006,
+        Section 2. Circles that are one have one radius, and their triangles are one face.
+    """
+    length = triangulation.length.reshape(-1, 3)
+    opposite = corner_angles(length)
+    sines = np.sin(opposite)
+    widest = np.argmax(sines, axis=1)[:, None]
+    start = np.log(np.take_along_axis(length, widest, 1) / np.take_along_axis(sines, widest, 1) / 2)[:, 0]
+
+    problem = RadiiProblem(triangulation.twin, coherent)
+    count = np.bincount(problem.circle)
+    found = descend(
+        problem, np.bincount(problem.circle, start - start.mean()) / count, TOLERANCE, MAX_STEPS
+    )
+    log_radius = found.place[problem.circle]
+    log_radius -= (log_radius.max() + log_radius.min()) / 2
+    half = _inside_too(problem.half_angles(found.place), coherent, triangulation.twin)
+    lengths = 2 * np.exp(np.repeat(log_radius, 3)) * np.sin(half)
+    upper = np.flatnonzero(triangulation.twin > np.arange(len(half)))
+    lengths[triangulation.twin[upper]] = lengths[upper]
+    return CirclePattern(log_radius, lengths, found.largest, found.steps)
+
+
+@dataclass(eq=False)
+class RadiiProblem:
+    """Find log radii rho for which the angles around each centre sum to a full turn.
+
+    The half angle at the centre of circle k over an edge towards l, which is the angle opposite it, is
+
+        phi = atan2(sin theta, exp(rho_k - rho_l) - cos theta)
+
+    and sum phi - pi is minus the gradient of a convex energy (the paper's Eq. 5, halved).
+
+    Attributes:
+        twin: (3m,) half-edges.
+        coherent: what gives theta, and the angles opposite the boundary.
+    """
+
+    twin: IntArray
+    coherent: CoherentAngles
+    _factor: Factor | None = field(default=None, init=False)
+
+    @cached_property
+    def circle(self) -> IntArray:
+        """(m,) the circle of each triangle."""
+        slots = np.flatnonzero(self.coherent.is_inside)
+        return label_components(len(self.twin) // 3, slots // 3, self.twin[slots] // 3)[1]
+
+    @cached_property
+    def _sides(self) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
+        """Half-edges between two circles, the circle of each and the one across, and theta / 2."""
+        slots = np.flatnonzero((self.twin >= 0) & ~self.coherent.is_inside)
+        others = self.twin[slots]
+        angles = self.coherent.angles
+        theta = np.pi - angles[slots] - angles[others]
+        return slots, self.circle[slots // 3], self.circle[others // 3], theta / 2
+
+    def half_angles(self, log_radius: FloatArray) -> FloatArray:
+        """Return (3m,) phi; those of the coherent angles at the boundary and inside of a circle."""
+        slots, own, other, half_theta = self._sides
+        half = self.coherent.angles.copy()
+        with np.errstate(over="ignore"):
+            beyond = np.expm1(log_radius[own] - log_radius[other])
+        half[slots] = np.arctan2(np.sin(2 * half_theta), beyond + 2 * np.sin(half_theta) ** 2)
+        return half
+
+    def downhill(self, place: FloatArray) -> FloatArray:
+        """Return by how much the half angles around each centre exceed pi."""
+        excess = self.half_angles(place).reshape(-1, 3).sum(axis=1) - np.pi
+        # Over an edge inside of a circle, the angles from both sides sum to pi, which makes one face of two.
+        around: FloatArray = np.bincount(self.circle, excess)
+        return around - around.mean()  # 0 but for rounding
+
+    def newton_step(self, place: FloatArray, residual: FloatArray) -> FloatArray:
+        """Return the step, with the first radius held."""
+        _, own, other, half_theta = self._sides
+        with np.errstate(over="ignore"):
+            spread = 2 * (np.sinh((place[own] - place[other]) / 2) ** 2 + np.sin(half_theta) ** 2)
+        weight = np.where(own == other, 0.0, np.sin(2 * half_theta) / (2 * spread))
+        count = len(place)
+        diagonal = np.bincount(own, weight, count)
+        free = (own != 0) & (other != 0)
+        diagonal[0] = 1.0
+        every = np.arange(count)
+        matrix = csc_matrix(
+            (
+                np.concatenate([diagonal, -weight[free]]),
+                (np.concatenate([every, own[free]]), np.concatenate([every, other[free]])),
+            ),
+            shape=(count, count),
+        )
+        self._factor = factorize(matrix, self._factor)
+        step = self._factor.solve(np.where(every == 0, 0.0, residual))
+        step -= step.mean()
+        return step * min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), 1e-300))
+
+
+def _inside_too(half: FloatArray, coherent: CoherentAngles, twin: IntArray) -> FloatArray:
+    """Return the half angles, also over edges inside of circles, where they sum to pi in each triangle."""
+    unknown = coherent.is_inside.copy()
+    half = half.copy()
+    while unknown.any():
+        faces = np.flatnonzero(unknown.reshape(-1, 3).sum(axis=1) == 1)
+        if not len(faces):  # a ring: it does not occur where the angles are coherent
+            break
+        side = 3 * faces + np.argmax(unknown.reshape(-1, 3)[faces], axis=1)
+        half[side] = 0.0
+        half[side] = np.pi - half.reshape(-1, 3)[faces].sum(axis=1)
+        half[twin[side]] = np.pi - half[side]
+        unknown[side] = unknown[twin[side]] = False
+    return half

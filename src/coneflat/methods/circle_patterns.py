@@ -1,0 +1,87 @@
+"""Circle patterns (Kharevych, Springborn, Schroeder 2006), with cones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import FloatArray, IntArray
+from ..cones import ConeSolution
+from ..conformal.circle_pattern import circle_pattern
+from ..conformal.coherent_angles import coherent_angles
+from ..conformal.exact import ExactMetric, checked_target
+from ..geometry import angle_defect, corner_angles
+from ..geometry.areas import vertex_areas
+from ..geometry.delaunay import make_delaunay
+from ..geometry.intrinsic import intrinsic_triangulation
+from ..mesh import TriangleMesh
+from ..text import plural
+from .exact import ExactFlatMetric
+from .solved import at_own_area
+
+# Largest curvature error of a metric that has converged, radians.
+TOLERANCE = 1e-9
+
+
+def circle_patterns(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    solution: ConeSolution,
+    best_effort: bool = False,
+    delaunay: bool = True,
+) -> ExactFlatMetric:
+    """Return the flat metric whose triangles' circumcircles meet at nearly the same angles as on the mesh.
+
+    Args:
+        mesh: connected.
+        lengths: (m, 3) side lengths, model units.
+        solution: cones with their curvatures; the boundary is free.
+        best_effort: return a metric that did not converge.
+        delaunay: make the mesh intrinsic Delaunay first, as the paper does; without, angles opposite edges that are
+            not Delaunay are made smaller until these are.
+
+    Raises:
+        ConvergenceError: there is no such pattern, or it was not found, unless `best_effort`.
+        CurvatureError: no metric has the curvatures.
+    """
+    border = mesh.is_boundary_vertex
+    target, _ = checked_target(mesh, np.where(border, 0.0, solution.target), border)
+    triangulation = intrinsic_triangulation(mesh, lengths)
+    flips: IntArray = np.empty(0, dtype=np.int64)
+    if delaunay:
+        flips = make_delaunay(triangulation)
+    before = triangulation.length.reshape(-1, 3)
+    coherent = coherent_angles(triangulation, corner_angles(before).ravel(), 2 * np.pi - target, ~border)
+    notes: tuple[str, ...] = ()
+    if not coherent.converged:
+        failure = (
+            f"no circle pattern on these triangles has the curvatures: after {plural(coherent.steps, 'step')} their "
+            f"angles are off by {coherent.residual:.2g} rad"
+        )
+        notes = noted(failure, best_effort)
+
+    pattern = circle_pattern(triangulation, coherent)
+    after = pattern.lengths.reshape(-1, 3)
+    faces, count = triangulation.faces, len(mesh.vertices)
+    curvature = angle_defect(faces, corner_angles(after), border)
+    error = np.where(border, 0.0, np.abs(curvature - target))
+    areas = [vertex_areas(faces, sides, count) for sides in (before, after)]
+    triangulation.length = pattern.lengths
+    solved = ExactMetric(
+        log_scale=np.log(areas[1] / areas[0]) / 2,
+        curvature=curvature,
+        triangulation=triangulation,
+        flips=flips,
+        euclidean_flips=len(flips),
+        steps=coherent.steps + pattern.steps,
+        residual=float(error.max()),
+        worst_vertex=int(error.argmax()),
+        converged=coherent.converged and bool(error.max() <= TOLERANCE),
+        doubled=False,
+    )
+    if coherent.converged and not solved.converged:
+        failure = (
+            f"the circle pattern did not converge: after {plural(solved.steps, 'step')} the curvature is off by "
+            f"{solved.residual:.2g} rad"
+        )
+        notes = noted(failure, best_effort)
+    return at_own_area(mesh, lengths, solution, solved, notes)
