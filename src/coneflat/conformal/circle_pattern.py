@@ -15,9 +15,14 @@ from ..mesh import label_components
 from ..solver import Factor, factorize
 from .coherent_angles import CoherentAngles
 from .descent import descend
+from .hessian_kernel import Int32Array
 
 # Largest error of the angles around the centre of a circle, radians, and steps of Newton's method at most.
 TOLERANCE, MAX_STEPS = 1e-11, 200
+# Residual, radians, from which on Newton's steps are tried.
+NEAR = 0.1
+# Part of theta by which log radii may differ and count as equal.
+EQUAL = 1e-6
 # Largest change of a log radius in one step.
 LARGEST_STEP = 5.0
 
@@ -57,17 +62,21 @@ def circle_pattern(triangulation: IntrinsicTriangulation, coherent: CoherentAngl
     start = np.log(np.take_along_axis(length, widest, 1) / np.take_along_axis(sines, widest, 1) / 2)[:, 0]
 
     problem = RadiiProblem(triangulation.twin, coherent)
-    count = np.bincount(problem.circle)
-    found = descend(
-        problem, np.bincount(problem.circle, start - start.mean()) / count, TOLERANCE, MAX_STEPS
-    )
-    log_radius = found.place[problem.circle]
+    problem.base = np.bincount(problem.circle, start - start.mean()) / np.bincount(problem.circle)
+    steps = 0
+    # Where circles meet at a small angle, the last bit of a log radius turns theirs by a thousand times more than
+    # what is to be reached. As a small change of what was found, log radii have bits enough.
+    for _ in range(2):
+        found = descend(problem, np.zeros_like(problem.base), TOLERANCE, MAX_STEPS)
+        half = _inside_too(problem.half_angles(found.place), coherent, triangulation.twin)
+        problem.base = problem.base + found.place
+        steps += found.steps
+    log_radius = problem.base[problem.circle]
     log_radius -= (log_radius.max() + log_radius.min()) / 2
-    half = _inside_too(problem.half_angles(found.place), coherent, triangulation.twin)
     lengths = 2 * np.exp(np.repeat(log_radius, 3)) * np.sin(half)
     upper = np.flatnonzero(triangulation.twin > np.arange(len(half)))
     lengths[triangulation.twin[upper]] = lengths[upper]
-    return CirclePattern(log_radius, lengths, found.largest, found.steps)
+    return CirclePattern(log_radius, lengths, found.largest, steps)
 
 
 @dataclass(eq=False)
@@ -83,10 +92,12 @@ class RadiiProblem:
     Attributes:
         twin: (3m,) half-edges.
         coherent: what gives theta, and the angles opposite the boundary.
+        base: (circles,) log radii, of which the variables are changes.
     """
 
     twin: IntArray
     coherent: CoherentAngles
+    base: FloatArray = field(default_factory=lambda: np.empty(0))
     _factor: Factor | None = field(default=None, init=False)
 
     @cached_property
@@ -104,12 +115,29 @@ class RadiiProblem:
         theta = np.pi - angles[slots] - angles[others]
         return slots, self.circle[slots // 3], self.circle[others // 3], theta / 2
 
-    def half_angles(self, log_radius: FloatArray) -> FloatArray:
+    @cached_property
+    def _pattern(self) -> tuple[IntArray, Int32Array, Int32Array]:
+        """Where each entry of the diagonal and each side's adds to a matrix by columns; its rows and starts."""
+        _, own, other, _ = self._sides
+        count = len(self.base)
+        every = np.arange(count)
+        keys = np.concatenate([every * count + every, other * count + own])
+        kept, place = np.unique(keys, return_inverse=True)
+        starts = np.searchsorted(kept, np.arange(count + 1) * count)
+        return place.ravel(), (kept % count).astype(np.int32), starts.astype(np.int32)
+
+    def _gaps(self, place: FloatArray) -> FloatArray:
+        """Return rho_k - rho_l for each side."""
+        _, own, other, _ = self._sides
+        gaps: FloatArray = (self.base[own] - self.base[other]) + (place[own] - place[other])
+        return gaps
+
+    def half_angles(self, place: FloatArray) -> FloatArray:
         """Return (3m,) phi; those of the coherent angles at the boundary and inside of a circle."""
-        slots, own, other, half_theta = self._sides
+        slots, _, _, half_theta = self._sides
         half = self.coherent.angles.copy()
         with np.errstate(over="ignore"):
-            beyond = np.expm1(log_radius[own] - log_radius[other])
+            beyond = np.expm1(self._gaps(place))
         half[slots] = np.arctan2(np.sin(2 * half_theta), beyond + 2 * np.sin(half_theta) ** 2)
         return half
 
@@ -121,25 +149,36 @@ class RadiiProblem:
         return around - around.mean()  # 0 but for rounding
 
     def newton_step(self, place: FloatArray, residual: FloatArray) -> FloatArray:
-        """Return the step, with the first radius held."""
-        _, own, other, half_theta = self._sides
+        """Return Newton's step where it goes no farther than down, else that of a parabola above the energy.
+
+        phi leaps within theta of equal radii, where circles meet at a small angle theta: tangents there say little.
+        The secant of phi from equal radii is steeper on the whole way to them, as phi is convex beyond.
+        """
+        _, _, _, half_theta = self._sides
+        gaps = self._gaps(place)
         with np.errstate(over="ignore"):
-            spread = 2 * (np.sinh((place[own] - place[other]) / 2) ** 2 + np.sin(half_theta) ** 2)
-        weight = np.where(own == other, 0.0, np.sin(2 * half_theta) / (2 * spread))
-        count = len(place)
+            tangent = np.sin(2 * half_theta) / (4 * (np.sinh(gaps / 2) ** 2 + np.sin(half_theta) ** 2))
+        if np.abs(residual).max() < NEAR:
+            step = self._solve(tangent, residual)
+            if float(self.downhill(place + step) @ step) >= 0:
+                return step
+        turned = np.abs(np.pi / 2 - half_theta - self.half_angles(place)[self._sides[0]])
+        far = np.abs(gaps) > EQUAL * half_theta
+        return self._solve(np.where(far, turned / np.where(far, np.abs(gaps), 1.0), tangent), residual)
+
+    def _solve(self, weight: FloatArray, residual: FloatArray) -> FloatArray:
+        """Return the solution for weights of the sides, mean-free; on the way, the first radius is held."""
+        _, own, other, _ = self._sides
+        weight = np.where(own == other, 0.0, weight)
+        count = len(residual)
         diagonal = np.bincount(own, weight, count)
-        free = (own != 0) & (other != 0)
         diagonal[0] = 1.0
-        every = np.arange(count)
-        matrix = csc_matrix(
-            (
-                np.concatenate([diagonal, -weight[free]]),
-                (np.concatenate([every, own[free]]), np.concatenate([every, other[free]])),
-            ),
-            shape=(count, count),
-        )
+        entries, rows, starts = self._pattern
+        across = np.where((own == 0) | (other == 0), 0.0, -weight)
+        values = np.bincount(entries, np.concatenate([diagonal, across]), len(rows))
+        matrix = csc_matrix((values, rows, starts), shape=(count, count))
         self._factor = factorize(matrix, self._factor)
-        step = self._factor.solve(np.where(every == 0, 0.0, residual))
+        step = self._factor.solve(np.where(np.arange(count) == 0, 0.0, residual))
         step -= step.mean()
         return step * min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), 1e-300))
 

@@ -12,6 +12,8 @@ from ..errors import MetricError
 
 # Residual below which nothing is left to gain: the rounding of a sum of a few angles.
 GOAL = 1e-13
+# Part of the gradient by which a step must change it.
+NO_CHANGE = 1e-6
 # Halvings of a step after which it is taken for rounding.
 HALVINGS = 40
 
@@ -64,7 +66,10 @@ def descend(function: Convex, start: FloatArray, tolerance: float, max_steps: in
         found = _search_line(function, here, step, best.largest)
         if found is None:
             break
+        changed = np.abs(found.residual - here.residual).max()
         here, before = found, best.largest
+        if changed <= NO_CHANGE * here.largest:  # a slope without an end
+            break
         if here.largest < before:
             best = here
         if before <= tolerance and here.largest > before / 2:

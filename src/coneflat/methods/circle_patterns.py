@@ -11,15 +11,17 @@ from ..conformal.coherent_angles import coherent_angles
 from ..conformal.exact import ExactMetric, checked_target
 from ..geometry import angle_defect, corner_angles
 from ..geometry.areas import vertex_areas
-from ..geometry.delaunay import make_delaunay
+from ..geometry.delaunay import make_delaunay, raise_degrees
 from ..geometry.intrinsic import intrinsic_triangulation
 from ..mesh import TriangleMesh
 from ..text import plural
 from .exact import ExactFlatMetric
-from .solved import at_own_area
+from .solved import at_own_area, noted
 
 # Largest curvature error of a metric that has converged, radians.
 TOLERANCE = 1e-9
+# Mean angle, radians, that corners at a vertex are to stay below.
+WIDEST = 0.98 * np.pi
 
 
 def circle_patterns(
@@ -49,6 +51,9 @@ def circle_patterns(
     flips: IntArray = np.empty(0, dtype=np.int64)
     if delaunay:
         flips = make_delaunay(triangulation)
+        # In Delaunay triangulations corners are wide: some few may be too few for a cone to become as wide as is wanted.
+        wanted = np.where(border, 0, np.floor((2 * np.pi - target) / WIDEST).astype(np.int64) + 1)
+        flips = np.concatenate([flips, raise_degrees(triangulation, wanted)])
     before = triangulation.length.reshape(-1, 3)
     coherent = coherent_angles(triangulation, corner_angles(before).ravel(), 2 * np.pi - target, ~border)
     notes: tuple[str, ...] = ()
