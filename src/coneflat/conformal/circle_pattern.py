@@ -19,10 +19,11 @@ from .hessian_kernel import Int32Array
 
 # Largest error of the angles around the centre of a circle, radians, and steps of Newton's method at most.
 TOLERANCE, MAX_STEPS = 1e-11, 200
-# Residual, radians, from which on Newton's steps are tried.
-NEAR = 0.1
-# Part of theta by which log radii may differ and count as equal.
-EQUAL = 1e-6
+# Change of an angle, radians, at which to go over from angles to radii; steps until there, and part of the way to the
+# bounds of angles that a step goes at most.
+SETTLED, MOST_STEPS, PART = 1e-5, 60, 0.9
+# Halvings of such a step at most, while it goes beyond the top.
+HALVINGS = 30
 # Largest change of a log radius in one step.
 LARGEST_STEP = 5.0
 
@@ -44,39 +45,29 @@ class CirclePattern:
     steps: int
 
 
-def circle_pattern(triangulation: IntrinsicTriangulation, coherent: CoherentAngles) -> CirclePattern:
+def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
     """Return the circles that meet at the angles theta = pi - a - a', for a and a' opposite an edge.
 
     Args:
-        triangulation: connected; its lengths tell where to start.
-        coherent: angles, from which alone the result follows, up to scale.
+        twin: (3m,) half-edges of a connected triangulation.
+        coherent: angles.
 
     Notes:
         L. Kharevych, B. Springborn, P. Schroeder, "Discrete conformal mappings via circle patterns", 2006,
         Section 2. Circles that are one have one radius, and their triangles are one face.
     """
-    length = triangulation.length.reshape(-1, 3)
-    opposite = corner_angles(length)
-    sines = np.sin(opposite)
-    widest = np.argmax(sines, axis=1)[:, None]
-    start = np.log(np.take_along_axis(length, widest, 1) / np.take_along_axis(sines, widest, 1) / 2)[:, 0]
-
-    problem = RadiiProblem(triangulation.twin, coherent)
-    problem.base = np.bincount(problem.circle, start - start.mean()) / np.bincount(problem.circle)
-    steps = 0
+    problem = RadiiProblem(twin, coherent)
+    problem.base, steps = widest_pattern(problem)
     # Where circles meet at a small angle, the last bit of a log radius turns theirs by a thousand times more than
     # what is to be reached. As a small change of what was found, log radii have bits enough.
-    for _ in range(2):
-        found = descend(problem, np.zeros_like(problem.base), TOLERANCE, MAX_STEPS)
-        half = _inside_too(problem.half_angles(found.place), coherent, triangulation.twin)
-        problem.base = problem.base + found.place
-        steps += found.steps
-    log_radius = problem.base[problem.circle]
+    found = descend(problem, np.zeros_like(problem.base), TOLERANCE, MAX_STEPS)
+    log_radius = (problem.base + found.place)[problem.circle]
     log_radius -= (log_radius.max() + log_radius.min()) / 2
+    half = _inside_too(problem.half_angles(found.place), coherent, twin)
     lengths = 2 * np.exp(np.repeat(log_radius, 3)) * np.sin(half)
-    upper = np.flatnonzero(triangulation.twin > np.arange(len(half)))
-    lengths[triangulation.twin[upper]] = lengths[upper]
-    return CirclePattern(log_radius, lengths, found.largest, steps)
+    upper = np.flatnonzero(twin > np.arange(len(half)))
+    lengths[twin[upper]] = lengths[upper]
+    return CirclePattern(log_radius, lengths, found.largest, steps + found.steps)
 
 
 @dataclass(eq=False)
@@ -106,8 +97,13 @@ class RadiiProblem:
         slots = np.flatnonzero(self.coherent.is_inside)
         return label_components(len(self.twin) // 3, slots // 3, self.twin[slots] // 3)[1]
 
+    @property
+    def count(self) -> int:
+        """The number of circles."""
+        return int(self.circle.max()) + 1
+
     @cached_property
-    def _sides(self) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
+    def sides(self) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
         """Half-edges between two circles, the circle of each and the one across, and theta / 2."""
         slots = np.flatnonzero((self.twin >= 0) & ~self.coherent.is_inside)
         others = self.twin[slots]
@@ -118,8 +114,8 @@ class RadiiProblem:
     @cached_property
     def _pattern(self) -> tuple[IntArray, Int32Array, Int32Array]:
         """Where each entry of the diagonal and each side's adds to a matrix by columns; its rows and starts."""
-        _, own, other, _ = self._sides
-        count = len(self.base)
+        _, own, other, _ = self.sides
+        count = self.count
         every = np.arange(count)
         keys = np.concatenate([every * count + every, other * count + own])
         kept, place = np.unique(keys, return_inverse=True)
@@ -128,47 +124,41 @@ class RadiiProblem:
 
     def _gaps(self, place: FloatArray) -> FloatArray:
         """Return rho_k - rho_l for each side."""
-        _, own, other, _ = self._sides
+        _, own, other, _ = self.sides
         gaps: FloatArray = (self.base[own] - self.base[other]) + (place[own] - place[other])
         return gaps
 
     def half_angles(self, place: FloatArray) -> FloatArray:
         """Return (3m,) phi; those of the coherent angles at the boundary and inside of a circle."""
-        slots, _, _, half_theta = self._sides
+        slots, _, _, half_theta = self.sides
         half = self.coherent.angles.copy()
         with np.errstate(over="ignore"):
             beyond = np.expm1(self._gaps(place))
         half[slots] = np.arctan2(np.sin(2 * half_theta), beyond + 2 * np.sin(half_theta) ** 2)
         return half
 
-    def downhill(self, place: FloatArray) -> FloatArray:
-        """Return by how much the half angles around each centre exceed pi."""
-        excess = self.half_angles(place).reshape(-1, 3).sum(axis=1) - np.pi
+    def excess(self, half: FloatArray) -> FloatArray:
+        """Return by how much half angles (3m,) around each centre exceed pi."""
+        excess = half.reshape(-1, 3).sum(axis=1) - np.pi
         # Over an edge inside of a circle, the angles from both sides sum to pi, which makes one face of two.
         around: FloatArray = np.bincount(self.circle, excess)
         return around - around.mean()  # 0 but for rounding
 
+    def downhill(self, place: FloatArray) -> FloatArray:
+        """Return by how much the half angles around each centre exceed pi."""
+        return self.excess(self.half_angles(place))
+
     def newton_step(self, place: FloatArray, residual: FloatArray) -> FloatArray:
-        """Return Newton's step where it goes no farther than down, else that of a parabola above the energy.
-
-        phi leaps within theta of equal radii, where circles meet at a small angle theta: tangents there say little.
-        The secant of phi from equal radii is steeper on the whole way to them, as phi is convex beyond.
-        """
-        _, _, _, half_theta = self._sides
-        gaps = self._gaps(place)
+        """Return the Newton step."""
+        half_theta, gaps = self.sides[3], self._gaps(place)
         with np.errstate(over="ignore"):
-            tangent = np.sin(2 * half_theta) / (4 * (np.sinh(gaps / 2) ** 2 + np.sin(half_theta) ** 2))
-        if np.abs(residual).max() < NEAR:
-            step = self._solve(tangent, residual)
-            if float(self.downhill(place + step) @ step) >= 0:
-                return step
-        turned = np.abs(np.pi / 2 - half_theta - self.half_angles(place)[self._sides[0]])
-        far = np.abs(gaps) > EQUAL * half_theta
-        return self._solve(np.where(far, turned / np.where(far, np.abs(gaps), 1.0), tangent), residual)
+            slope = np.sin(2 * half_theta) / (4 * (np.sinh(gaps / 2) ** 2 + np.sin(half_theta) ** 2))
+        step = self.solve(slope, residual)
+        return step * min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), 1e-300))
 
-    def _solve(self, weight: FloatArray, residual: FloatArray) -> FloatArray:
+    def solve(self, weight: FloatArray, residual: FloatArray) -> FloatArray:
         """Return the solution for weights of the sides, mean-free; on the way, the first radius is held."""
-        _, own, other, _ = self._sides
+        _, own, other, _ = self.sides
         weight = np.where(own == other, 0.0, weight)
         count = len(residual)
         diagonal = np.bincount(own, weight, count)
@@ -179,8 +169,38 @@ class RadiiProblem:
         matrix = csc_matrix((values, rows, starts), shape=(count, count))
         self._factor = factorize(matrix, self._factor)
         step = self._factor.solve(np.where(np.arange(count) == 0, 0.0, residual))
-        step -= step.mean()
-        return step * min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), 1e-300))
+        centred: FloatArray = step - step.mean()
+        return centred
+
+
+def widest_pattern(problem: RadiiProblem) -> tuple[FloatArray, int]:
+    """Return (circles,) log radii, nearly, and the number of steps, from the dual problem.
+
+    Of all coherent angles with the same theta those of the pattern have the largest volume, as angles of ideal
+    hyperbolic prisms (I. Rivin 1994; G. Leibon 2002). An angle answers to a difference of log radii by a leap where
+    theta is small, but log radii answer to angles gently, log sin(theta + phi) - log sin(phi): Newton's method takes
+    ten steps here where it creeps from leap to leap there.
+    """
+    slots, own, other, half_theta = problem.sides
+    half = problem.coherent.angles.copy()
+    radii = np.zeros(problem.count)
+    for steps in range(1, MOST_STEPS + 1):
+        one, two = half[slots], half[problem.twin[slots]]
+        wanted = np.log(np.sin(two) / np.sin(one))
+        weight = np.sin(one) * np.sin(two) / np.sin(2 * half_theta)
+        radii = problem.solve(weight, np.bincount(own, weight * wanted, len(radii)) + problem.excess(half))
+        change = weight * (wanted - (radii[own] - radii[other]))
+        room = one / np.maximum(-change, np.finfo(float).tiny)
+        part = min(1.0, PART * float(room.min(initial=np.inf)))
+        half[slots] = one + part * change
+        for _ in range(HALVINGS):
+            if not change @ np.log(np.sin(half[problem.twin[slots]]) / np.sin(half[slots])) < 0:
+                break
+            part /= 2
+            half[slots] = one + part * change
+        if np.abs(change).max(initial=0.0) <= SETTLED:
+            break
+    return radii, steps
 
 
 def _inside_too(half: FloatArray, coherent: CoherentAngles, twin: IntArray) -> FloatArray:

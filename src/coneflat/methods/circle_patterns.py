@@ -64,7 +64,7 @@ def circle_patterns(
         )
         notes = noted(failure, best_effort)
 
-    pattern = circle_pattern(triangulation, coherent)
+    pattern = circle_pattern(triangulation.twin, coherent)
     after = pattern.lengths.reshape(-1, 3)
     faces, count = triangulation.faces, len(mesh.vertices)
     curvature = angle_defect(faces, corner_angles(after), border)
