@@ -18,7 +18,7 @@ from .descent import descend
 from .hessian_kernel import Int32Array
 
 # Largest error of the angles around the centre of a circle, radians, and steps of Newton's method at most.
-TOLERANCE, MAX_STEPS = 1e-11, 200
+TOLERANCE, MAX_STEPS = 1e-10, 200
 # Change of an angle, radians, at which to go over from angles to radii; steps until there, and part of the way to the
 # bounds of angles that a step goes at most.
 SETTLED, MOST_STEPS, PART = 1e-5, 60, 0.9

@@ -12,18 +12,19 @@ from ..geometry.intrinsic import IntrinsicTriangulation
 from ..solver import factorize
 from .descent import descend
 
-# Least angle, radians.
-LEAST_ANGLE = 1e-5
+# Angles may shrink to this part of what they were, or to this many radians where that is less; but never below the
+# last, radians.
+LEAST_PART, LARGEST_LEAST, LEAST_ANGLE = 0.5, 0.02, 1e-5
 # Circles that meet at a smaller angle, radians, become one, as neighbours around a planar quad that is inscribed in a
 # circle are. The equations would be as steep as this is small. Less than the least angle: so circles that are
 # one never close a ring, as the angles that are left in a ring sum to what they meet at.
 ONE_CIRCLE = 1e-6
 # Largest error of a sum of angles, radians; it sums to that of curvature.
-TOLERANCE = 1e-11
+TOLERANCE = 1e-10
 # Rounds in which circles are made one, and Newton steps in each.
-ROUNDS, MAX_STEPS = 4, 100
+ROUNDS, MAX_STEPS = 4, 40
 # Damping of a step, relative to its residual, where rank is wanting.
-DAMPING, LARGEST_DAMPING, LEAST_DAMPING = 1e-2, 1e-3, 1e-13
+DAMPING, LARGEST_DAMPING, LEAST_DAMPING = 1e-5, 1e-6, 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +72,6 @@ def coherent_angles(
     count = len(angles)
     rows = triangulation.face_count
     summed = np.flatnonzero(is_summed)
-    if is_summed.all():  # then one of the equations follows from the others
-        summed = summed[1:]
     number = np.full(triangulation.vertex_count, -1, dtype=np.int64)
     number[summed] = rows + np.arange(len(summed))
     row = np.concatenate([np.arange(count) // 3, number[triangulation.faces.ravel()]])
@@ -83,7 +82,10 @@ def coherent_angles(
     )
     right = np.concatenate([np.full(rows, np.pi), sums[summed]])
 
-    problem = _Dual(angles, triangulation.twin, np.zeros(count, dtype=bool), equations, right)
+    least = np.clip(LEAST_PART * angles, LEAST_ANGLE, LARGEST_LEAST)
+    problem = _Dual(
+        angles, least, triangulation.twin, np.zeros(count, dtype=bool), equations, right, bool(is_summed.all())
+    )
     found = descend(problem, np.zeros(len(right)), TOLERANCE, MAX_STEPS)
     steps = found.steps
     for _ in range(ROUNDS):
@@ -101,30 +103,32 @@ class _Dual:
     """A convex function of the multipliers of equations A x = b, for x nearest to c within bounds."""
 
     angles: FloatArray
+    least: FloatArray
     twin: IntArray
     is_inside: BoolArray
     equations: csr_matrix
     right: FloatArray
+    is_closed: bool  # then the last of the equations follows from the others
 
     def project(self, place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the angles for multipliers, and their derivatives by those before bounds: own and across."""
         free = self.angles + self.equations.T @ place
         is_inner = self.twin >= 0
         other = np.where(is_inner, self.twin, 0)
-        bounded = np.maximum(free, LEAST_ANGLE)
+        bounded = np.maximum(free, self.least)
         too_wide = is_inner & (self.is_inside | (bounded + bounded[other] > np.pi))
-        half, most = (free - free[other]) / 2, np.pi / 2 - LEAST_ANGLE
-        slides = too_wide & (np.abs(half) < most)
-        angles = np.where(too_wide, np.pi / 2 + np.clip(half, -most, most), bounded)
-        own = np.where(too_wide, 0.5 * slides, free > LEAST_ANGLE)
+        half = (free - free[other]) / 2
+        low, high = self.least - np.pi / 2, np.pi / 2 - self.least[other]
+        slides = too_wide & (low < half) & (half < high)
+        angles = np.where(too_wide, np.pi / 2 + np.clip(half, low, high), bounded)
+        own = np.where(too_wide, 0.5 * slides, free > self.least)
         return angles, own, np.where(slides, -0.5, 0.0)
 
     def nearly_one_circle(self, place: FloatArray) -> BoolArray:
         """Return (3m,) where two different circles are nearly one."""
         angles = self.project(place)[0]
-        near: BoolArray = (
-            (self.twin >= 0) & ~self.is_inside & (np.pi - angles - angles[self.twin] < ONE_CIRCLE)
-        )
+        near: BoolArray = (self.twin >= 0) & ~self.is_inside
+        near &= np.pi - (angles + angles[self.twin]) < ONE_CIRCLE
         return near
 
     def downhill(self, place: FloatArray) -> FloatArray:
@@ -144,9 +148,11 @@ class _Dual:
             ),
             shape=(len(own), len(own)),
         )
-        damping = np.clip(DAMPING * np.abs(residual).max(), LEAST_DAMPING, LARGEST_DAMPING)
-        matrix = csc_matrix(
-            self.equations @ derivative @ self.equations.T + damping * identity(len(residual), format="csr")
-        )
+        used = len(residual) - self.is_closed
+        damping = np.clip(DAMPING * np.abs(residual[:used]).max(), LEAST_DAMPING, LARGEST_DAMPING)
+        equations = self.equations[:used]
+        matrix = csc_matrix(equations @ derivative @ equations.T + damping * identity(used, format="csr"))
         matrix.sort_indices()
-        return factorize(matrix).solve(residual)
+        step = np.zeros_like(residual)
+        step[:used] = factorize(matrix).solve(residual[:used])
+        return step

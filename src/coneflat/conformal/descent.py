@@ -10,8 +10,8 @@ import numpy as np
 from .._arrays import FloatArray
 from ..errors import MetricError
 
-# Residual below which nothing is left to gain: the rounding of a sum of a few angles.
-GOAL = 1e-13
+# Gradient below which nothing is left to gain: the rounding of a sum of some angles.
+GOAL = 1e-12
 # Part of the gradient by which a step must change it.
 NO_CHANGE = 1e-6
 # Halvings of a step after which it is taken for rounding.
@@ -54,8 +54,8 @@ def descend(function: Convex, start: FloatArray, tolerance: float, max_steps: in
     """Return the place of least gradient that Newton's method reaches.
 
     As in `coneflat.conformal.newton`, a step is halved while the function rises at its end: what is left falls by half
-    of what was to be had. One that goes beyond the minimum is taken if it halves the gradient. Past the tolerance
-    the method goes on while that is so.
+    of what was to be had. One that goes beyond the minimum is taken if it halves the least gradient so far.
+    Once below the tolerance, the method goes on while steps halve the gradient.
     """
     here = best = Minimum(start, function.downhill(start), 0)
     while best.largest > GOAL and here.steps < max_steps:
@@ -68,11 +68,11 @@ def descend(function: Convex, start: FloatArray, tolerance: float, max_steps: in
             break
         changed = np.abs(found.residual - here.residual).max()
         here, before = found, best.largest
-        if changed <= NO_CHANGE * here.largest:  # a slope without an end
-            break
         if here.largest < before:
             best = here
         if before <= tolerance and here.largest > before / 2:
+            break
+        if changed <= NO_CHANGE * here.largest:  # a slope without an end
             break
     return Minimum(best.place, best.residual, here.steps)
 

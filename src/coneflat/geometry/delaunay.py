@@ -59,21 +59,6 @@ def make_delaunay(
     return np.concatenate(records)
 
 
-def raise_degrees(triangulation: IntrinsicTriangulation, wanted: IntArray) -> IntArray:
-    """Flip edges, in place, towards vertices of too small a degree; return the half-edges flipped, in order.
-
-    Args:
-        triangulation: changed in place, where its quads are convex.
-        wanted: (n,) number of triangles at each vertex.
-    """
-    from .degree_kernel import raise_degrees as raise_all
-
-    degree = np.bincount(triangulation.tail, minlength=triangulation.vertex_count)
-    record = np.empty(int(np.maximum(wanted - degree, 0).sum()), dtype=np.int64)
-    arrays = triangulation.twin, triangulation.tail, triangulation.length
-    return record[: raise_all(*arrays, degree, np.asarray(wanted, dtype=np.int64), record)]
-
-
 def intrinsic_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> tuple[IntrinsicTriangulation, IntArray]:
     """Return the intrinsic Delaunay triangulation of a mesh and the half-edges flipped, in order.
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray
 from ..cones import ConeSolution
 from ..conformal.circle_pattern import circle_pattern
-from ..conformal.coherent_angles import coherent_angles
+from ..conformal.coherent_angles import CoherentAngles, coherent_angles
 from ..conformal.exact import ExactMetric, checked_target
 from ..geometry import angle_defect, corner_angles
 from ..geometry.areas import vertex_areas
-from ..geometry.delaunay import make_delaunay, raise_degrees
-from ..geometry.intrinsic import intrinsic_triangulation
+from ..geometry.delaunay import make_delaunay
+from ..geometry.intrinsic import IntrinsicTriangulation, intrinsic_triangulation
+from ..geometry.proper import make_proper
 from ..mesh import TriangleMesh
 from ..text import plural
 from .exact import ExactFlatMetric
@@ -51,11 +52,13 @@ def circle_patterns(
     flips: IntArray = np.empty(0, dtype=np.int64)
     if delaunay:
         flips = make_delaunay(triangulation)
-        # In Delaunay triangulations corners are wide: some few may be too few for a cone to become as wide as is wanted.
+    coherent = _nearest_angles(triangulation, target, border)
+    if delaunay and not coherent.converged:
+        # Two edges between the same vertices, flat all around, cannot both be straight; nor can there be a cone wider
+        # than the corners at it can be.
         wanted = np.where(border, 0, np.floor((2 * np.pi - target) / WIDEST).astype(np.int64) + 1)
-        flips = np.concatenate([flips, raise_degrees(triangulation, wanted)])
-    before = triangulation.length.reshape(-1, 3)
-    coherent = coherent_angles(triangulation, corner_angles(before).ravel(), 2 * np.pi - target, ~border)
+        flips = np.concatenate([flips, make_proper(triangulation, wanted)])
+        coherent = _nearest_angles(triangulation, target, border)
     notes: tuple[str, ...] = ()
     if not coherent.converged:
         failure = (
@@ -65,6 +68,7 @@ def circle_patterns(
         notes = noted(failure, best_effort)
 
     pattern = circle_pattern(triangulation.twin, coherent)
+    before = triangulation.length.reshape(-1, 3)
     after = pattern.lengths.reshape(-1, 3)
     faces, count = triangulation.faces, len(mesh.vertices)
     curvature = angle_defect(faces, corner_angles(after), border)
@@ -90,3 +94,10 @@ def circle_patterns(
         )
         notes = noted(failure, best_effort)
     return at_own_area(mesh, lengths, solution, solved, notes)
+
+
+def _nearest_angles(
+    triangulation: IntrinsicTriangulation, target: FloatArray, border: BoolArray
+) -> CoherentAngles:
+    angles = corner_angles(triangulation.length.reshape(-1, 3)).ravel()
+    return coherent_angles(triangulation, angles, 2 * np.pi - target, ~border)
