@@ -276,10 +276,8 @@ def test_real_models(shared, name):
 
 def test_free_cones_are_an_option():
     mesh = shapes.sphere(3)
-    free = flatten(*mesh, method="abf++", at_cones="free")
+    free = flatten(*mesh, method="abf++/free")
     held = flatten(*mesh, method="abf++")
     assert free.distortion.seam_mismatch > 1e-3 > 1e-9 > held.distortion.seam_mismatch
-    with pytest.raises(errors.OptionError, match="'lscm' cannot leave cones free"):
-        flatten(*mesh, method="lscm", at_cones="free")
-    with pytest.raises(errors.OptionError, match="no such choice at cones"):
-        flatten(*mesh, method="abf++", at_cones="scale")
+    with pytest.raises(errors.OptionError, match="unknown method 'lscm/free'"):
+        flatten(*mesh, method="lscm/free")

@@ -15,7 +15,7 @@ from coneflat.compare.paper import METHODS as PAPER_METHODS
 from coneflat.compare.peers import PEERS, installed_peers, with_uv
 from coneflat.compare.published import MODELS, model_of
 from coneflat.compare.table import COLUMNS, comparison_csv, comparison_markdown
-from coneflat.options import METHODS
+from coneflat.options import METHODS, VARIANTS
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +135,7 @@ def test_the_experiments_of_the_paper(tmp_path, ball):
     assert np.isnan(second[5])
     rows = [row for row in found.table_2() if row[0] == "fandisk"]
     assert len(rows) == len(PAPER_METHODS)
-    assert rows[0][3] == 1.013
+    assert rows[0][1:4:2] == ["circle-patterns/fixed (CP)", 1.013]
     text = found.markdown()
     assert "Not among the files: rockerarm, foot" in text
     assert "gargoyle.obj" in text
@@ -173,6 +173,13 @@ def test_a_folder_that_cannot_be_made(tmp_path, ball):
     mesh = write_mesh(tmp_path / "ball.obj", ball)
     with pytest.raises(errors.MeshFileError, match="cannot make the folder"):
         CliRunner().invoke(cli, ["compare", str(mesh), "-o", str(mesh)], catch_exceptions=False)
+
+
+def test_every_list_of_methods_is_the_same():
+    from coneflat.cli.method import METHODS as listed
+
+    assert set(listed) == {*METHODS, *VARIANTS}
+    assert len(listed) == len(METHODS + VARIANTS)
 
 
 def test_names_of_files_are_kept(tmp_path, ball):

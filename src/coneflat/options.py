@@ -16,12 +16,12 @@ from .errors import OptionError
 CONES = ("auto", "pursuit", "greedy", "none")
 #: From cones to a layout: this package's own, the paper's, and those that it compares with.
 METHODS = ("exact", "linear", "circle-patterns", "ricci", "linear-abf", "abf++", "lscm", "spectral", "bff")
-# Those that may leave the angles of cones free.
-ANGLE_BASED = ("linear-abf", "abf++")
+#: Of some of them: circle patterns without flips, and angle based flattening that prescribes nothing at cones.
+VARIANTS = ("circle-patterns/fixed", "linear-abf/free", "abf++/free")
 # Those that solve what need not converge.
-ITERATIVE = ("exact", "circle-patterns", "ricci", "abf++")
+ITERATIVE = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci", "abf++", "abf++/free")
 LENGTH_RULES = ("integral", "mean")
-AT_CONES = ("auto", "scale", "curvature", "free")
+AT_CONES = ("auto", "scale", "curvature")
 SOLVERS = ("auto", "pardiso", "scikit-sparse", "cholespy", "scipy", "amg")
 CHARTS = ("one", "atlas")
 BOUNDARIES = ("free", "lengths", "disk", "straight")
@@ -107,11 +107,11 @@ class Options:
             if not self.corners:
                 raise OptionError("boundary names no corners; for a round boundary, say 'disk'")
         _choice("at_cones", self.at_cones, AT_CONES)
-        _choice("method", self.method, METHODS)
+        _choice("method", self.method, METHODS + VARIANTS)
         if self.method != "exact":
-            if self.boundary_kind != "free" or self.at_cones not in ("auto", "free"):
+            if self.boundary_kind != "free" or self.at_cones != "auto":
                 raise OptionError(
-                    f"method {self.method!r} has a free boundary and no such choice at cones: use method 'exact'"
+                    f"method {self.method!r} has a free boundary and no choice at cones: use method 'exact'"
                 )
             if self.best_effort and self.method not in ITERATIVE:
                 raise OptionError(f"method {self.method!r} does not iterate: there is no best effort")
@@ -119,8 +119,6 @@ class Options:
                 raise OptionError(
                     f"method {self.method!r} has no common subdivision to refine to: use method 'exact'"
                 )
-        if self.at_cones == "free" and self.method not in ANGLE_BASED:
-            raise OptionError(f"method {self.method!r} cannot leave cones free: {', '.join(ANGLE_BASED)} can")
         if self.at_cones == "scale" and any(k is not None for k in self.given_cones.values()):
             raise OptionError("with the scale fixed at cones their curvatures come out: give positions only")
         if self.at_cones == "scale" and self.boundary_kind not in ("free", "lengths"):

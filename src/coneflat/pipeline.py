@@ -117,13 +117,13 @@ def flatten(
         method: "exact" has no curvature error and no flipped triangle, "linear" is the paper's. For comparison:
             "circle-patterns" (Kharevych et al. 2006), "ricci" (Jin et al. 2007), "linear-abf" (Zayer et al. 2007),
             "abf++" (Sheffer et al. 2005), "bff" (Sawhney and Crane 2017), and, without cones on what was cut open,
-            "lscm" (Levy et al. 2002) and "spectral" (Mullen et al. 2008).
+            "lscm" (Levy et al. 2002) and "spectral" (Mullen et al. 2008). "linear-abf/free" and "abf++/free" prescribe
+            no cones either, and "circle-patterns/fixed" flips no edges.
         length_rule: of the linear metric: "integral" scales an edge by the mean of exp(phi) along it, "mean"
             by exp of the mean.
         at_cones: of the exact metric: "scale" prescribes phi = 0 at the cones and their curvatures come out,
             "curvature" prescribes those of the search; "auto" is "scale" after a greedy search and at given
-            positions, unless the boundary is prescribed, and else "curvature". Of angle based flattening: "free" cuts
-            the mesh first and prescribes no cones.
+            positions, unless the boundary is prescribed, and else "curvature".
         boundary: of the exact metric: "free" has the least area distortion (phi = 0 there), "lengths" is the
             same at the model's own scale, so that boundary lengths are kept, "disk" makes it round, "straight" has
             straight sides between corners that the pursuit finds like cones; vertices
@@ -356,7 +356,7 @@ def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, option
     if options.method == "linear":
         return linear_flattening(mesh, lengths, solution, options.length_rule)
     if options.method != "exact":
-        return other_method(options.method, options.at_cones)(mesh, lengths, solution, options.best_effort)
+        return other_method(options.method)(mesh, lengths, solution, options.best_effort)
     boundary = None
     if mesh.is_boundary_vertex.any():
         if options.boundary_kind == "straight":

@@ -14,7 +14,20 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 QUANTUM_OPTIONS = ("quantise", "correct_handles")
 SEARCH_OPTIONS = ("cones", "epsilon", "max_cones", *PURSUIT_OPTIONS, *QUANTUM_OPTIONS)
-EXACT_OPTIONS = ("boundary", "corner", "refine")
+EXACT_OPTIONS = ("at_cones", "boundary", "corner", "refine")
+#: As in `coneflat.options`, which takes a while to load.
+METHODS = (
+    *(
+        "exact",
+        "linear",
+        "circle-patterns",
+        "circle-patterns/fixed",
+        "ricci",
+        "linear-abf",
+        "linear-abf/free",
+    ),
+    *("abf++", "abf++/free", "lscm", "spectral", "bff"),
+)
 # Formats of models to be textured, where nothing may overlap.
 TEXTURED = (".obj", ".glb")
 METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "method", "lengths", *EXACT_OPTIONS)
@@ -52,20 +65,19 @@ _AFTER_SEARCH = (
     click.option("--max-cones", type=int, help="Searches stop at this many cones."),
     click.option(
         "--method",
-        type=click.Choice(
-            ["exact", "linear", "circle-patterns", "ricci", "linear-abf", "abf++", "lscm", "spectral", "bff"]
-        ),
+        type=click.Choice(METHODS),
+        metavar="METHOD",
         default="exact",
         show_default=True,
-        help="exact: no curvature error, no flipped triangle.  linear: the paper's.  The others, for comparison.",
+        help="exact: no curvature error, no flipped triangle.  linear: the paper's.  For comparison: "
+        f"{', '.join(METHODS[2:])}.",
     ),
     click.option(
         "--at-cones",
-        type=click.Choice(["auto", "scale", "curvature", "free"]),
+        type=click.Choice(["auto", "scale", "curvature"]),
         default="auto",
         show_default=True,
-        help="Exact metric: prescribe scale 1 at cones, or the curvatures that the search found.  free: of linear-abf "
-        "and abf++, which then prescribe no cones.",
+        help="Exact metric: prescribe scale 1 at cones, or the curvatures that the search found.",
     ),
     click.option(
         "--boundary",

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from ..result import Flattening
     from .pictures import Sight
 
-#: What the paper compares, its future work of cones in linear ABF, and the exact metric, which it does not have.
-METHODS = (*NAMES, "linear-abf", "exact")
+#: What the paper compares; then what it had not: flips before circle patterns, cones in linear ABF, the exact metric.
+METHODS = (*NAMES, "circle-patterns", "linear-abf", "exact")
 TABLE_1 = ("model", "triangles", "of the paper", "cones", "curvature error, pi", "of the paper", "ratio")
 TABLE_2 = ("model", "method", "QC mean", "of the paper", "ratio", "time, s", "of the paper", "ratio")
 # How their numbers are written.

@@ -32,8 +32,9 @@ class Published:
         return abs(triangles / 1000 - self.thousands) <= max(SAME * self.thousands, 0.5)
 
 
-#: The paper's names of the methods, by ours. Its linear ABF left cones free.
-NAMES = {"circle-patterns": "CP", "linear-abf/free": "LABF", "linear": "CF"}
+#: The paper's names of the methods, by ours. Its circle patterns ran on the triangles as they are, and its
+#: linear ABF left cones free.
+NAMES = {"circle-patterns/fixed": "CP", "linear-abf/free": "LABF", "linear": "CF"}
 
 
 def _published(

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import ConeflatError, OptionError
 from ..io import MeshFile
-from ..options import METHODS
+from ..options import METHODS, VARIANTS
 from ..pipeline import flatten
 from ..result import Flattening
 from ..stages import Progress
@@ -91,7 +91,7 @@ def compare_methods(
 
     Args:
         mesh, faces: as for `coneflat.flatten`.
-        methods: names that its `method` takes; with "/free" at the end those that may leave cones free.
+        methods: names that its `method` takes.
         peers: names of other packages' methods, of `coneflat.compare.PEERS`; by default those that are installed.
         progress: called with what is done and the fraction done.
         options: arguments of `coneflat.flatten`; those of cones hold for all, by the method "exact" if they do not
@@ -102,8 +102,8 @@ def compare_methods(
         MeshError: the mesh cannot be flattened, or cones not be found.
     """
     for name in methods:
-        if _choices(name)["method"] not in METHODS:
-            raise OptionError(f"unknown method {name!r}: choose from {', '.join(METHODS)}")
+        if name not in METHODS + VARIANTS:
+            raise OptionError(f"unknown method {name!r}: choose from {', '.join(METHODS + VARIANTS)}")
     chosen = installed_peers() if peers is None else tuple(peers)
     for name in chosen:
         if name not in installed_peers():
@@ -133,19 +133,13 @@ def compare_methods(
         else:
             _warm_up(name)
             try:
-                result = flatten(mesh, faces, **_choices(name), cones=cones, **shared)
+                result = flatten(mesh, faces, method=name, cones=cones, **shared)
             except ConeflatError as error:
                 entries.append(Entry(name, None, float("nan"), " ".join(str(error).split())))
             else:
                 entries.append(_entry(name, result, base))
     named = mesh.path if isinstance(mesh, MeshFile) else mesh if isinstance(mesh, str) else None
     return Comparison("mesh" if named is None else str(named), len(base.faces), tuple(entries))
-
-
-def _choices(name: str) -> dict[str, Any]:
-    """Return the options that a method's name stands for."""
-    method, slash, at_cones = name.partition("/")
-    return {"method": method, "at_cones": at_cones} if slash else {"method": method}
 
 
 def _cones_again(base: Flattening) -> Mapping[int, float] | str:
@@ -175,4 +169,4 @@ def _entry_of_peer(name: str, base: Flattening) -> Entry:
 def _warm_up(method: str) -> None:
     """Load what a method needs, so that its time is that of its work."""
     with suppress(ConeflatError):
-        flatten(*SMALL, cones=dict.fromkeys(range(4), np.pi), **_choices(method))
+        flatten(*SMALL, cones=dict.fromkeys(range(4), np.pi), method=method)

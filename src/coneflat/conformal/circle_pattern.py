@@ -9,8 +9,6 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from .._arrays import FloatArray, IntArray
-from ..geometry import corner_angles
-from ..geometry.intrinsic import IntrinsicTriangulation
 from ..mesh import label_components
 from ..solver import Factor, factorize
 from .coherent_angles import CoherentAngles

@@ -84,7 +84,13 @@ def coherent_angles(
 
     least = np.clip(LEAST_PART * angles, LEAST_ANGLE, LARGEST_LEAST)
     problem = _Dual(
-        angles, least, triangulation.twin, np.zeros(count, dtype=bool), equations, right, bool(is_summed.all())
+        angles,
+        least,
+        triangulation.twin,
+        np.zeros(count, dtype=bool),
+        equations,
+        right,
+        bool(is_summed.all()),
     )
     found = descend(problem, np.zeros(len(right)), TOLERANCE, MAX_STEPS)
     steps = found.steps

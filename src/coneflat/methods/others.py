@@ -16,30 +16,31 @@ from .base import FlatMetric
 Method: TypeAlias = Callable[[TriangleMesh, FloatArray, ConeSolution, bool], FlatMetric]
 
 
-def other_method(name: str, at_cones: str = "auto") -> Method:
-    """Return the method of a name; `at_cones` is "free" for those that are to leave the angles of cones free."""
-    cones = "free" if at_cones == "free" else "prescribed"
-    if name == "circle-patterns":
+def other_method(name: str) -> Method:
+    """Return the method of a name."""
+    base, _, variant = name.partition("/")
+    cones = "free" if variant == "free" else "prescribed"
+    if base == "circle-patterns":
         from .circle_patterns import circle_patterns
 
-        return circle_patterns
-    if name == "ricci":
+        return partial(circle_patterns, delaunay=variant != "fixed")
+    if base == "ricci":
         from .ricci import ricci_flow
 
         return ricci_flow
-    if name == "linear-abf":
+    if base == "linear-abf":
         from .angle_based import linear_abf
 
         return partial(linear_abf, cones=cones)
-    if name == "abf++":
+    if base == "abf++":
         from .angle_based import abf_plus_plus
 
         return partial(abf_plus_plus, cones=cones)
-    if name == "lscm":
+    if base == "lscm":
         from .lscm import lscm
 
         return lscm
-    if name == "spectral":
+    if base == "spectral":
         from .spectral import spectral
 
         return spectral
