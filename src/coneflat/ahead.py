@@ -31,6 +31,8 @@ def compile_kernels() -> None:
     for mesh in (_tube(closed=True), _tube(closed=False)):
         flatten(*mesh)
         flatten(*mesh, cones="greedy", refine=True)
+    for method in ("ricci", "circle-patterns"):
+        flatten(*_tube(closed=True), method=method)
     flatten(*_tube(closed=True), quantum=np.pi / 2)
     visible_share(*_tube(closed=True))
     flatten(*_tube(closed=False), boundary="disk", best_effort=True)

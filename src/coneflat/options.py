@@ -19,7 +19,12 @@ METHODS = ("exact", "linear", "circle-patterns", "ricci", "linear-abf", "abf++",
 #: Of some of them: circle patterns without flips, and angle based flattening that prescribes nothing at cones.
 VARIANTS = ("circle-patterns/fixed", "linear-abf/free", "abf++/free")
 # Those that solve what need not converge.
+#: Of some of them: circle patterns without flips, and angle based flattening that prescribes nothing at cones.
+VARIANTS = ("circle-patterns/fixed", "linear-abf/free", "abf++/free")
+# Those that solve what need not converge.
 ITERATIVE = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci", "abf++", "abf++/free")
+# Those whose metric lives on flipped triangles and is unfolded on the mesh's own.
+UNFOLDED = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci")
 LENGTH_RULES = ("integral", "mean")
 AT_CONES = ("auto", "scale", "curvature")
 SOLVERS = ("auto", "pardiso", "scikit-sparse", "cholespy", "scipy", "amg")

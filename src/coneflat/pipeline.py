@@ -25,7 +25,7 @@ from .methods import ExactChoices, FlatMetric, LaidOut, exact_flattening, linear
 from .methods.exact import ExactFlatMetric
 from .methods.handles import corrected_flattening
 from .methods.others import other_method
-from .options import Boundary, Cones, Options
+from .options import UNFOLDED, Boundary, Cones, Options
 from .prepare import Component, Prepared, prepare
 from .result import Flattening
 from .rotations import measure_rotations
@@ -225,14 +225,14 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     for _ in range(SEARCHES):
         laid_out = _flatten_once(part, options, stages)
         unheld = unheld_cones(laid_out)
-        if not len(unheld) or not pursues(part.mesh, options) or options.method != "exact":
+        if not len(unheld) or not pursues(part.mesh, options) or options.method not in UNFOLDED:
             break
         part = replace(part, wishes=part.wishes.without(unheld))
     if options.charts == "atlas":
         with stages("atlas", 1.0):
             laid_out = without_overlaps(laid_out, part, options)
     notes = _missed_distortion(laid_out, part, options)
-    if options.method == "exact":
+    if options.method in UNFOLDED:
         notes += shortfalls(laid_out, part.wishes.names)
     return replace(laid_out, notes=laid_out.notes + notes)
 

@@ -16,7 +16,7 @@ from .descent import descend
 from .hessian_kernel import Int32Array
 
 # Largest error of the angles around the centre of a circle, radians, and steps of Newton's method at most.
-TOLERANCE, MAX_STEPS = 1e-10, 200
+TOLERANCE, MAX_STEPS = 1e-10, 50
 # Change of an angle, radians, at which to go over from angles to radii; steps until there, and part of the way to the
 # bounds of angles that a step goes at most.
 SETTLED, MOST_STEPS, PART = 1e-5, 60, 0.9
@@ -51,8 +51,8 @@ def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
         coherent: angles.
 
     Notes:
-        L. Kharevych, B. Springborn, P. Schroeder, "Discrete conformal mappings via circle patterns", 2006,
-        Section 2. Circles that are one have one radius, and their triangles are one face.
+        L. Kharevych, B. Springborn, P. Schroeder, "Discrete conformal mappings via circle patterns", ACM Transactions
+        on Graphics 25(2), 2006. Circles that are one have one radius, and their triangles are one face.
     """
     problem = RadiiProblem(twin, coherent)
     problem.base, steps = widest_pattern(problem)
@@ -76,7 +76,11 @@ class RadiiProblem:
 
         phi = atan2(sin theta, exp(rho_k - rho_l) - cos theta)
 
-    and sum phi - pi is minus the gradient of a convex energy (the paper's Eq. 5, halved).
+    and sum phi - pi is minus the gradient of half the paper's convex energy, the sum over inner edges of
+
+        Im Li2(exp(x + i theta)) + Im Li2(exp(-x + i theta)) - (pi - theta) (rho_k + rho_l),  x = rho_k - rho_l
+
+    over the boundary of - 2 (pi - theta) rho_k, and over circles of 2 pi rho_k.
 
     Attributes:
         twin: (3m,) half-edges.
@@ -139,7 +143,7 @@ class RadiiProblem:
         """Return by how much half angles (3m,) around each centre exceed pi."""
         excess = half.reshape(-1, 3).sum(axis=1) - np.pi
         # Over an edge inside of a circle, the angles from both sides sum to pi, which makes one face of two.
-        around: FloatArray = np.bincount(self.circle, excess)
+        around: FloatArray = np.bincount(self.circle, excess).astype(np.float64)
         return around - around.mean()  # 0 but for rounding
 
     def downhill(self, place: FloatArray) -> FloatArray:
@@ -166,9 +170,8 @@ class RadiiProblem:
         values = np.bincount(entries, np.concatenate([diagonal, across]), len(rows))
         matrix = csc_matrix((values, rows, starts), shape=(count, count))
         self._factor = factorize(matrix, self._factor)
-        step = self._factor.solve(np.where(np.arange(count) == 0, 0.0, residual))
-        centred: FloatArray = step - step.mean()
-        return centred
+        solution: FloatArray = self._factor.solve(np.where(np.arange(count) == 0, 0.0, residual))
+        return solution - solution.mean()
 
 
 def widest_pattern(problem: RadiiProblem) -> tuple[FloatArray, int]:
@@ -182,7 +185,9 @@ def widest_pattern(problem: RadiiProblem) -> tuple[FloatArray, int]:
     slots, own, other, half_theta = problem.sides
     half = problem.coherent.angles.copy()
     radii = np.zeros(problem.count)
-    for steps in range(1, MOST_STEPS + 1):
+    steps = 0
+    while steps < MOST_STEPS:
+        steps += 1
         one, two = half[slots], half[problem.twin[slots]]
         wanted = np.log(np.sin(two) / np.sin(one))
         weight = np.sin(one) * np.sin(two) / np.sin(2 * half_theta)

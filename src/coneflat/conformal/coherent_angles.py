@@ -55,7 +55,7 @@ def coherent_angles(
     """Return the angles nearest to given ones, in the sum of squares, that belong to a flat circle pattern.
 
     They are positive, sum to pi in triangles and to what is wanted at vertices, and the two opposite an edge sum
-    to pi at most (Section 3 of the paper; angles at a boundary are free).
+    to pi at most: the paper's quadratic program. Angles at a boundary are free.
 
     Args:
         triangulation: connected.
@@ -101,7 +101,8 @@ def coherent_angles(
         problem.is_inside = problem.is_inside | near
         found = descend(problem, found.place, TOLERANCE, MAX_STEPS)
         steps += found.steps
-    return CoherentAngles(problem.project(found.place)[0], problem.is_inside, found.largest, steps)
+    is_inside = problem.is_inside | problem.nearly_one_circle(found.place)
+    return CoherentAngles(problem.project(found.place)[0], is_inside, found.largest, steps)
 
 
 @dataclass(eq=False)

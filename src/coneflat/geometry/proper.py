@@ -36,9 +36,8 @@ def make_proper(triangulation: IntrinsicTriangulation, wanted: IntArray) -> IntA
         h = int(slots[np.argmax(room)])
         twin, tail, length = triangulation.twin, triangulation.tail, triangulation.length
         one, two = _around(h), _around(int(twin[h]))
-        diagonal = euclidean_diagonal(
-            length[h], length[one[1]], length[one[0]], length[two[0]], length[two[1]]
-        )
+        sides = (h, one[1], one[0], two[0], two[1])
+        diagonal = euclidean_diagonal(*(float(length[side]) for side in sides))
         relink(twin, tail, length, h, diagonal)
         flipped.append(h)
 
@@ -50,7 +49,7 @@ def _around(slots: int | IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _candidates(triangulation: IntrinsicTriangulation, wanted: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return the half-edges that should and can be flipped without making worse what is to be mended, and their room."""
+    """Return the half-edges that should be flipped, and can without harm, and their room."""
     twin, tail, count = triangulation.twin, triangulation.tail, triangulation.vertex_count
     every = np.arange(len(twin))
     after, before = _around(every)
