@@ -37,6 +37,7 @@ from coneflat.methods.ricci import ricci_flow
 
 # Vertices of the icosahedron that the sphere is split from, and curvatures that sum to 4 pi.
 CONES = np.array([0, 2, 3, 5, 7, 8, 10])
+COLORS = "#0072b2", "#d55e00", "#009e73"  # told apart without red or green
 CURVATURES = np.array([1.0, 0.75, 0.5, 0.75, 0.5, 1.0, -0.5]) * np.pi
 METHODS = ("CP", "RF", "CF")
 PAIRS = tuple(combinations(range(3), 2))
@@ -99,10 +100,12 @@ def plot(rows: list[tuple[int, float, np.ndarray]], path: Path) -> None:
     figure, axes = plt.subplots(figsize=(6, 4.5))
     for k, (one, two) in enumerate(PAIRS):
         name = f"{METHODS[one]} and {METHODS[two]}"
-        axes.loglog(size, values[:, k, 0], "o-", color=f"C{k}", label=f"{name}, mean")
-        axes.loglog(size, values[:, k, 1], "s--", color=f"C{k}", label=f"{name}, largest off cones")
+        axes.loglog(size, values[:, k, 0], "o-", color=COLORS[k], label=f"{name}, mean")
+        axes.loglog(size, values[:, k, 1], "s--", color=COLORS[k], label=f"{name}, largest off cones")
     guide = values[:, :, 0].min() / 2 * (size / size.min()) ** 2
     axes.loglog(size, guide, color="0.6", label="second order")
+    axes.set_xticks(size, [f"{edge:.3f}" for edge in size])
+    axes.set_xticks([], minor=True)
     axes.set_xlabel("mean edge length")
     axes.set_ylabel("difference of log flat length")
     axes.legend(fontsize=8, frameon=False)
