@@ -30,13 +30,18 @@ class PackingProblem(ConformalProblem):
     radii: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def prepare(self, delaunay: bool) -> int:
-        """Flip the input to Delaunay, if so wanted, and put circles on it; return the number of flips."""
+        """Put circles on the input, made Delaunay and then weighted Delaunay, if so wanted; return the number of flips.
+
+        Neither changes the surface, and circles in the triangles around their centres do not overlap whatever
+        the triangles.
+        """
         flips = super().prepare(delaunay)
         self.radii = packed_radii(self.triangulation.length.reshape(-1, 3), self.triangulation.faces)
+        if delaunay:
+            self.records.append(make_delaunay(self.triangulation, radii=self.radii))
+            flips += len(self.records[-1])
         one, two = self._ends(self.radii)
-        length = self.triangulation.length
-        # (l^2 - g_i^2 - g_j^2) / (2 g_i g_j) from the gap between the circles, which keeps its digits, is 1 and more.
-        gap, both = np.maximum(length - (one + two), 0), length + (one + two)
+        gap, both = self.triangulation.length - (one + two), self.triangulation.length + (one + two)
         self.triangulation.length = 1 + gap * both / (2 * (one * two))
         return flips
 
@@ -56,7 +61,9 @@ class PackingProblem(ConformalProblem):
 
     def flip(self, log_scale: FloatArray) -> IntArray:
         """Flip to weighted Delaunay for the radii; return the half-edges flipped."""
-        return make_delaunay(self.triangulation, radii=self.radii * np.exp(centred(log_scale)))
+        return make_delaunay(
+            self.triangulation, radii=self.radii * np.exp(centred(log_scale)), has_lengths=False
+        )
 
     def _ends(self, radii: FloatArray) -> tuple[FloatArray, FloatArray]:
         tail = self.triangulation.tail

@@ -17,6 +17,7 @@ def make_delaunay(
     triangulation: IntrinsicTriangulation,
     log_scale: FloatArray | None = None,
     radii: FloatArray | None = None,
+    has_lengths: bool = True,
 ) -> IntArray:
     """Flip a triangulation, in place, until it is Delaunay; return the half-edges flipped, in order.
 
@@ -25,17 +26,18 @@ def make_delaunay(
         log_scale: None for the triangulation's own metric and Euclidean flips. With (n,) log scale factors
             phi, the metric l_ij exp((phi_i + phi_j) / 2) is made Delaunay by Ptolemy flips of the lengths l,
             which keep the discrete conformal class (Springborn 2019; Gillespie, Springborn, Crane 2021).
-        radii: (n,) of circles at the vertices, where the triangulation has their inversive distances for lengths:
-            it is made weighted Delaunay, by flips that keep these (Bobenko, Lutz 2023).
+        radii: (n,) of circles at the vertices, to make the triangulation weighted Delaunay for.
+        has_lengths: False if the triangulation has the circles' inversive distances for lengths: flips then keep these
+            (Bobenko, Lutz 2023).
 
     Notes:
         Where nothing fails the condition the cost is one pass over the edges. The condition is meaningful
         also where scaled lengths break the triangle inequality.
     """
-    from .flip_kernel import EUCLIDEAN, PACKED, SCALED, find_violations, flip_until_delaunay
+    from .flip_kernel import EUCLIDEAN, PACKED, SCALED, WEIGHTED, find_violations, flip_until_delaunay
 
     if radii is not None:
-        kind, scale = PACKED, radii
+        kind, scale = WEIGHTED if has_lengths else PACKED, radii
     elif log_scale is None:
         kind, scale = EUCLIDEAN, np.ones(triangulation.vertex_count)
     else:

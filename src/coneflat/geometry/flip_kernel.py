@@ -16,8 +16,9 @@ from .._arrays import BoolArray, FloatArray, IntArray
 from .compiled import compiled
 from .packing_kernel import other_inversive_distance, tilts
 
-# What lengths are: those of the metric to be made Delaunay, those before scaling, inversive distances of circles.
-EUCLIDEAN, SCALED, PACKED = 0, 1, 2
+# What the lengths are: those of the metric that is to be Delaunay; those before scaling; those of the metric that is
+# to be weighted Delaunay; inversive distances of circles.
+EUCLIDEAN, SCALED, WEIGHTED, PACKED = 0, 1, 2, 3
 # Rounding of a slack relative to the perimeter: a few ulps of lengths that are products of three factors,
 # with a wide margin, since an edge flipped for the sake of rounding could be flipped back and forth forever.
 NOISE = 1e-14
@@ -58,9 +59,9 @@ def is_flippable(
     t = twin[h]
     if t < 0 or t // 3 == h // 3:
         return False
-    if kind == PACKED:
-        tilt, size = tilts(tail, length, scale, h)
-        tilt2, size2 = tilts(tail, length, scale, t)
+    if kind >= WEIGHTED:
+        tilt, size = tilts(tail, length, scale, kind == WEIGHTED, h)
+        tilt2, size2 = tilts(tail, length, scale, kind == WEIGHTED, t)
         return tilt + tilt2 < -NOISE * (size + size2)
     x, y, dx, dy = incircle_terms(tail, length, scale, h)
     x2, y2, dx2, dy2 = incircle_terms(tail, length, scale, t)
@@ -160,7 +161,7 @@ def flip_until_delaunay(
         h2 = h - h % 3 + (h + 2) % 3
         t1 = t - t % 3 + (t + 1) % 3
         t2 = t - t % 3 + (t + 2) % 3
-        if kind == EUCLIDEAN:
+        if kind in (EUCLIDEAN, WEIGHTED):
             diagonal = euclidean_diagonal(length[h], length[h2], length[h1], length[t1], length[t2])
         elif kind == PACKED:
             diagonal = other_inversive_distance(length[h], length[h2], length[h1], length[t1], length[t2])

@@ -22,17 +22,34 @@ def spread(edge: float, one: float, two: float) -> float:
 
 
 @compiled
-def tilts(tail: IntArray, inversive: FloatArray, radius: FloatArray, h: int) -> tuple[float, float]:
+def inversive_distance(length: float, one: float, two: float) -> float:
+    """Return the inversive distance of two circles with radii one and two, their centres so far from each other."""
+    # 1 and a term with the gap between the circles, which keeps its digits.
+    return 1 + (length - (one + two)) * (length + (one + two)) / (2 * (one * two))
+
+
+@compiled
+def tilts(
+    tail: IntArray, sides: FloatArray, radius: FloatArray, are_lengths: bool, h: int
+) -> tuple[float, float]:
     """Return the slope of the triangle of h along its side h, and a bound of the terms that it is made of.
 
     An edge is weighted Delaunay if the slopes from both sides do not sum to a negative number. Where the triangle
     exists, its radical centre is at a height over the side with the sign of the slope.
+
+    sides: (3m,) inversive distances, or lengths.
     """
     base = h - h % 3
     h1 = base + (h + 1) % 3
     h2 = base + (h + 2) % 3
     gi, gj, gk = radius[tail[h]], radius[tail[h1]], radius[tail[h2]]
-    c, jk, ik = inversive[h], inversive[h1], inversive[h2]
+    c, jk, ik = sides[h], sides[h1], sides[h2]
+    if are_lengths:
+        c, jk, ik = (
+            inversive_distance(c, gi, gj),
+            inversive_distance(jk, gj, gk),
+            inversive_distance(ik, gi, gk),
+        )
     up = gk * ((gj + c * gi) * ik + (gi + c * gj) * jk)
     down = gi * gj * (c * c - 1)
     length = math.sqrt(gi * gi + gj * gj + 2 * c * gi * gj)
