@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
-from importlib.util import find_spec
+from collections.abc import Iterator
 
 import numpy as np
 from common import MODELS, shapes
 
-from coneflat import check_mesh, flatten, read_mesh
-from coneflat.distortion import Distortion, measure
+from coneflat import Flattening, check_mesh, flatten, read_mesh
+from coneflat.compare.peers import installed_peers, run_peer
+from coneflat.distortion import Distortion
 from coneflat.errors import ConeflatError
 from coneflat.mesh import TriangleMesh
-
-Method = Callable[[TriangleMesh], tuple[np.ndarray, float | None]]
 
 
 def main() -> None:
@@ -29,11 +27,6 @@ def main() -> None:
     parser.add_argument("--more", type=float, default=0.05, help="distortion allowed with more cones")
     parser.add_argument("--largest", type=int, default=120_000, help="triangles")
     arguments = parser.parse_args()
-    methods: dict[str, Method] = {
-        "coneflat": lambda mesh: ours(mesh),
-        f"coneflat, distortion {arguments.more:g}": lambda mesh: ours(mesh, distortion=arguments.more),
-    }
-    methods |= {name: call for name, call in (("xatlas", xatlas), ("uvunwrap", uvunwrap)) if find_spec(name)}
     print(
         "| model | triangles | method | charts | seam length | QC | area std | flipped | overlaps | packed | s |"
     )
@@ -41,12 +34,8 @@ def main() -> None:
     flatten(*shapes.sphere(2), charts="atlas")
     sums: dict[str, list[tuple[float, ...]]] = {}
     for name, mesh in models([word for word in arguments.models.split(",") if word], arguments.largest):
-        for method, call in methods.items():
-            start = time.perf_counter()
-            corner_uv, packed = call(mesh)
-            seconds = time.perf_counter() - start
-            found = measure(mesh, corner_uv)
-            packed = area_covered(corner_uv) if packed is None else packed
+        for method, result, seconds in flattened(mesh, arguments.more):
+            found, packed = result.distortion, result.packing_efficiency
             sums.setdefault(method, []).append(
                 (found.charts, found.seam_length, found.qc_mean, found.area_std, packed)
             )
@@ -80,35 +69,16 @@ def row(name: str, mesh: TriangleMesh, method: str, found: Distortion, packed: f
     )
 
 
-def area_covered(corner_uv: np.ndarray) -> float:
-    """Return the part of the unit square that triangles cover, overlaps counted as often as they are covered."""
-    one, two = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
-    return float(np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum() / 2)
-
-
-def ours(mesh: TriangleMesh, **options: float) -> tuple[np.ndarray, None]:
-    return flatten(mesh.vertices, mesh.faces, charts="atlas", **options).corner_uv, None
-
-
-def xatlas(mesh: TriangleMesh) -> tuple[np.ndarray, None]:
-    """At a size at which its absolute tolerances do not matter: an area of 10,000."""
-    import xatlas
-
-    corners = mesh.vertices[mesh.faces]
-    area = (
-        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
-        / 2
-    )
-    _, faces, uv = xatlas.parametrize(mesh.vertices * (100 / np.sqrt(area)), mesh.faces)
-    return np.asarray(uv, dtype=np.float64)[faces], None
-
-
-def uvunwrap(mesh: TriangleMesh) -> tuple[np.ndarray, float]:
-    import uvunwrap
-
-    atlas = uvunwrap.generate([uvunwrap.Mesh(mesh.vertices.ravel().tolist(), mesh.faces.ravel().tolist())])
-    uv = np.array(atlas.meshes[0].corner_uvs, dtype=np.float64).reshape(-1, 3, 2)
-    return uv, float(atlas.utilization)
+def flattened(mesh: TriangleMesh, more: float) -> Iterator[tuple[str, Flattening, float]]:
+    """Yield what each method makes of a mesh, and the seconds it takes."""
+    for method, options in (("coneflat", {}), (f"coneflat, distortion {more:g}", {"distortion": more})):
+        start = time.perf_counter()
+        ours = flatten(mesh.vertices, mesh.faces, charts="atlas", **options)
+        yield method, ours, time.perf_counter() - start
+    for name in ("xatlas", "uvunwrap"):
+        if name in installed_peers():
+            theirs = run_peer(name, ours)
+            yield name, theirs.flattening, theirs.seconds
 
 
 if __name__ == "__main__":

@@ -14,14 +14,13 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from importlib.util import find_spec
 
 import numpy as np
 from common import best_time, cases, model, peak_memory, shapes
 from scipy.sparse import csc_matrix
 
 from coneflat import Flattening, cotangent_laplacian, cotangents, edge_lengths, flatten
+from coneflat.compare.peers import PEERS, installed_peers
 from coneflat.solver import factorize, solving
 from coneflat.solver.ladder import best_for
 
@@ -81,34 +80,13 @@ def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
         "total": min(times),
         "stages": best.seconds,
         "memory": peak_memory(),
-        "peers": peers(vertices, faces, best) if len(faces) <= largest_of_peers else {},
+        "peers": peers(best) if len(faces) <= largest_of_peers else {},
     }
 
 
-def peers(vertices: np.ndarray, faces: np.ndarray, result: Flattening) -> dict[str, float]:
+def peers(best: Flattening) -> dict[str, float]:
     """Return the seconds that others take for the same mesh, of those that are installed."""
-    calls: dict[str, tuple[str, Callable[[], object]]] = {
-        "libigl LSCM": ("igl", lambda: lscm(vertices, result)),
-        "xatlas": ("xatlas", lambda: __import__("xatlas").parametrize(vertices, faces)),
-        "uvunwrap": ("uvunwrap", lambda: uvunwrap(vertices, faces)),
-    }
-    return {name: best_time(call, 1) for name, (module, call) in calls.items() if find_spec(module)}
-
-
-def lscm(vertices: np.ndarray, result: Flattening) -> object:
-    """Flatten our cut mesh; two far points are pinned."""
-    import igl
-
-    points = np.empty((len(result.uv), 3))
-    points[result.uv_faces] = vertices[result.faces]
-    pins = np.array([0, int(np.argmax(((points - points[0]) ** 2).sum(axis=1)))])
-    return igl.lscm(points, result.uv_faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
-
-
-def uvunwrap(vertices: np.ndarray, faces: np.ndarray) -> object:
-    import uvunwrap
-
-    return uvunwrap.generate([uvunwrap.Mesh(vertices.ravel().tolist(), faces.ravel().tolist())])
+    return {name: best_time(lambda name=name: PEERS[name].run(best), 1) for name in installed_peers()}
 
 
 def line(row: dict) -> str:
