@@ -2,6 +2,8 @@
 
 import csv
 import io
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from coneflat.compare.paper import METHODS as PAPER_METHODS
 from coneflat.compare.peers import PEERS, installed_peers, with_uv
 from coneflat.compare.published import MODELS, model_of
 from coneflat.compare.table import COLUMNS, comparison_csv, comparison_markdown
+from coneflat.methods.others import other_method
 from coneflat.options import METHODS, VARIANTS
 
 
@@ -177,10 +180,15 @@ def test_a_folder_that_cannot_be_made(tmp_path, ball):
 
 
 def test_every_list_of_methods_is_the_same():
-    from coneflat.cli.method import METHODS as listed
+    from coneflat.cli import method
 
-    assert set(listed) == {*METHODS, *VARIANTS}
-    assert len(listed) == len(METHODS + VARIANTS)
+    assert (method.METHODS, method.VARIANTS) == (METHODS, VARIANTS)
+    others = [other_method(name) for name in (METHODS + VARIANTS)[2:]]
+    assert len({(one.func, str(one.keywords)) if isinstance(one, partial) else one for one in others}) == 10
+    with pytest.raises(errors.OptionError, match="unknown method 'magic'"):
+        other_method("magic")
+    page = (Path(__file__).parents[1] / "docs" / "methods.md").read_text(encoding="utf-8")
+    assert all(f"`{name}`" in page for name in METHODS + VARIANTS)
 
 
 def test_names_of_files_are_kept(tmp_path, ball):

@@ -138,10 +138,11 @@ class TestPipeline:
     def test_says_that_it_cut(self, method, name):
         closed = flatten(*shapes.sphere(2), method=method)
         note = closed.notes[-1]
-        assert f"cut open first, along {len(closed.seams)} edges" in note
+        assert "cut open first" in note
         assert name in note
         assert "prescribes no cones" in note
         assert not flatten(*shapes.hill(), cones="none", method=method).notes
+        assert flatten(*shapes.join(shapes.sphere(1), shapes.sphere(2)), method=method).notes == (note,)
 
     @pytest.mark.parametrize("method", ["lscm", "spectral", "bff"])
     def test_nothing_to_cut_through(self, method):

@@ -88,7 +88,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         ),
         distortion=distortion,
         seconds=dict(stages.seconds),
-        notes=(*checked.notes, *prepared.notes, *(note for one in laid_out for note in one.notes), *lost),
+        notes=(*checked.notes, *prepared.notes, *_distinct_notes(laid_out), *lost),
         settings=options.as_dict(),
         solve=SolveFigures.of_all([one.figures for one in laid_out], [one.area for one in laid_out]),
         rotations=Rotations.of_all(one.rotations for one in laid_out),
@@ -97,6 +97,11 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         face_corners=face_corners,
         source=given.source,
     )
+
+
+def _distinct_notes(laid_out: Sequence[LaidOut]) -> tuple[str, ...]:
+    """Return the notes on all components, each once."""
+    return tuple(dict.fromkeys(note for one in laid_out for note in one.notes))
 
 
 def _all_charts(laid_out: Sequence[LaidOut]) -> tuple[FloatArray, IntArray, IntArray]:

@@ -19,9 +19,6 @@ METHODS = ("exact", "linear", "circle-patterns", "ricci", "linear-abf", "abf++",
 #: Of some of them: circle patterns without flips, and angle based flattening that prescribes nothing at cones.
 VARIANTS = ("circle-patterns/fixed", "linear-abf/free", "abf++/free")
 # Those that solve what need not converge.
-#: Of some of them: circle patterns without flips, and angle based flattening that prescribes nothing at cones.
-VARIANTS = ("circle-patterns/fixed", "linear-abf/free", "abf++/free")
-# Those that solve what need not converge.
 ITERATIVE = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci", "abf++", "abf++/free")
 # Those whose metric lives on flipped triangles and is unfolded on the mesh's own.
 UNFOLDED = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci")
@@ -119,7 +116,7 @@ class Options:
                     f"method {self.method!r} has a free boundary and no choice at cones: use method 'exact'"
                 )
             if self.best_effort and self.method not in ITERATIVE:
-                raise OptionError(f"method {self.method!r} does not iterate: there is no best effort")
+                raise OptionError(f"method {self.method!r} has no unfinished result to give: no best effort")
             if self.refine:
                 raise OptionError(
                     f"method {self.method!r} has no common subdivision to refine to: use method 'exact'"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 import hashlib
 import json
 import os
@@ -13,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import OptionError
-
-READABLE = (".obj", ".ply", ".stl", ".off", ".gltf", ".glb")
+from ..io.find import find_meshes
 
 
 @dataclass(frozen=True)
@@ -52,10 +50,11 @@ def find_jobs(
 
     Raises:
         OptionError: a pattern matches nothing, or a result would overwrite a mesh.
+        MeshFileError: a folder cannot be read.
     """
     found: dict[str, None] = {}
     for pattern in patterns:
-        for path in _matches(pattern):
+        for path in find_meshes(pattern):
             found[os.path.realpath(path)] = None
     meshes = sorted(found)
     jobs = [
@@ -66,20 +65,6 @@ def find_jobs(
         if os.path.realpath(job.output) in found:
             raise OptionError(f"the result of {job.mesh} would overwrite {job.output}: choose another folder")
     return jobs
-
-
-def _matches(pattern: str) -> list[str]:
-    if os.path.isdir(pattern):
-        every = sorted(os.path.join(pattern, name) for name in os.listdir(pattern))
-        matches = [path for path in every if path.lower().endswith(READABLE)]
-    elif os.path.exists(pattern):
-        matches = [pattern]
-    else:
-        every = sorted(glob.glob(pattern, recursive=True))
-        matches = [path for path in every if os.path.isfile(path) and path.lower().endswith(READABLE)]
-    if not matches:
-        raise OptionError(f"{pattern!r} matches no mesh ({', '.join(READABLE)})")
-    return matches
 
 
 def _names(meshes: list[str], ending: str) -> list[str]:

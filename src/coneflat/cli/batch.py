@@ -77,7 +77,7 @@ def batch(
       coneflat batch models --out flat --dask tcp://10.0.0.1:8786
     """
     from ..batch import find_jobs, run_batch
-    from ..errors import MeshFileError
+    from ..io.atomic import make_folder
     from ..options import Options
     from .console import Console
 
@@ -89,10 +89,7 @@ def batch(
         raise click.UsageError("a file of --weights fits one mesh: name a property, or color", context)
     Options(**options)  # Says what makes no sense before the work.
     todo = find_jobs(patterns, out.absolute(), f".{ending}", options, weld)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise MeshFileError(f"{out} cannot be made: {error.strerror}") from error
+    make_folder(out)
     rows = []
     with Console(talk) as console:
 

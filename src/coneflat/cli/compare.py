@@ -15,6 +15,9 @@ from .talk import talk_options
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+#: What `compare` writes.
+COMPARED = ("compare.md", "compare.csv", "layouts.png", "quality.png")
+
 _SIGHT = (
     click.option(
         "--eye",
@@ -51,7 +54,7 @@ def _sight(command: Command) -> Command:
 @click.option(
     "--methods",
     metavar="NAMES",
-    help="Methods to compare, with commas: names that flatten --method takes.  [default: all]",
+    help="Methods to compare, with commas: names that flatten --method takes.  [default: all without a /]",
 )
 @click.option("--no-peers", is_flag=True, help="Leave out other packages (libigl, xatlas, uvunwrap).")
 @click.option("--paper", is_flag=True, help="The cones of the published method (greedy, epsilon 1).")
@@ -84,6 +87,7 @@ def compare(
     """
     from ..compare.run import compare_methods
     from ..compare.table import comparison_csv, comparison_markdown
+    from ..errors import MetricError
     from ..io import read_mesh
     from ..options import METHODS, PAPER
     from .console import Console
@@ -97,13 +101,14 @@ def compare(
     chosen = METHODS if methods is None else tuple(name.strip() for name in methods.split(","))
     if output is not None:
         from ..compare.pictures import Sight, draw_layouts, draw_qualities
-        from ..compare.write import check_folder, write_folder
+        from ..compare.write import open_folder, write_folder
 
-        check_folder(output)
         sight = Sight(eye, up)
     with Console(talk) as console:
         with console.stage("read", 0.0):
             source = read_mesh(mesh)
+        if output is not None:
+            open_folder(output, COMPARED)
         with console.stage("compare", READ):
             found = compare_methods(
                 source,
@@ -112,12 +117,15 @@ def compare(
                 progress=console.part(READ, FLATTENED),
                 **options,
             )
+        if not found.drawn:
+            why = "; ".join(f"{entry.method}: {entry.note}" for entry in found.entries)
+            raise MetricError(f"no method came to a layout: {why}")
         written: list[Path] = []
         if output is not None:
             with console.stage("draw", FLATTENED):
-                texts = {"compare.md": comparison_markdown(found), "compare.csv": comparison_csv(found)}
-                pictures = {"layouts.png": draw_layouts(found), "quality.png": draw_qualities(found, sight)}
-                written = write_folder(output, texts, pictures)
+                texts = comparison_markdown(found), comparison_csv(found)
+                pictures = draw_layouts(found), draw_qualities(found, sight)
+                written = write_folder(output, dict(zip(COMPARED, (*texts, *pictures), strict=True)))
         console.say(comparison_lines(found))
         console.finish(written)
 
@@ -135,7 +143,7 @@ def compare(
 @_sight
 @talk_options
 def paper(meshes: tuple[Path, ...], output: Path, eye: Any, up: str, talk: str | None) -> None:
-    """Run the experiments of the paper (Section 5) on MESHES, files or folders, with its numbers beside ours.
+    """Run the experiments of the paper (Section 5) on MESHES, files or folders, its numbers beside ours.
 
     Models are known by their names: fandisk, rocker-arm, foot, gargoyle, elephant, horse, hand, torso, isi-horse.
 
@@ -145,17 +153,20 @@ def paper(meshes: tuple[Path, ...], output: Path, eye: Any, up: str, talk: str |
       coneflat paper models
     """
     from ..compare import reproduce
+    from ..compare.paper import FILES
     from ..compare.pictures import Sight
-    from ..compare.write import check_folder, write_folder
+    from ..compare.write import open_folder, write_folder
+    from ..io.find import find_meshes
     from .console import Console
     from .run import FLATTENED
 
-    check_folder(output)
+    for mesh in meshes:
+        find_meshes(str(mesh))
+    open_folder(output, FILES)
     with Console(talk) as console:
         with console.stage("compare", 0.0):
             found = reproduce(meshes, progress=console.part(0.0, FLATTENED))
         with console.stage("draw", FLATTENED):
-            texts = {"paper.md": found.markdown(), **found.csv_files()}
-            written = write_folder(output, texts, found.figures(Sight(eye, up)))
+            written = write_folder(output, {**found.texts(), **found.figures(Sight(eye, up))})
         console.say([found.tables().rstrip()])
         console.finish(written)

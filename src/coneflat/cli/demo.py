@@ -23,17 +23,14 @@ DRAWING = 0.95  # The fraction of the whole that is done before.
 @talk_options
 def demo(output: Path, talk: str | None) -> None:
     """Flatten the sample that comes with coneflat; write the textured mesh, its report and a picture."""
-    from ..errors import MeshFileError
+    from ..io.atomic import make_folder
     from ..sample import sample_path
     from ..view import demo_figure, new_figure, save_figure
     from .console import Console
     from .run import flatten_file, save
 
     new_figure(1, 1)  # says what is missing before the work
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise MeshFileError(f"cannot make the folder {output}: {error.strerror}") from error
+    make_folder(output)
     mesh, report, picture = (output / f"sample.{ending}" for ending in ("obj", "json", "png"))
     with Console(talk) as console:
         result = flatten_file(sample_path(), console, {"charts": "atlas"})

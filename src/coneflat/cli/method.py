@@ -16,18 +16,8 @@ QUANTUM_OPTIONS = ("quantise", "correct_handles")
 SEARCH_OPTIONS = ("cones", "epsilon", "max_cones", *PURSUIT_OPTIONS, *QUANTUM_OPTIONS)
 EXACT_OPTIONS = ("at_cones", "boundary", "corner", "refine")
 #: As in `coneflat.options`, which takes a while to load.
-METHODS = (
-    *(
-        "exact",
-        "linear",
-        "circle-patterns",
-        "circle-patterns/fixed",
-        "ricci",
-        "linear-abf",
-        "linear-abf/free",
-    ),
-    *("abf++", "abf++/free", "lscm", "spectral", "bff"),
-)
+METHODS = ("exact", "linear", "circle-patterns", "ricci", "linear-abf", "abf++", "lscm", "spectral", "bff")
+VARIANTS = ("circle-patterns/fixed", "linear-abf/free", "abf++/free")
 # Formats of models to be textured, where nothing may overlap.
 TEXTURED = (".obj", ".glb")
 METHOD_OPTIONS = (*SEARCH_OPTIONS, "cone", "cones_file", "method", "lengths", *EXACT_OPTIONS)
@@ -65,12 +55,12 @@ _AFTER_SEARCH = (
     click.option("--max-cones", type=int, help="Searches stop at this many cones."),
     click.option(
         "--method",
-        type=click.Choice(METHODS),
+        type=click.Choice(METHODS + VARIANTS),
         metavar="METHOD",
         default="exact",
         show_default=True,
         help="exact: no curvature error, no flipped triangle.  linear: the paper's.  For comparison: "
-        f"{', '.join(METHODS[2:])}.",
+        f"{', '.join(METHODS[2:] + VARIANTS)}.",
     ),
     click.option(
         "--at-cones",

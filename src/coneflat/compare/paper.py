@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import ConeflatError
-from ..io import INPUT_FORMATS, read_mesh
+from ..errors import ConeflatError, MeshError
+from ..io import read_mesh
+from ..io.find import find_meshes
 from ..options import PAPER
 from ..stages import Progress
 from ..text import plural
 from .published import MODELS, NAMES, Published, model_of
-from .run import Comparison, compare_methods
+from .run import Comparison, compare_methods, known_methods
 from .table import as_csv, markdown, notes, written
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class Reproduction:
     """The paper's experiments.
 
     Attributes:
-        models: in the paper's order, then others.
+        models: one or more, in the paper's order, then others.
         failed: file and what was wrong with it.
     """
 
@@ -106,7 +107,7 @@ class Reproduction:
 
     def markdown(self) -> str:
         """Return both tables, what is to be known of them, and the figures."""
-        figures = [f"![{title}]({name})\n\n{title}\n" for name, title in FIGURES.items() if self.models]
+        figures = [f"![{title}]({name})\n\n{title}\n" for name, title in FIGURES.items()]
         return "\n".join([self.tables(), *figures])
 
     def tables(self) -> str:
@@ -133,12 +134,10 @@ class Reproduction:
         lines += [notes([replace(model.comparison, name=model.name) for model in self.models])]
         return "\n".join(lines)
 
-    def csv_files(self) -> dict[str, str]:
-        """Return the tables as comma separated values, by file name."""
-        return {
-            "table1.csv": as_csv(_distinct(TABLE_1), self.table_1()),
-            "table2.csv": as_csv(_distinct(TABLE_2), self.table_2()),
-        }
+    def texts(self) -> dict[str, str]:
+        """Return the tables as Markdown, and as comma separated values, by file name."""
+        one, two = as_csv(_distinct(TABLE_1), self.table_1()), as_csv(_distinct(TABLE_2), self.table_2())
+        return dict(zip(TEXTS, (self.markdown(), one, two), strict=True))
 
     def figures(self, sight: Sight) -> dict[str, Figure]:
         """Return the paper's figures, by file name."""
@@ -153,8 +152,6 @@ class Reproduction:
             texture_panel,
         )
 
-        if not self.models:
-            return {}
         cones = [cone_panel(m.linear, sight, f"{m.name}: {_cones(m.linear)}") for m in self.models]
         quality, layouts, textures = [], [], []
         for model in self.models:
@@ -189,6 +186,7 @@ class Reproduction:
         }
 
 
+TEXTS = ("paper.md", "table1.csv", "table2.csv")
 #: File and caption of each figure, numbered as in the paper.
 FIGURES = {
     "figure2.png": "Figure 2: cones, red where their curvature is positive, black where it is negative, and seams",
@@ -196,6 +194,8 @@ FIGURES = {
     "figure4.png": "Figure 4: layouts by each method, with the same cones and cut",
     "figure5.png": "Figure 5: a checkerboard, and the distortion, by the paper's method",
 }
+#: All that is written.
+FILES = (*TEXTS, *FIGURES)
 
 
 def reproduce(
@@ -204,12 +204,16 @@ def reproduce(
     """Run the paper's experiments on mesh files, and on those in folders.
 
     Args:
-        paths: files, or folders of files; those named after the paper's models come first.
+        paths: files, folders of files, or patterns; those named after the paper's models come first.
         methods: to compare; the paper's own, "linear", is among them in any case.
         progress: called with what is done and the fraction done.
+
+    Raises:
+        OptionError: a method is unknown, or a path names no mesh.
+        MeshError: none of the meshes can be flattened.
     """
-    files = sorted({file for path in paths for file in _meshes(path)}, key=_place)
-    methods = methods if "linear" in methods else ("linear", *methods)
+    files = sorted({Path(file) for path in paths for file in find_meshes(str(path))}, key=_place)
+    methods = known_methods(methods if "linear" in methods else ("linear", *methods))
     models, failed = [], []
     for number, file in enumerate(files):
 
@@ -225,13 +229,10 @@ def reproduce(
             continue
         name = model_of(file)
         models.append(Model(name or file.stem, MODELS[name] if name else None, compared))
+    if not models:
+        why = "; ".join(f"{name}: {reason}" for name, reason in failed)
+        raise MeshError(f"no mesh could be flattened: {why}")
     return Reproduction(tuple(models), tuple(failed))
-
-
-def _meshes(path: Path) -> list[Path]:
-    if not path.is_dir():
-        return [path]
-    return [file for file in path.iterdir() if file.suffix.lower() in INPUT_FORMATS]
 
 
 def _place(path: Path) -> tuple[int, str, str]:

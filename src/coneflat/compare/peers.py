@@ -32,21 +32,13 @@ class Peer:
     note: str
 
 
-@dataclass(frozen=True, eq=False)
-class PeerResult:
-    """What a peer made, and how long it took."""
-
-    flattening: Flattening
-    seconds: float
-
-
 def installed_peers() -> tuple[str, ...]:
     """Return the names of the peers that are installed."""
     return tuple(name for name, peer in PEERS.items() if find_spec(peer.module) is not None)
 
 
-def run_peer(name: str, base: Flattening) -> PeerResult:
-    """Return what a peer makes of the mesh of a flattening.
+def run_peer(name: str, base: Flattening) -> tuple[Flattening, float]:
+    """Return what a peer makes of the mesh of a flattening, and how many seconds it takes.
 
     Raises:
         MetricError: it fails, or what it returns is no map of the mesh.
@@ -59,7 +51,7 @@ def run_peer(name: str, base: Flattening) -> PeerResult:
     seconds = time.perf_counter() - start
     if corner_uv.shape != (len(base.faces), 3, 2) or not np.isfinite(corner_uv).all():
         raise MetricError(f"{name} returned no map of the mesh's {len(base.faces):,} triangles")
-    return PeerResult(with_uv(base, corner_uv), seconds)
+    return with_uv(base, corner_uv), seconds
 
 
 def with_uv(base: Flattening, corner_uv: FloatArray) -> Flattening:

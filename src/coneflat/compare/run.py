@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,14 @@ SHARED = (
     "creases",
     "hide_seams",
     "seam_weights",
+    "charts",
+    "resolution",
+    "padding",
+    "tiles",
+    "up",
 )
+# Those of them that name vertices of the input.
+NAMING = ("seams", "forbidden_seams", "seam_weights")
 # The stages that lead from cones and cut to a layout.
 TIMED = ("metric", "layout")
 # A mesh on which every method has its code loaded before the clock starts: a tetrahedron and its corners.
@@ -75,7 +83,7 @@ class Comparison:
 
     def __getitem__(self, method: str) -> Entry:
         """Return the entry of a method."""
-        return next(entry for entry in self.entries if entry.method == method)
+        return {entry.method: entry for entry in self.entries}[method]
 
 
 def compare_methods(
@@ -101,10 +109,8 @@ def compare_methods(
         OptionError: a method or peer is unknown or not installed.
         MeshError: the mesh cannot be flattened, or cones not be found.
     """
-    for name in methods:
-        if name not in METHODS + VARIANTS:
-            raise OptionError(f"unknown method {name!r}: choose from {', '.join(METHODS + VARIANTS)}")
-    chosen = installed_peers() if peers is None else tuple(peers)
+    methods = known_methods(methods)
+    chosen = installed_peers() if peers is None else tuple(dict.fromkeys(peers))
     for name in chosen:
         if name not in installed_peers():
             raise OptionError(
@@ -121,8 +127,14 @@ def compare_methods(
     tell("cones", 0)
     _warm_up(options.get("method", "exact"))
     base = flatten(mesh, faces, **options)
-    cones = _cones_again(base)
+    cones = dict(zip(base.cones.tolist(), base.curvatures.tolist(), strict=True)) or "none"
+    same, same_faces = _with_cones(mesh, faces, base)
     shared = {name: value for name, value in options.items() if name in SHARED}
+    if same is not mesh and any(name in shared for name in NAMING):
+        raise OptionError(
+            "a cone lies where the repair split a vertex, so that the input's numbers do not tell which edges are "
+            f"meant: leave out {', '.join(name for name in NAMING if name in shared)}"
+        )
     entries = []
     for done, name in enumerate(names, 1):
         tell(name, done)
@@ -133,21 +145,37 @@ def compare_methods(
         else:
             _warm_up(name)
             try:
-                result = flatten(mesh, faces, method=name, cones=cones, **shared)
+                result = flatten(same, same_faces, method=name, cones=cones, **shared)
             except ConeflatError as error:
-                entries.append(Entry(name, None, float("nan"), " ".join(str(error).split())))
+                entries.append(_entry_of_failure(name, error))
             else:
                 entries.append(_entry(name, result, base))
-    named = mesh.path if isinstance(mesh, MeshFile) else mesh if isinstance(mesh, str) else None
+    named = mesh.path if isinstance(mesh, MeshFile) else mesh if isinstance(mesh, (str, PathLike)) else None
     return Comparison("mesh" if named is None else str(named), len(base.faces), tuple(entries))
 
 
-def _cones_again(base: Flattening) -> Mapping[int, float] | str:
-    """Return what prescribes the same cones: those of the result, by the input's numbers."""
-    if not len(base.cones):
-        return "none"
-    numbers = base.cones if base.vertex_origin is None else base.vertex_origin[base.cones]
-    return dict(zip(numbers.tolist(), base.curvatures.tolist(), strict=True))
+def known_methods(names: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of methods, each once.
+
+    Raises:
+        OptionError: one is unknown, or there is none.
+    """
+    names = tuple(dict.fromkeys(names))
+    for name in names or ("",):
+        if name not in METHODS + VARIANTS:
+            raise OptionError(f"unknown method {name!r}: choose from {', '.join(METHODS + VARIANTS)}")
+    return names
+
+
+def _with_cones(mesh: Any, faces: ArrayLike | None, base: Flattening) -> tuple[Any, ArrayLike | None]:
+    """Return the mesh on which numbers name the cones of a result: the input, or the repaired one.
+
+    A vertex that a repair split has copies that no number of the input tells apart.
+    """
+    origin = base.vertex_origin
+    if origin is None or np.array_equal(origin[base.cones], base.cones):
+        return mesh, faces
+    return base.vertices, base.faces
 
 
 def _entry(name: str, result: Flattening, base: Flattening | None = None) -> Entry:
@@ -158,12 +186,15 @@ def _entry(name: str, result: Flattening, base: Flattening | None = None) -> Ent
 
 
 def _entry_of_peer(name: str, base: Flattening) -> Entry:
-    start = time.perf_counter()
     try:
-        result = run_peer(name, base)
+        result, seconds = run_peer(name, base)
     except ConeflatError as error:
-        return Entry(name, None, float("nan"), " ".join(str(error).split()))
-    return Entry(name, result.flattening, result.seconds or time.perf_counter() - start, PEERS[name].note)
+        return _entry_of_failure(name, error)
+    return Entry(name, result, seconds, PEERS[name].note)
+
+
+def _entry_of_failure(name: str, error: ConeflatError) -> Entry:
+    return Entry(name, None, math.nan, " ".join(str(error).split()))
 
 
 def _warm_up(method: str) -> None:

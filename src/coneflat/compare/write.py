@@ -2,32 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import MeshFileError
-from ..io import atomic_write
+from ..io.atomic import atomic_write, check_target, make_folder
 from ..view import new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def check_folder(folder: Path) -> None:
-    """Raise an error if files cannot be written to a folder, or pictures not drawn; worth asking before long work."""
+def open_folder(folder: Path, names: Iterable[str]) -> None:
+    """Make a folder if it is missing, for files of some names; worth doing before long work.
+
+    Raises:
+        OptionError: matplotlib, which draws the pictures, is not installed.
+        MeshFileError: the folder cannot be made, or a file not be written there.
+    """
     new_figure(1, 1)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise MeshFileError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+    make_folder(folder)
+    for name in names:
+        check_target(folder / name)
 
 
-def write_folder(folder: Path, texts: Mapping[str, str], figures: Mapping[str, Figure]) -> list[Path]:
+def write_folder(folder: Path, contents: Mapping[str, str | Figure]) -> list[Path]:
     """Write texts and figures by their names, and return the paths."""
-    for name, text in texts.items():
-        with atomic_write(folder / name, "w") as file:
-            file.write(text)
-    for name, figure in figures.items():
-        save_figure(figure, folder / name)
-    return [folder / name for name in (*texts, *figures)]
+    for name, content in contents.items():
+        if isinstance(content, str):
+            with atomic_write(folder / name, "w") as file:
+                file.write(content)
+        else:
+            save_figure(content, folder / name)
+    return [folder / name for name in contents]

@@ -58,6 +58,18 @@ def check_target(path: str | PathLike[str]) -> Path:
     return target
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder, and those that it is in, if they are missing.
+
+    Raises:
+        MeshFileError: it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise MeshFileError(f"cannot make the folder {path}: {_reason(error)}") from error
+
+
 @contextmanager
 def atomic_write(path: str | PathLike[str], mode: str = "wb") -> Iterator[IO[Any]]:
     """Open a file that appears under its name only when it is complete.
@@ -93,5 +105,8 @@ def atomic_write(path: str | PathLike[str], mode: str = "wb") -> Iterator[IO[Any
 
 
 def _failure(path: Path, error: Exception) -> MeshFileError:
-    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    return MeshFileError(f"{path} cannot be written: {reason}")
+    return MeshFileError(f"{path} cannot be written: {_reason(error)}")
+
+
+def _reason(error: Exception) -> str:
+    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)

@@ -13,13 +13,13 @@ from ..cones import ConeSolution
 from ..conformal.abf import nearest_angles
 from ..conformal.angle_conditions import AngleConditions, FoundAngles, angle_conditions, wanted_angles
 from ..conformal.linear_abf import linear_angles
-from ..errors import ConvergenceError, OptionError
+from ..errors import OptionError
 from ..figures import SolveFigures
 from ..geometry import corner_angles
 from ..layout.least_squares import fit_shapes, shapes_of_angles
 from ..mesh import TriangleMesh
 from ..text import plural
-from .base import LaidOut
+from .base import LaidOut, failure_notes
 from .measured import laid_out_at
 
 #: What is asked of the angles around cones: to sum to what is prescribed, with lengths that match across seams; or
@@ -39,7 +39,7 @@ class AngleMetric:
         solution: cones.
         solve: finds the angles.
         best_effort: take angles that did not converge.
-        found: the angles; None if the mesh is to be cut first.
+        found: the angles, and how they fall short; None if the mesh is to be cut first.
     """
 
     mesh: TriangleMesh
@@ -47,30 +47,31 @@ class AngleMetric:
     solution: ConeSolution
     solve: Solve
     best_effort: bool
-    found: FoundAngles | None
+    found: tuple[FoundAngles, tuple[str, ...]] | None
 
     def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
         """Return the least squares reconstruction, at the mesh's area."""
-        found, notes = self.found, []
-        if found is None:
-            found = _find(disk, self.lengths, np.zeros(len(disk.vertices)), self.solve, self.best_effort)
-            if len(self.solution.cones):
-                notes.append(
-                    "The mesh was cut first: the angles of cones, and lengths along seams, were left free."
+        if self.found is not None:
+            found, notes = self.found
+        else:
+            found, notes = _find(
+                disk, self.lengths, np.zeros(len(disk.vertices)), self.solve, self.best_effort
+            )
+            if len(seams):
+                notes = (
+                    "The mesh was cut first: the angles of cones, and lengths along seams, were left free.",
+                    *notes,
                 )
         shapes = shapes_of_angles(found.angles.reshape(-1, 3))
-        if shapes.is_broken.any():
-            notes.append(
-                f"{plural(int(shapes.is_broken.sum()), 'triangle')} got an angle below 0: method 'abf++' allows none."
+        broken = int(shapes.is_broken.sum())
+        if broken:
+            notes = (
+                *notes,
+                f"{plural(broken, 'triangle')} got an angle below 0: method 'abf++' allows none.",
             )
-        if not found.converged:
-            failure = _failure(found)
-            notes.append(f"{failure[0].upper()}{failure[1:]}.")
-        figures = SolveFigures(
-            newton_steps=found.steps, residual=found.residual, broken=int(shapes.is_broken.sum())
-        )
+        figures = SolveFigures(newton_steps=found.steps, residual=found.residual, broken=broken)
         points = fit_shapes(disk, shapes, self.lengths)
-        return laid_out_at(points, self.mesh, disk, seams, self.solution, figures, tuple(notes))
+        return laid_out_at(points, self.mesh, disk, seams, self.solution, figures, notes)
 
 
 def linear_abf(
@@ -140,20 +141,14 @@ def _metric(
 
 def _find(
     mesh: TriangleMesh, lengths: FloatArray, curvature: FloatArray, solve: Solve, best_effort: bool
-) -> FoundAngles:
-    """Return the angles for the given (n,) curvature inside."""
+) -> tuple[FoundAngles, tuple[str, ...]]:
+    """Return the angles for the given (n,) curvature inside, and how they fall short."""
     wanted = wanted_angles(mesh, corner_angles(lengths), curvature)
     found = solve(angle_conditions(mesh, curvature), wanted)
-    if not found.converged and not (best_effort and np.isfinite(found.angles).all()):
-        raise ConvergenceError(
-            f"{_failure(found)}; --best-effort takes them as they are, --method exact is surer, other cones, "
-            "--repair or remeshing may help"
+    failure = None
+    if not found.converged:
+        failure = (
+            f"angle based flattening did not converge: after {plural(found.steps, 'step')} the conditions on angles "
+            f"are off by {found.residual:.2g}"
         )
-    return found
-
-
-def _failure(found: FoundAngles) -> str:
-    return (
-        f"angle based flattening did not converge: after {plural(found.steps, 'step')} the conditions on angles are "
-        f"off by {found.residual:.2g}"
-    )
+    return found, failure_notes(failure, best_effort and bool(np.isfinite(found.angles).all()))

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
+from ..errors import ConvergenceError
 from ..figures import SolveFigures
 from ..geometry import double_areas, edge_lengths
 from ..mesh import TriangleMesh
@@ -71,3 +72,25 @@ class FlatMetric(Protocol):
 def all_faces(mesh: TriangleMesh) -> IntArray:
     """Return (m,) the numbers of a mesh's faces, which are their own origin."""
     return np.arange(len(mesh.faces))
+
+
+def failure_notes(
+    failure: str | None, accepted: bool, instead: str = "--method exact is surer"
+) -> tuple[str, ...]:
+    """Return how a solve fell short as notes, if it is accepted all the same.
+
+    Args:
+        failure: a clause, or None if it did not fall short.
+        accepted: the best effort will do.
+        instead: what else to try.
+
+    Raises:
+        ConvergenceError: it will not.
+    """
+    if failure is None:
+        return ()
+    if not accepted:
+        raise ConvergenceError(
+            f"{failure}; --best-effort takes it as it is, {instead}, other cones, --repair or remeshing may help"
+        )
+    return (f"{failure[0].upper()}{failure[1:]}.",)

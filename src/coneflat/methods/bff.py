@@ -60,7 +60,7 @@ class BoundaryFirst:
         notes: tuple[str, ...] = ()
         if change > NOTABLE:
             notes = (
-                f"The boundary closes after its lengths were changed by up to {100 * change:.3g} %: with those of the "
+                f"The boundary closes after its lengths were changed by up to {100 * change:,.1f} %: with those of the "
                 "linear scale factors it does not.",
             )
         return laid_out_at(points, self.mesh, disk, seams, self.solution, notes=notes)

@@ -16,8 +16,9 @@ from ..geometry.intrinsic import IntrinsicTriangulation, intrinsic_triangulation
 from ..geometry.proper import make_proper
 from ..mesh import TriangleMesh
 from ..text import plural
+from .base import failure_notes
 from .exact import ExactFlatMetric
-from .solved import at_own_area, noted
+from .solved import at_own_area
 
 # Largest curvature error of a metric that has converged, radians.
 TOLERANCE = 1e-9
@@ -49,33 +50,57 @@ def circle_patterns(
     border = mesh.is_boundary_vertex
     target, _ = checked_target(mesh, np.where(border, 0.0, solution.target), border)
     triangulation = intrinsic_triangulation(mesh, lengths)
-    flips: IntArray = np.empty(0, dtype=np.int64)
-    if delaunay:
-        flips = make_delaunay(triangulation)
-    coherent = _nearest_angles(triangulation, target, border)
-    if delaunay and not coherent.converged:
-        # Two edges between the same vertices, flat all around, cannot both be straight; nor can there be a cone wider
-        # than the corners at it can be.
-        wanted = np.where(border, 0, np.floor((2 * np.pi - target) / WIDEST).astype(np.int64) + 1)
-        flips = np.concatenate([flips, make_proper(triangulation, wanted)])
-        coherent = _nearest_angles(triangulation, target, border)
-    notes: tuple[str, ...] = ()
+    coherent, flips = _find_angles(triangulation, target, border, delaunay)
+    failure = None
     if not coherent.converged:
         failure = (
             f"no circle pattern on these triangles has the curvatures: after {plural(coherent.steps, 'step')} their "
             f"angles are off by {coherent.residual:.2g} rad"
         )
-        notes = noted(failure, best_effort)
+    notes = failure_notes(failure, best_effort)
+    solved = _solved(triangulation, coherent, flips, target, border)
+    if failure is None and not solved.converged:
+        failure = (
+            f"the circle pattern did not converge: after {plural(solved.steps, 'step')} the curvature is off by "
+            f"{solved.residual:.2g} rad"
+        )
+        notes = failure_notes(failure, best_effort)
+    return at_own_area(mesh, lengths, solution, solved, notes)
 
+
+def _find_angles(
+    triangulation: IntrinsicTriangulation, target: FloatArray, border: BoolArray, delaunay: bool
+) -> tuple[CoherentAngles, IntArray]:
+    """Return the angles of a pattern, and the half-edges flipped, in place, before there was one."""
+    if not delaunay:
+        return _nearest_angles(triangulation, target, border), np.empty(0, dtype=np.int64)
+    flips = make_delaunay(triangulation)
+    coherent = _nearest_angles(triangulation, target, border)
+    if not coherent.converged:
+        # Two edges between the same vertices, flat all around, cannot both be straight; nor can there be a cone wider
+        # than the corners at it can be.
+        wanted = np.where(border, 0, np.floor((2 * np.pi - target) / WIDEST).astype(np.int64) + 1)
+        flips = np.concatenate([flips, make_proper(triangulation, wanted)])
+        coherent = _nearest_angles(triangulation, target, border)
+    return coherent, flips
+
+
+def _solved(
+    triangulation: IntrinsicTriangulation,
+    coherent: CoherentAngles,
+    flips: IntArray,
+    target: FloatArray,
+    border: BoolArray,
+) -> ExactMetric:
+    """Return the metric of the circle pattern with given angles, which the triangulation gets for its own."""
     pattern = circle_pattern(triangulation.twin, coherent)
-    before = triangulation.length.reshape(-1, 3)
-    after = pattern.lengths.reshape(-1, 3)
-    faces, count = triangulation.faces, len(mesh.vertices)
+    before, after = triangulation.length.reshape(-1, 3), pattern.lengths.reshape(-1, 3)
+    faces = triangulation.faces
     curvature = angle_defect(faces, corner_angles(after), border)
     error = np.where(border, 0.0, np.abs(curvature - target))
-    areas = [vertex_areas(faces, sides, count) for sides in (before, after)]
+    areas = [vertex_areas(faces, sides, len(border)) for sides in (before, after)]
     triangulation.length = pattern.lengths
-    solved = ExactMetric(
+    return ExactMetric(
         log_scale=np.log(areas[1] / areas[0]) / 2,
         curvature=curvature,
         triangulation=triangulation,
@@ -87,13 +112,6 @@ def circle_patterns(
         converged=coherent.converged and bool(error.max() <= TOLERANCE),
         doubled=False,
     )
-    if coherent.converged and not solved.converged:
-        failure = (
-            f"the circle pattern did not converge: after {plural(solved.steps, 'step')} the curvature is off by "
-            f"{solved.residual:.2g} rad"
-        )
-        notes = noted(failure, best_effort)
-    return at_own_area(mesh, lengths, solution, solved, notes)
 
 
 def _nearest_angles(

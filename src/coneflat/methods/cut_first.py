@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from .._arrays import FloatArray, IntArray
 from ..cones import ConeSolution
 from ..mesh import TriangleMesh
-from ..text import plural
 from .base import LaidOut
 from .measured import laid_out_at
 
@@ -36,8 +35,8 @@ class CutFirst:
         notes: tuple[str, ...] = ()
         if len(seams):
             notes = (
-                f"The mesh was cut open first, along {plural(len(seams), 'edge')}, and {self.name} mapped the disk: it "
-                "prescribes no cones, and the sides of seams come out as they may.",
+                f"The mesh was cut open first, and {self.name} mapped the disk: it prescribes no cones, and the sides "
+                "of seams come out as they may.",
             )
         points = self.place(disk, self.lengths)
         return laid_out_at(points, self.mesh, disk, seams, self.solution, notes=notes)

@@ -10,7 +10,6 @@ from .._arrays import BoolArray, FloatArray, IntArray
 from ..cones import ConeSolution
 from ..conformal.boundary import BoundaryCurvature
 from ..conformal.exact import ExactMetric, exact_metric
-from ..errors import ConvergenceError
 from ..figures import SolveFigures
 from ..geometry import angle_defect, double_areas
 from ..layout.straighten import FlatTriangles, straight_triangles
@@ -18,7 +17,7 @@ from ..layout.unfold import unfold
 from ..layout.untangle import untangle
 from ..mesh import TriangleMesh
 from ..seams import cut_open
-from .base import LaidOut, all_faces
+from .base import LaidOut, all_faces, failure_notes
 
 # The curvature of a round boundary is found from the metric it leads to, over and over: rounds at most, and the
 # largest relative change at a vertex at which to stop. What is solved for in the end is exact in any case.
@@ -169,26 +168,24 @@ def exact_flattening(
     if choices.boundary is None:
         fixed |= mesh.is_boundary_vertex
     solved, target = _solve(mesh, lengths, solution, choices, fixed)
-    notes: tuple[str, ...] = ()
+    failure = None
     if not solved.converged:
         worst = solved.worst_vertex if choices.names is None else choices.names[solved.worst_vertex]
         failure = (
             f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is off "
             f"by {solved.residual:.2g} rad"
         )
-        if not choices.best_effort:
-            raise ConvergenceError(
-                f"{failure}; --best-effort takes it as it is, --method linear needs no convergence, other cones, "
-                "--repair or remeshing may help"
-            )
-        notes = (f"{failure[0].upper()}{failure[1:]}.",)
-    shrink = 1.0
-    if choices.keep_area:
-        flat = solved.triangulation.length.reshape(-1, 3)
-        copies = len(flat) / len(mesh.faces)  # 2 where the surface was doubled
-        shrink = float(np.sqrt(copies * double_areas(lengths).sum() / double_areas(flat).sum()))
+    notes = failure_notes(failure, choices.best_effort, "--method linear needs no convergence")
+    shrink = area_factor(lengths, solved) if choices.keep_area else 1.0
     target = np.where(fixed, solved.curvature, target)
     return ExactFlatMetric(mesh, solution.cones, target, solved, shrink, choices.refine, notes)
+
+
+def area_factor(lengths: FloatArray, solved: ExactMetric) -> float:
+    """Return the factor of lengths that brings a metric to the area of a mesh with given (m, 3) side lengths."""
+    flat = solved.triangulation.length.reshape(-1, 3)
+    copies = len(flat) / len(lengths)  # 2 where the surface was doubled
+    return float(np.sqrt(copies * double_areas(lengths).sum() / double_areas(flat).sum()))
 
 
 def _solve(

@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from .._arrays import FloatArray
 from ..cones import ConeSolution
+from ..errors import OptionError
 from ..mesh import TriangleMesh
 from .base import FlatMetric
 
@@ -17,33 +18,38 @@ Method: TypeAlias = Callable[[TriangleMesh, FloatArray, ConeSolution, bool], Fla
 
 
 def other_method(name: str) -> Method:
-    """Return the method of a name."""
-    base, _, variant = name.partition("/")
-    cones = "free" if variant == "free" else "prescribed"
-    if base == "circle-patterns":
-        from .circle_patterns import circle_patterns
+    """Return the method of a name.
 
-        return partial(circle_patterns, delaunay=variant != "fixed")
-    if base == "ricci":
-        from .ricci import ricci_flow
+    Raises:
+        OptionError: there is none of that name.
+    """
+    match name:
+        case "circle-patterns" | "circle-patterns/fixed":
+            from .circle_patterns import circle_patterns
 
-        return ricci_flow
-    if base == "linear-abf":
-        from .angle_based import linear_abf
+            return partial(circle_patterns, delaunay=name == "circle-patterns")
+        case "ricci":
+            from .ricci import ricci_flow
 
-        return partial(linear_abf, cones=cones)
-    if base == "abf++":
-        from .angle_based import abf_plus_plus
+            return ricci_flow
+        case "linear-abf" | "linear-abf/free":
+            from .angle_based import linear_abf
 
-        return partial(abf_plus_plus, cones=cones)
-    if base == "lscm":
-        from .lscm import lscm
+            return partial(linear_abf, cones="prescribed" if name == "linear-abf" else "free")
+        case "abf++" | "abf++/free":
+            from .angle_based import abf_plus_plus
 
-        return lscm
-    if base == "spectral":
-        from .spectral import spectral
+            return partial(abf_plus_plus, cones="prescribed" if name == "abf++" else "free")
+        case "lscm":
+            from .lscm import lscm
 
-        return spectral
-    from .bff import boundary_first
+            return lscm
+        case "spectral":
+            from .spectral import spectral
 
-    return boundary_first
+            return spectral
+        case "bff":
+            from .bff import boundary_first
+
+            return boundary_first
+    raise OptionError(f"unknown method {name!r}")

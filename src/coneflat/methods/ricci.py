@@ -11,8 +11,9 @@ from ..conformal.packing import FixedPackingProblem, PackingProblem
 from ..geometry import is_broken
 from ..mesh import TriangleMesh
 from ..text import plural
+from .base import failure_notes
 from .exact import ExactFlatMetric
-from .solved import at_own_area, noted
+from .solved import at_own_area
 
 
 def ricci_flow(
@@ -58,4 +59,4 @@ def ricci_flow(
             f"the Ricci flow did not converge: after {plural(solved.steps, 'step')} the curvature is off by "
             f"{solved.residual:.2g} rad, and {plural(broken, 'triangle')} broke the triangle inequality"
         )
-    return at_own_area(mesh, lengths, solution, solved, noted(failure, best_effort))
+    return at_own_area(mesh, lengths, solution, solved, failure_notes(failure, best_effort))
