@@ -216,3 +216,12 @@ def test_results_are_those_of_flatten(models, tmp_path):
     alone, batch = read_mesh(tmp_path / "alone.obj"), read_mesh(tmp_path / "out" / "ball.obj")
     assert (alone.vertices == batch.vertices).all()
     assert (tmp_path / "alone.obj").read_bytes() == (tmp_path / "out" / "ball.obj").read_bytes()
+
+
+def test_a_folder_that_cannot_be_read(models, tmp_path, monkeypatch):
+    def refuse(_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(os, "listdir", refuse)
+    with pytest.raises(errors.MeshFileError, match="cannot be read: Permission denied"):
+        find_jobs([str(models)], tmp_path, ".obj", {}, None)

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import sys
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import shapes
 from click.testing import CliRunner
 
 from coneflat import MeshFile, errors, flatten
-from coneflat.cli.main import cli
+from coneflat.cli.main import cli, main
 from coneflat.compare import compare_methods, reproduce
 from coneflat.compare.paper import METHODS as PAPER_METHODS
 from coneflat.compare.peers import PEERS, installed_peers, with_uv
@@ -98,6 +99,16 @@ def test_peers_are_measured_like_us(ball, name):
     assert found[name].result.distortion.qc_mean < 1.5
 
 
+def test_libigl_gets_each_chart():
+    pytest.importorskip("igl")
+    two = shapes.join(shapes.sphere(2), shapes.hill(8, 8))
+    found = compare_methods(*two, methods=("lscm",), peers=("libigl LSCM",))
+    ours, theirs = (found[name].result.distortion for name in ("lscm", "libigl LSCM"))
+    assert theirs.charts == 2
+    assert theirs.overlap < 1e-9
+    assert theirs.qc_mean == pytest.approx(ours.qc_mean, abs=0.02)
+
+
 def test_uvs_of_others_are_welded_and_measured(ball):
     ours = flatten(*ball)
     theirs = with_uv(ours, ours.corner_uv * 3 - 1)
@@ -170,6 +181,76 @@ def test_cones_of_the_paper_and_others(tmp_path, ball):
     run = CliRunner().invoke(cli, ["compare", str(mesh), "--paper", "--cone-count", "5"])
     assert run.exit_code == 2
     assert "--paper says which cones: leave out --cone-count" in run.output
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["compare", "missing.obj", "-o", "out"], "there is no such file"),
+        (["compare", "ball.obj", "--methods", "exact,"], "unknown method ''"),
+        (["compare", "ball.obj", "--eye", "front"], "pictures need a folder: give -o, or leave out --eye"),
+        (["compare", "ball.obj", "-o", "out", "--eye", "nowhere"], "unknown eye 'nowhere'"),
+        (["compare", "ball.obj", "-o", "busy"], "it is a folder"),
+        (["paper", "missing.obj", "-o", "out"], "'missing.obj' matches no mesh"),
+        (["paper", "busy", "-o", "out"], "'busy' matches no mesh"),
+        (["paper", "ball.obj", "-o", "out", "--eye", "nowhere"], "unknown eye 'nowhere'"),
+        (["paper", "ball.obj", "-o", "busy"], "it is a folder"),
+    ],
+)
+def test_what_cannot_work_is_refused_before_the_work(words, message, tmp_path, ball, monkeypatch):
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    write_mesh(tmp_path / "ball.obj", ball)
+    for name in ("compare.md", "paper.md"):
+        (tmp_path / "busy" / name).mkdir(parents=True)
+
+    def work(*_, **__):
+        raise AssertionError("went to work")
+
+    monkeypatch.setattr("coneflat.compare.run.flatten", work)
+    monkeypatch.setattr(sys, "argv", ["coneflat", *words])
+    error = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", error)
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    assert message in error.getvalue()
+    assert error.getvalue().count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_nothing_that_came_out_is_an_error(tmp_path):
+    pytest.importorskip("matplotlib")
+    vertices, faces = shapes.sphere(3)
+    mesh = write_mesh(tmp_path / "squashed.obj", (vertices * [1, 1, 1e-3], faces))
+    words = ["compare", str(mesh), "--methods", "abf++", "--no-peers", "-o", str(tmp_path / "out")]
+    with pytest.raises(errors.MetricError, match=r"no method came to a layout: abf\+\+: .* did not converge"):
+        CliRunner().invoke(cli, words, catch_exceptions=False)
+    (tmp_path / "empty.obj").write_text("")
+    with pytest.raises(errors.MeshError, match=r"no mesh could be flattened: empty.obj: "):
+        reproduce([tmp_path / "empty.obj"])
+    with pytest.raises(errors.OptionError, match="unknown method 'magic'"):
+        reproduce([mesh], methods=("magic",))
+
+
+def test_cones_where_a_repair_split_a_vertex():
+    """Spheres that share vertex 3; as three cones are what each needs, its two copies are cones."""
+    vertices, faces = shapes.join(shapes.sphere(1), shapes.sphere(2))
+    first = len(shapes.sphere(1)[0])
+    faces[faces == first + 7] = 3
+    found = compare_methods(
+        vertices,
+        faces,
+        methods=("exact", "linear"),
+        peers=(),
+        repair=True,
+        allowed_cones=[3, 5, 9, first + 5, first + 9],
+    )
+    one, two = (found[name].result for name in ("exact", "linear"))
+    assert (one.vertex_origin[one.cones] == 3).sum() == 2
+    assert set(one.cones.tolist()) == set(two.cones.tolist())
+    assert one.notes[0].startswith("Split 1")
+    assert "Split" not in found["linear"].note
+    assert "other edges" not in found["linear"].note
 
 
 def test_a_folder_that_cannot_be_made(tmp_path, ball):

@@ -97,6 +97,9 @@ def compare(
     for name in search if paper else ():
         if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             raise click.UsageError(f"--paper says which cones: leave out --{name.replace('_', '-')}", context)
+    for name in ("eye", "up") if output is None else ():
+        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"pictures need a folder: give -o, or leave out --{name}", context)
     options = {"repair": repair, **(PAPER if paper else as_keywords(search))}
     chosen = METHODS if methods is None else tuple(name.strip() for name in methods.split(","))
     if output is not None:
@@ -160,6 +163,7 @@ def paper(meshes: tuple[Path, ...], output: Path, eye: Any, up: str, talk: str |
     from .console import Console
     from .run import FLATTENED
 
+    sight = Sight(eye, up)
     for mesh in meshes:
         find_meshes(str(mesh))
     open_folder(output, FILES)
@@ -167,6 +171,6 @@ def paper(meshes: tuple[Path, ...], output: Path, eye: Any, up: str, talk: str |
         with console.stage("compare", 0.0):
             found = reproduce(meshes, progress=console.part(0.0, FLATTENED))
         with console.stage("draw", FLATTENED):
-            written = write_folder(output, {**found.texts(), **found.figures(Sight(eye, up))})
+            written = write_folder(output, {**found.texts(), **found.figures(sight)})
         console.say([found.tables().rstrip()])
         console.finish(written)

@@ -13,6 +13,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..distortion import measure, seams_of
 from ..errors import MetricError
+from ..geometry import double_areas, edge_lengths
 from ..mesh import TriangleMesh
 from ..result import Flattening
 
@@ -85,15 +86,26 @@ def _covered(corner_uv: FloatArray) -> float:
 
 
 def libigl_lscm(base: Flattening) -> FloatArray:
-    """LSCM of our cut mesh, two points far apart pinned."""
-    import igl
-
+    """LSCM of each of our charts, two points far apart pinned; charts at their own areas, side by side."""
     points = np.empty((len(base.uv), 3))
     points[base.uv_faces] = base.vertices[base.faces]
-    pins = np.array([0, int(np.argmax(((points - points[0]) ** 2).sum(axis=1)))])
-    found: Any = igl.lscm(points, base.uv_faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
+    corner_uv, right = np.empty((len(base.faces), 3, 2)), 0.0
+    for chart, _, faces in TriangleMesh(points, base.uv_faces).split_components():
+        uv = _lscm_of_chart(chart)[chart.faces]
+        space = float(double_areas(edge_lengths(chart.vertices, chart.faces)).sum()) / 2
+        uv *= np.sqrt(space / _covered(uv))
+        corner_uv[faces] = uv + np.array([right - uv[..., 0].min(), 0.0])
+        right += float(np.ptp(uv[..., 0]))
+    return corner_uv
+
+
+def _lscm_of_chart(chart: TriangleMesh) -> FloatArray:
+    import igl
+
+    pins = np.array([0, int(np.argmax(((chart.vertices - chart.vertices[0]) ** 2).sum(axis=1)))])
+    found: Any = igl.lscm(chart.vertices, chart.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
     uv: FloatArray = np.asarray(found[0] if isinstance(found, tuple) else found, dtype=np.float64)
-    return uv[base.uv_faces]
+    return uv
 
 
 def xatlas_charts(base: Flattening) -> FloatArray:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..view import draw_checker, draw_cones, draw_layout
-from ..view.camera import Eye, view_aspect
+from ..view.camera import Eye, eye_direction, view_aspect
 from ..view.compose import Panel, Row, compose
 from ..view.layout import fill_layout, layout_aspect
 from ..view.marks import mark_handles
@@ -38,10 +38,16 @@ class Sight:
     Attributes:
         eye: direction to the eye, as in `draw_checker`.
         up: the models' upward axis, "x", "y" or "z".
+
+    Raises:
+        OptionError: there is no such direction or axis.
     """
 
     eye: Eye = "front-right"
     up: str = "y"
+
+    def __post_init__(self) -> None:
+        eye_direction(self.eye, self.up)
 
     def panel(self, result: Flattening, draw: Callable[..., object], label: str) -> Panel:
         """Return a panel in which a function of axes draws the model."""

@@ -141,7 +141,7 @@ def compare_methods(
         if name in PEERS:
             entries.append(_entry_of_peer(name, base))
         elif name == base.settings["method"]:
-            entries.append(_entry(name, base))
+            entries.append(_entry(name, base, base))
         else:
             _warm_up(name)
             try:
@@ -178,11 +178,17 @@ def _with_cones(mesh: Any, faces: ArrayLike | None, base: Flattening) -> tuple[A
     return base.vertices, base.faces
 
 
-def _entry(name: str, result: Flattening, base: Flattening | None = None) -> Entry:
-    note = "; ".join(note.rstrip(".") for note in result.notes)
-    if base is not None and not np.array_equal(result.seams, base.seams):
-        note = "; ".join(["cut along other edges", *([note] if note else [])])
-    return Entry(name, result, sum(result.seconds[stage] for stage in TIMED), note)
+def _entry(name: str, result: Flattening, base: Flattening) -> Entry:
+    """Return what a method made, where another made the base; what was done to the input is a note on that."""
+    said = () if result is base else base.notes
+    notes = [note.rstrip(".") for note in result.notes if note not in said]
+    if _cut_edges(result) != _cut_edges(base):
+        notes.insert(0, "cut along other edges")
+    return Entry(name, result, sum(result.seconds[stage] for stage in TIMED), "; ".join(notes))
+
+
+def _cut_edges(result: Flattening) -> set[tuple[int, int]]:
+    return {(min(pair), max(pair)) for pair in result.seams.tolist()}
 
 
 def _entry_of_peer(name: str, base: Flattening) -> Entry:
