@@ -37,10 +37,10 @@ from coneflat.methods.ricci import ricci_flow
 
 # Vertices of the icosahedron that the sphere is split from, and curvatures that sum to 4 pi.
 CONES = np.array([0, 2, 3, 5, 7, 8, 10])
-COLORS = "#0072b2", "#d55e00", "#009e73"  # told apart without red or green
 CURVATURES = np.array([1.0, 0.75, 0.5, 0.75, 0.5, 1.0, -0.5]) * np.pi
 METHODS = ("CP", "RF", "CF")
 PAIRS = tuple(combinations(range(3), 2))
+COLORS = "#0072b2", "#d55e00", "#009e73"  # told apart without red or green
 
 
 def flat_lengths(mesh: TriangleMesh) -> list[np.ndarray]:

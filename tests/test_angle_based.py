@@ -215,6 +215,17 @@ def test_what_did_not_converge_is_refused_or_noted(monkeypatch):
     assert result.solve.newton_steps == 1
 
 
+@pytest.mark.parametrize("method", BOTH)
+def test_a_cut_without_cones_is_noted(method):
+    result = flatten(*shapes.annulus(), method=f"{method}/free")
+    assert not len(result.cones)
+    assert len(result.seams)
+    assert result.notes == (
+        "The mesh was cut first: the angles of cones, and lengths along seams, were left free.",
+    )
+    assert not flatten(*shapes.hill(), method=f"{method}/free", cones="none").notes
+
+
 def test_negative_angles_are_noted():
     vertices, faces = shapes.sphere(3)
     result = flatten(vertices * [1, 1, 1e-3], faces, method="linear-abf")
