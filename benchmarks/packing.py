@@ -23,6 +23,7 @@ from scipy.sparse.csgraph import dijkstra
 import coneflat
 from coneflat.atlas import pack_charts
 from coneflat.errors import ConeflatError
+from coneflat.geometry.planar import signed_double_areas
 from coneflat.mesh import label_components
 
 RESOLUTION, PADDING = 1024, 2
@@ -81,7 +82,9 @@ def cut(result: coneflat.Flattening, number: int) -> tuple[np.ndarray, np.ndarra
         chart = neighbourhoods(corner_uv, points, chart, number)
     corners = result.vertices[result.faces]
     space = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    ratio = np.bincount(chart, weights=space) / np.bincount(chart, weights=areas(corner_uv))
+    ratio = np.bincount(chart, weights=space) / np.bincount(
+        chart, weights=np.abs(signed_double_areas(corner_uv)) / 2
+    )
     return corner_uv * np.sqrt(ratio / space.sum())[chart][:, None, None], chart
 
 
@@ -95,17 +98,12 @@ def neighbourhoods(corner_uv: np.ndarray, points: np.ndarray, chart: np.ndarray,
     middle = corner_uv.mean(axis=1)
     steps = np.linalg.norm(middle[one] - middle[two], axis=1) + 1e-12
     graph = coo_matrix((steps, (one, two)), shape=(len(points), len(points))).tocsr()
-    weights = areas(corner_uv)
+    weights = np.abs(signed_double_areas(corner_uv)) / 2
     seeds = np.random.default_rng(0).choice(len(points), number, replace=False, p=weights / weights.sum())
     first = np.unique(chart, return_index=True)[1]
     seeds = np.unique(np.concatenate([seeds, first[~np.isin(chart[first], chart[seeds])]]))
     _, _, nearest = dijkstra(graph, directed=False, indices=seeds, min_only=True, return_predecessors=True)
     return np.unique(nearest, return_inverse=True)[1]
-
-
-def areas(corner_uv: np.ndarray) -> np.ndarray:
-    one, two = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
-    return np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
 
 
 def ours(rotate: str) -> Packer:
@@ -131,7 +129,7 @@ def xatlas(rotate_charts: bool) -> Packer:
             atlas.generate(pack_options=options)
             side = max(atlas.width, atlas.height)
             options.resolution, options.texels_per_unit = 0, atlas.texels_per_unit * RESOLUTION / side
-        return float((atlas.texels_per_unit / side) ** 2 * areas(corner_uv).sum())
+        return float((atlas.texels_per_unit / side) ** 2 * np.abs(signed_double_areas(corner_uv)).sum() / 2)
 
     return pack
 

@@ -12,6 +12,7 @@ from ._arrays import FloatArray, IntArray
 from .atlas import Packed, orient_charts, pack_charts, part_touching
 from .distortion import curvature_errors, measure
 from .figures import SolveFigures
+from .geometry.planar import signed_double_areas
 from .mesh import TriangleMesh
 from .numbering import result_numbering, turn_corners
 from .options import Options
@@ -140,9 +141,7 @@ def _packed(
 
 def _upright(flat: FloatArray, chart: IntArray) -> FloatArray:
     """Return (m, 3, 2) charts, those turned over of which more area is upside down than not."""
-    sides = flat[:, 1:] - flat[:, :1]
-    areas = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
-    is_mirrored = np.bincount(chart, weights=areas) < 0
+    is_mirrored = np.bincount(chart, weights=signed_double_areas(flat)) < 0
     if is_mirrored.any():
         flat[is_mirrored[chart], :, 1] *= -1
     return flat

@@ -6,6 +6,7 @@ import numpy as np
 
 from ._arrays import FloatArray, IntArray
 from .errors import OptionError
+from .geometry.planar import signed_double_areas
 
 LIGHT_CELL = (0.86, 0.87, 0.89)
 """A light, slightly cool grey."""
@@ -29,9 +30,7 @@ def cell_side(uv: FloatArray, uv_faces: IntArray, cells: float = CELLS) -> float
         OptionError: `cells` is no positive number.
     """
     check_cells(cells)
-    p, q, r = np.moveaxis(uv[uv_faces], 1, 0)
-    one, two = q - p, r - p
-    area = np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum() / 2
+    area = np.abs(signed_double_areas(uv[uv_faces])).sum() / 2
     return float(np.sqrt(area) or 1.0) / cells
 
 

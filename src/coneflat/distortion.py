@@ -9,6 +9,7 @@ import numpy as np
 
 from ._arrays import BoolArray, FloatArray, IntArray, dots
 from .atlas.overlap import find_overlaps
+from .geometry.planar import signed_double_areas
 from .mesh import TriangleMesh, end_corners, label_components
 from .threads import meanwhile
 
@@ -112,7 +113,7 @@ def _measure(
     """Return all measures but those of overlaps."""
     area, longest = _model_areas(mesh)
     one, two = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
-    uv_area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    uv_area = signed_double_areas(corner_uv)
     uv_longest = np.sqrt(np.maximum.reduce([dots(side, side) for side in (one, two, two - one)]))
     has_area = area > ZERO_AREA * longest**2
     has_uv_area = np.abs(uv_area) > ZERO_AREA * uv_longest**2

@@ -20,6 +20,7 @@ from .conformal.turning import open_turning
 from .distortion import measure
 from .errors import CurvatureError, MetricError, SeamError
 from .geometry.areas import area_distortion, weighted_areas
+from .geometry.planar import signed_double_areas
 from .mesh import TriangleMesh
 from .methods import ExactChoices, FlatMetric, LaidOut, exact_flattening, linear_flattening
 from .methods.exact import ExactFlatMetric
@@ -263,9 +264,7 @@ def shortfalls(laid_out: LaidOut, names: IntArray) -> tuple[str, ...]:
             f"{plural(len(unheld), 'cone')} too wide for the triangles around: that at vertex {names[unheld[0]]} has "
             f"an angle of {angle:.3g} pi. Choose others, or refine (--refine)."
         )
-    corners = laid_out.points[laid_out.corners]
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    flipped = int(np.count_nonzero(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0] <= 0))
+    flipped = int(np.count_nonzero(signed_double_areas(laid_out.points[laid_out.corners]) <= 0))
     if flipped and laid_out.figures.ptolemy_flips + laid_out.figures.euclidean_flips:
         notes.append(
             f"{plural(flipped, 'triangle')} could not be turned over on the input's own triangles: refine (--refine), "

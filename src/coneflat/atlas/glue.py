@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..geometry.planar import signed_double_areas
 from ..mesh import TriangleMesh
 from .layout import Layout, Seams, same_points
 from .overlap import find_overlaps
@@ -117,8 +118,7 @@ class _Gluing:
     def _fits(self, kept: int, moved: int) -> bool:
         """Whether the triangles of a chart are upright in their new places, and overlap none of the other's."""
         corners = self._corners(self.faces[moved])
-        sides = corners[:, 1:] - corners[:, :1]
-        if not (sides[:, 0, 0] * sides[:, 1, 1] > sides[:, 0, 1] * sides[:, 1, 0]).all():
+        if not (signed_double_areas(corners) > 0).all():
             return False
         low, high = corners.min(axis=1), corners.max(axis=1)
         others = self.faces[kept]

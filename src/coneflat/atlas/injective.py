@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
+from ..geometry.planar import signed_double_areas
 from ..mesh import TriangleMesh
 from .glue import glue_charts
 from .layout import Layout, Seams
@@ -37,9 +38,7 @@ def injective_charts(
         lengths: (e,) of the edges, which cuts and seams cost.
     """
     whole = Layout(points, corners, np.zeros(len(corners), dtype=np.int64))
-    places = points[corners]
-    sides = places[:, 1:] - places[:, :1]
-    areas = (sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]) / 2
+    areas = signed_double_areas(points[corners])
     pairs = find_overlaps(points, corners).pairs
     # What an inverted triangle covers is not to be had apart from its neighbours.
     pairs = pairs[(areas[pairs] > 0).all(axis=1)]

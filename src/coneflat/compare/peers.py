@@ -14,6 +14,7 @@ from .._arrays import FloatArray, IntArray
 from ..distortion import measure, seams_of
 from ..errors import MetricError
 from ..geometry import double_areas, edge_lengths
+from ..geometry.planar import signed_double_areas
 from ..mesh import TriangleMesh
 from ..result import Flattening
 
@@ -81,8 +82,7 @@ def with_uv(base: Flattening, corner_uv: FloatArray) -> Flattening:
 
 def _covered(corner_uv: FloatArray) -> float:
     """Return the area of the triangles in the plane, overlaps counted as often as they are covered."""
-    one, two = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
-    return float(np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum() / 2)
+    return float(np.abs(signed_double_areas(corner_uv)).sum() / 2)
 
 
 def libigl_lscm(base: Flattening) -> FloatArray:

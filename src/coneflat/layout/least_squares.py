@@ -8,13 +8,12 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..errors import MetricError
 from ..geometry import corner_angles, is_broken
 from ..geometry.ties import argmax_tied, tie_key
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from ..solver import HermitianFactor
-from .complex_arrays import ComplexArray
 
 # Radians that an angle has which came out as none: they keep the shape of its triangle finite.
 LEAST_ANGLE = 1e-3

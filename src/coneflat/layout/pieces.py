@@ -7,10 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import ComplexArray, FloatArray, IntArray
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..mesh import NEXT, PREVIOUS
-from .complex_arrays import ComplexArray
 from .overlay import Overlay
 
 # A piece is what two triangles have in common.

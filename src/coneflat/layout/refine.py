@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import ComplexArray, FloatArray, IntArray
 from ..conformal.doubling import double
 from ..conformal.exact import ExactMetric
 from ..errors import MetricError
 from ..geometry.intrinsic import IntrinsicTriangulation, halfedge_twins, intrinsic_triangulation
 from ..mesh import TriangleMesh
-from .complex_arrays import ComplexArray
 from .overlay import Overlay, overlay
 from .pieces import Pieces, find_pieces
 from .straighten import FlatTriangles

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import BoolArray, IntArray
+from .._arrays import BoolArray, ComplexArray, IntArray
 from ..geometry.intrinsic import IntrinsicTriangulation
-from .complex_arrays import ComplexArray
 
 
 @dataclass(frozen=True, eq=False)

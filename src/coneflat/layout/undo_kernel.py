@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import ComplexArray, FloatArray, IntArray
 from ..geometry.compiled import compiled
-from .complex_arrays import ComplexArray
 
 
 @compiled

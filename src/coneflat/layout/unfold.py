@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray
-from .complex_arrays import ComplexArray
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from .straighten import FlatTriangles
 
 # Iterations that spread the gaps; each costs as much as half a breadth-first search.

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..geometry.compiled import compiled
-from .complex_arrays import ComplexArray
 
 
 @compiled

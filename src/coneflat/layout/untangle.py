@@ -8,9 +8,8 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, hstack, identity, vstack
 from scipy.sparse.linalg import splu
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..mesh import label_components
-from .complex_arrays import ComplexArray
 from .straighten import FlatTriangles
 
 # Height over longest side up to which a triangle counts as degenerate: coordinates in the plane are good to

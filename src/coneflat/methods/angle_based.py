@@ -10,9 +10,7 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..cones import ConeSolution
-from ..conformal.abf import nearest_angles
 from ..conformal.angle_conditions import AngleConditions, FoundAngles, angle_conditions, wanted_angles
-from ..conformal.linear_abf import linear_angles
 from ..errors import OptionError
 from ..figures import SolveFigures
 from ..geometry import corner_angles
@@ -74,63 +72,32 @@ class AngleMetric:
         return laid_out_at(points, self.mesh, disk, seams, self.solution, figures, notes)
 
 
-def linear_abf(
+def angle_based(
     mesh: TriangleMesh,
     lengths: FloatArray,
     solution: ConeSolution,
     best_effort: bool,
+    solve: Solve,
     cones: str = "prescribed",
 ) -> AngleMetric:
-    """Return a metric by linear angle based flattening (Zayer, Levy, Seidel 2007), see `linear_angles`.
-
-    Args:
-        mesh: connected.
-        lengths: (m, 3) side lengths, model units.
-        solution: cones and their curvatures.
-        best_effort: has no effect, as there is nothing to converge.
-        cones: one of `CONES`. Cones as constraints are what the paper leaves to future work; its Table 2 is matched
-            with "free": QC means of 1.0076 on fandisk and 1.0260 on rocker-arm for its 1.007 and 1.027, where the
-            constraints make 1.0116 and 1.0279.
-
-    Raises:
-        CurvatureError: a cone is too wide for its triangles.
-        OptionError: there is no such choice for cones.
-    """
-    return _metric(mesh, lengths, solution, linear_angles, best_effort, cones)
-
-
-def abf_plus_plus(
-    mesh: TriangleMesh,
-    lengths: FloatArray,
-    solution: ConeSolution,
-    best_effort: bool,
-    cones: str = "prescribed",
-) -> AngleMetric:
-    """Return a metric by ABF++ (Sheffer, Levy, Mogilnitsky, Bogomyakov 2005), see `nearest_angles`.
+    """Return a metric by angle based flattening.
 
     Args:
         mesh: connected.
         lengths: (m, 3) side lengths, model units.
         solution: cones and their curvatures.
         best_effort: return a metric that did not converge.
-        cones: one of `CONES`.
+        solve: `linear_angles` (Zayer, Levy, Seidel 2007), which has nothing to converge, or `nearest_angles`, ABF++
+            (Sheffer, Levy, Mogilnitsky, Bogomyakov 2005).
+        cones: one of `CONES`. Cones as constraints are what the paper leaves to future work; its Table 2 is matched
+            with "free" and the linear method: QC means of 1.0076 on fandisk and 1.0260 on rocker-arm for its 1.007
+            and 1.027, where the constraints make 1.0116 and 1.0279.
 
     Raises:
         ConvergenceError: the solve ends short of its tolerance, unless `best_effort`.
         CurvatureError: a cone is too wide for its triangles.
         OptionError: there is no such choice for cones.
     """
-    return _metric(mesh, lengths, solution, nearest_angles, best_effort, cones)
-
-
-def _metric(
-    mesh: TriangleMesh,
-    lengths: FloatArray,
-    solution: ConeSolution,
-    solve: Solve,
-    best_effort: bool,
-    cones: str,
-) -> AngleMetric:
     if cones not in CONES:
         raise OptionError(f"unknown choice for cones {cones!r}: choose from {', '.join(CONES)}")
     found = None

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import ComplexArray, FloatArray, IntArray
 from ..cones import ConeSolution
 from ..cones.solution import GroundedLaplacian
 from ..geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
 from ..layout.boundary_walk import walk_boundary
-from ..layout.complex_arrays import ComplexArray
 from ..layout.unfold import closed_chain
 from ..mesh import TriangleMesh
 from .base import LaidOut

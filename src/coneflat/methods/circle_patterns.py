@@ -17,8 +17,7 @@ from ..geometry.proper import make_proper
 from ..mesh import TriangleMesh
 from ..text import plural
 from .base import failure_notes
-from .exact import ExactFlatMetric
-from .solved import at_own_area
+from .exact import ExactFlatMetric, at_own_area
 
 # Largest curvature error of a metric that has converged, radians.
 TOLERANCE = 1e-9

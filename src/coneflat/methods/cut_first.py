@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from .._arrays import FloatArray, IntArray
 from ..cones import ConeSolution
 from ..mesh import TriangleMesh
 from .base import LaidOut
 from .measured import laid_out_at
+
+Place: TypeAlias = Callable[[TriangleMesh, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +28,7 @@ class CutFirst:
     """
 
     name: str
-    place: Callable[[TriangleMesh, FloatArray], FloatArray]
+    place: Place
     mesh: TriangleMesh
     lengths: FloatArray
     solution: ConeSolution
@@ -40,3 +43,23 @@ class CutFirst:
             )
         points = self.place(disk, self.lengths)
         return laid_out_at(points, self.mesh, disk, seams, self.solution, notes=notes)
+
+
+def map_cut_mesh(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    solution: ConeSolution,
+    best_effort: bool,
+    name: str,
+    place: Place,
+) -> CutFirst:
+    """Return the map of a mesh, cut open through its cones, by a method that prescribes none.
+
+    Args:
+        mesh: connected.
+        lengths: (m, 3) side lengths, model units.
+        solution: the cones, which decide where the mesh is cut and no more.
+        best_effort: of no meaning here: what is not found is nothing.
+        name, place: of the method, see `CutFirst`.
+    """
+    return CutFirst(name, place, mesh, lengths, solution)

@@ -12,6 +12,7 @@ from ..conformal.boundary import BoundaryCurvature
 from ..conformal.exact import ExactMetric, exact_metric
 from ..figures import SolveFigures
 from ..geometry import angle_defect, double_areas
+from ..geometry.planar import signed_angles
 from ..layout.straighten import FlatTriangles, straight_triangles
 from ..layout.unfold import unfold
 from ..layout.untangle import untangle
@@ -142,9 +143,7 @@ class ExactFlatMetric:
 
 def curvature_on(mesh: TriangleMesh, flat: FlatTriangles) -> FloatArray:
     """Return (n,) the curvature of flat triangles as they are laid out; the angles of inverted ones are negative."""
-    sides = flat.sides.reshape(-1, 3)
-    angles = np.angle(-sides[:, [1, 2, 0]] * np.conj(sides[:, [2, 0, 1]]))
-    return angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+    return angle_defect(mesh.faces, signed_angles(flat.sides.reshape(-1, 3)), mesh.is_boundary_vertex)
 
 
 def exact_flattening(
@@ -186,6 +185,26 @@ def area_factor(lengths: FloatArray, solved: ExactMetric) -> float:
     flat = solved.triangulation.length.reshape(-1, 3)
     copies = len(flat) / len(lengths)  # 2 where the surface was doubled
     return float(np.sqrt(copies * double_areas(lengths).sum() / double_areas(flat).sum()))
+
+
+def at_own_area(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    solution: ConeSolution,
+    solved: ExactMetric,
+    notes: tuple[str, ...] = (),
+) -> ExactFlatMetric:
+    """Return a metric, to be scaled to the area of the mesh, with what came out at the free boundary for its target.
+
+    Args:
+        mesh: connected.
+        lengths: (m, 3) its side lengths.
+        solution: its cones and their curvatures.
+        solved: the metric.
+        notes: how it fell short.
+    """
+    target = np.where(mesh.is_boundary_vertex, solved.curvature, solution.target)
+    return ExactFlatMetric(mesh, solution.cones, target, solved, area_factor(lengths, solved), False, notes)
 
 
 def _solve(

@@ -12,6 +12,7 @@ from ..conformal.linear import scaled_lengths
 from ..errors import MetricError
 from ..figures import SolveFigures
 from ..geometry import angle_defect, corner_angles, double_areas, is_broken
+from ..geometry.planar import signed_double_areas
 from ..layout import least_squares_layout
 from ..mesh import TriangleMesh
 from .base import LaidOut, all_faces
@@ -37,8 +38,7 @@ class LinearFlatMetric:
     def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
         """Return the least squares reconstruction, at the scale of the metric."""
         points = least_squares_layout(disk, self.lengths)
-        one, two = (points[disk.faces[:, k]] - points[disk.faces[:, 0]] for k in (1, 2))
-        area = np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum()
+        area = np.abs(signed_double_areas(points[disk.faces])).sum()
         return LaidOut(
             mesh=self.mesh,
             face_origin=all_faces(self.mesh),

@@ -5,26 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from ..cones import ConeSolution
 from ..conformal.energy import conformal_equations
 from ..errors import MetricError
 from ..layout.least_squares import far_pins, pinned_least_squares
 from ..mesh import TriangleMesh
-from .cut_first import CutFirst
-
-
-def lscm(
-    mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, best_effort: bool = False
-) -> CutFirst:
-    """Return the least squares conformal map of a mesh, cut open through its cones.
-
-    Args:
-        mesh: connected.
-        lengths: (m, 3) side lengths, model units.
-        solution: the cones, which decide where the mesh is cut and no more.
-        best_effort: of no meaning here: nothing iterates.
-    """
-    return CutFirst("LSCM", least_squares_conformal, mesh, lengths, solution)
 
 
 def least_squares_conformal(

@@ -8,6 +8,7 @@ from .._arrays import FloatArray, IntArray
 from ..cones import ConeSolution
 from ..figures import SolveFigures
 from ..geometry import angle_defect, double_areas, edge_lengths
+from ..geometry.planar import signed_angles, signed_double_areas
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from .base import LaidOut, all_faces
 
@@ -35,12 +36,11 @@ def laid_out_at(
         figures, notes: how it was found, and what falls short.
     """
     corners = points[disk.faces]
+    doubles = np.abs(signed_double_areas(corners))
     sides = corners[:, PREVIOUS] - corners[:, NEXT]
-    doubles = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
     before = double_areas(edge_lengths(mesh.vertices, mesh.faces))
-    factor = float(np.sqrt(before.sum() / np.abs(doubles).sum()))
-    complex_sides = sides[..., 0] + 1j * sides[..., 1]
-    angles = np.angle(-complex_sides[:, NEXT] * np.conj(complex_sides[:, PREVIOUS]))
+    factor = float(np.sqrt(before.sum() / doubles.sum()))
+    angles = signed_angles(sides[..., 0] + 1j * sides[..., 1])
     curvature = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
     return LaidOut(
         mesh=mesh,
@@ -49,7 +49,7 @@ def laid_out_at(
         corners=disk.faces,
         cones=solution.cones,
         seams=mesh.edges[seams],
-        log_scale=_log_scale(mesh, before, np.abs(doubles) * factor**2),
+        log_scale=_log_scale(mesh, before, doubles * factor**2),
         # The boundary is free: what comes out there is what was wanted.
         target=np.where(mesh.is_boundary_vertex, curvature, solution.target),
         curvature=curvature,

@@ -33,21 +33,28 @@ def other_method(name: str) -> Method:
 
             return ricci_flow
         case "linear-abf" | "linear-abf/free":
-            from .angle_based import linear_abf
+            from ..conformal.linear_abf import linear_angles
+            from .angle_based import angle_based
 
-            return partial(linear_abf, cones="prescribed" if name == "linear-abf" else "free")
+            cones = "prescribed" if name == "linear-abf" else "free"
+            return partial(angle_based, solve=linear_angles, cones=cones)
         case "abf++" | "abf++/free":
-            from .angle_based import abf_plus_plus
+            from ..conformal.abf import nearest_angles
+            from .angle_based import angle_based
 
-            return partial(abf_plus_plus, cones="prescribed" if name == "abf++" else "free")
+            return partial(
+                angle_based, solve=nearest_angles, cones="prescribed" if name == "abf++" else "free"
+            )
         case "lscm":
-            from .lscm import lscm
+            from .cut_first import map_cut_mesh
+            from .lscm import least_squares_conformal
 
-            return lscm
+            return partial(map_cut_mesh, name="LSCM", place=least_squares_conformal)
         case "spectral":
-            from .spectral import spectral
+            from .cut_first import map_cut_mesh
+            from .spectral import spectral_conformal
 
-            return spectral
+            return partial(map_cut_mesh, name="the spectral method", place=spectral_conformal)
         case "bff":
             from .bff import boundary_first
 

@@ -12,8 +12,7 @@ from ..geometry import is_broken
 from ..mesh import TriangleMesh
 from ..text import plural
 from .base import failure_notes
-from .exact import ExactFlatMetric
-from .solved import at_own_area
+from .exact import ExactFlatMetric, at_own_area
 
 
 def ricci_flow(

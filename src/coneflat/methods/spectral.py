@@ -6,35 +6,18 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
-from .._arrays import FloatArray
-from ..cones import ConeSolution
+from .._arrays import ComplexArray, FloatArray
 from ..conformal.energy import conformal_equations
 from ..errors import ConvergenceError, MetricError
 from ..layout.boundary_walk import walk_boundary
-from ..layout.complex_arrays import ComplexArray
 from ..mesh import TriangleMesh
 from ..solver import HermitianFactor
-from .cut_first import CutFirst
 
 # What is added to the eigenvalues, times the number of vertices on the boundary, so that none is zero: well below that
 # of a map which keeps angles but for a thousandth, and enough that factorizations see it.
 SHIFT = 1e-7
 # Relative accuracy of the eigenvalue, and restarts of the Lanczos iteration, which takes a few.
 TOLERANCE, RESTARTS = 1e-13, 300
-
-
-def spectral(
-    mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, best_effort: bool = False
-) -> CutFirst:
-    """Return the spectral conformal map of a mesh, cut open through its cones.
-
-    Args:
-        mesh: connected.
-        lengths: (m, 3) side lengths, model units.
-        solution: the cones, which decide where the mesh is cut and no more.
-        best_effort: of no meaning here: an eigenvector that was not found is none.
-    """
-    return CutFirst("the spectral method", spectral_conformal, mesh, lengths, solution)
 
 
 def spectral_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:

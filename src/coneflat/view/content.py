@@ -10,11 +10,12 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..checker import cell_side
 from ..errors import ArrayShapeError, OptionError
+from ..geometry.planar import signed_double_areas
 from ..io.uv_split import split_at_seams
 from ..mesh import TriangleMesh, end_corners, label_components
 from .quantity import ColorScale, conformal_distortion, missing_angles, stretch
 from .scales import page_scales
-from .thin import cross, sides, thin
+from .thin import sides, thin
 
 if TYPE_CHECKING:
     from ..result import Flattening
@@ -160,7 +161,7 @@ def _into_unit_ball(vertices: FloatArray) -> tuple[FloatArray, FloatArray, float
 def _charts(faces: IntArray, uv: FloatArray) -> IntArray:
     """Return (m,) the chart of each triangle, numbered from the one with the largest area."""
     count, label = label_components(len(uv), faces[:, :2].reshape(-1), np.repeat(faces[:, 2], 2))
-    chart, areas = label[faces[:, 0]], np.abs(cross(*sides(uv[faces])))
+    chart, areas = label[faces[:, 0]], np.abs(signed_double_areas(uv[faces]))
     rank = np.full(count, -1, dtype=np.int64)
     rank[np.argsort(-np.bincount(chart, weights=areas, minlength=count), kind="stable")] = np.arange(count)
     return rank[chart]

@@ -6,6 +6,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import MeshError
+from ..geometry.planar import signed_double_areas
 
 CELLS = 4095
 """Cells along an axis at most, so that the five numbers of a cell fit into 60 bits."""
@@ -36,7 +37,7 @@ def thin(
     Raises:
         MeshError: the triangles along outlines alone are more than that.
     """
-    areas = cross(*sides(uv[faces]))
+    areas = signed_double_areas(uv[faces])
     area = float(np.linalg.norm(np.cross(*sides(places[faces])), axis=1).sum())
     scale = np.sqrt(np.abs(areas).sum() / max(area, TINY))
     coordinates = np.column_stack([places, uv / max(scale, TINY)])
@@ -53,7 +54,7 @@ def thin(
             & (corners[:, 2] != corners[:, 0])
         )
         # Where merging folds the plane, what runs forward covers all that what runs backward does.
-        stay[stay] = cross(*sides(uv[corners[stay]])) * areas[stay] > 0
+        stay[stay] = signed_double_areas(uv[corners[stay]]) * areas[stay] > 0
         count = int(stay.sum())
         if count <= most:
             chosen = np.flatnonzero(stay)
@@ -92,8 +93,3 @@ def _representatives(coordinates: FloatArray, kept: BoolArray, size: float) -> I
 def sides(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the two sides (m, d) of triangles (m, 3, d) from their first corner."""
     return corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-
-
-def cross(one: FloatArray, two: FloatArray) -> FloatArray:
-    """Return (m,) the cross products of vectors of the plane."""
-    return np.asarray(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
