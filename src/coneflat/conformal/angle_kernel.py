@@ -9,6 +9,36 @@ from ..geometry.compiled import compiled
 
 
 @compiled
+def add_angles(
+    i: int, j: int, k: int, a: float, b: float, c: float, angle_sum: FloatArray
+) -> tuple[bool, float, float, float, float]:
+    """Add the angles of a triangle with sides a, b, c opposite i, j, k to the sums there.
+
+    Where the triangle inequality is broken they are pi and 0, pi opposite the side that is too long. Returns whether it
+    is, four times the area, and the cotangents at i, j, k; these are 0 then.
+    """
+    slack_a = min(b, c) - (a - max(b, c))
+    slack_b = min(c, a) - (b - max(c, a))
+    slack_c = min(a, b) - (c - max(a, b))
+    if min(slack_a, slack_b, slack_c) <= 0.0:
+        wide = i if slack_a <= 0.0 else (j if slack_b <= 0.0 else k)
+        angle_sum[wide] += math.pi
+        return True, 0.0, 0.0, 0.0, 0.0
+    perimeter = a + b + c
+    root = math.sqrt(perimeter * slack_a * slack_b * slack_c)
+    angle_sum[i] += 2 * math.atan2(root, perimeter * slack_a)
+    angle_sum[j] += 2 * math.atan2(root, perimeter * slack_b)
+    angle_sum[k] += 2 * math.atan2(root, perimeter * slack_c)
+    return (
+        False,
+        root,
+        (perimeter * slack_a - slack_b * slack_c) / (2 * root),
+        (perimeter * slack_b - slack_c * slack_a) / (2 * root),
+        (perimeter * slack_c - slack_a * slack_b) / (2 * root),
+    )
+
+
+@compiled
 def sum_angles(
     tail: IntArray, length: FloatArray, scale: FloatArray, angle_sum: FloatArray, cots: FloatArray
 ) -> int:
@@ -30,23 +60,8 @@ def sum_angles(
         a /= largest
         b /= largest
         c /= largest
-        slack_a = min(b, c) - (a - max(b, c))
-        slack_b = min(c, a) - (b - max(c, a))
-        slack_c = min(a, b) - (c - max(a, b))
-        if min(slack_a, slack_b, slack_c) <= 0.0:
-            broken += 1
-            cots[h] = cots[h + 1] = cots[h + 2] = 0.0
-            wide = i if slack_a <= 0.0 else (j if slack_b <= 0.0 else k)
-            angle_sum[wide] += math.pi
-            continue
-        perimeter = a + b + c
-        root = math.sqrt(perimeter * slack_a * slack_b * slack_c)  # four times the area
-        angle_sum[i] += 2 * math.atan2(root, perimeter * slack_a)
-        angle_sum[j] += 2 * math.atan2(root, perimeter * slack_b)
-        angle_sum[k] += 2 * math.atan2(root, perimeter * slack_c)
-        cots[h] = (perimeter * slack_a - slack_b * slack_c) / (2 * root)
-        cots[h + 1] = (perimeter * slack_b - slack_c * slack_a) / (2 * root)
-        cots[h + 2] = (perimeter * slack_c - slack_a * slack_b) / (2 * root)
+        is_broken, _, cots[h], cots[h + 1], cots[h + 2] = add_angles(i, j, k, a, b, c, angle_sum)
+        broken += is_broken
     return broken
 
 

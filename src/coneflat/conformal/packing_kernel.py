@@ -6,6 +6,7 @@ import math
 
 from .._arrays import FloatArray, IntArray
 from ..geometry.compiled import compiled
+from .angle_kernel import add_angles
 
 
 @compiled
@@ -33,23 +34,11 @@ def sum_packing_angles(
         a = math.sqrt(gj * gj + gk * gk + 2 * inversive[h] * (gj * gk))
         b = math.sqrt(gk * gk + gi * gi + 2 * inversive[h + 1] * (gk * gi))
         c = math.sqrt(gi * gi + gj * gj + 2 * inversive[h + 2] * (gi * gj))
-        slack_a = min(b, c) - (a - max(b, c))
-        slack_b = min(c, a) - (b - max(c, a))
-        slack_c = min(a, b) - (c - max(a, b))
-        if min(slack_a, slack_b, slack_c) <= 0.0:
+        is_broken, root, cot_i, cot_j, cot_k = add_angles(i, j, k, a, b, c, angle_sum)
+        if is_broken:
             broken += 1
             weights[h] = weights[h + 1] = weights[h + 2] = 0.0
-            wide = i if slack_a <= 0.0 else (j if slack_b <= 0.0 else k)
-            angle_sum[wide] += math.pi
             continue
-        perimeter = a + b + c
-        root = math.sqrt(perimeter * slack_a * slack_b * slack_c)  # four times the area
-        angle_sum[i] += 2 * math.atan2(root, perimeter * slack_a)
-        angle_sum[j] += 2 * math.atan2(root, perimeter * slack_b)
-        angle_sum[k] += 2 * math.atan2(root, perimeter * slack_c)
-        cot_i = (perimeter * slack_a - slack_b * slack_c) / (2 * root)
-        cot_j = (perimeter * slack_b - slack_c * slack_a) / (2 * root)
-        cot_k = (perimeter * slack_c - slack_a * slack_b) / (2 * root)
         gi, gj, gk = gi * gi, gj * gj, gk * gk
         weights[h] = cot_i + (gj * cot_k + gk * cot_j) / (a * a) - 2 * gi / root
         weights[h + 1] = cot_j + (gk * cot_i + gi * cot_k) / (b * b) - 2 * gj / root
