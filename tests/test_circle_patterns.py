@@ -199,23 +199,6 @@ def test_with_and_without_delaunay_on_a_delaunay_mesh():
     np.testing.assert_array_equal(one.solved.triangulation.length, two.solved.triangulation.length)
 
 
-def test_scale_motion_and_numbering():
-    vertices, faces = shapes.sphere(3)
-    other_vertices, other_faces, new = shapes.renumber(vertices, faces)
-    base = flatten(vertices, faces, cones="greedy", method="circle-patterns")
-    for mesh in (
-        (vertices * 1e-6, faces),
-        (vertices * 1e6, faces),
-        (vertices @ shapes.rotation().T, faces),
-        (other_vertices, other_faces),
-    ):
-        other = flatten(*mesh, cones="greedy", method="circle-patterns")
-        assert other.distortion.qc_mean == pytest.approx(base.distortion.qc_mean, rel=1e-7)
-        assert other.distortion.qc_max == pytest.approx(base.distortion.qc_max, rel=1e-6)
-    np.testing.assert_array_equal(other.cones, new[base.cones])
-    np.testing.assert_allclose(other.log_scale[new], base.log_scale, atol=1e-7)
-
-
 class TestRefusals:
     def too_wide(self):
         """A cone of 5 pi at a vertex of four triangles."""

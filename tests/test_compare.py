@@ -278,3 +278,21 @@ def test_names_of_files_are_kept(tmp_path, ball):
     source = read_mesh(write_mesh(tmp_path / "ball.obj", ball))
     assert isinstance(source, MeshFile)
     assert compare_methods(source, methods=("exact",), peers=()).name.endswith("ball.obj")
+
+
+@pytest.mark.parametrize(("method", "accuracy"), [("circle-patterns", 1e-7), ("ricci", 1e-8)])
+def test_scale_motion_and_numbering(method, accuracy):
+    vertices, faces = shapes.sphere(3)
+    other_vertices, other_faces, new = shapes.renumber(vertices, faces)
+    base = flatten(vertices, faces, cones="greedy", method=method)
+    for mesh in (
+        (vertices * 1e-6, faces),
+        (vertices * 1e6, faces),
+        (vertices @ shapes.rotation().T, faces),
+        (other_vertices, other_faces),
+    ):
+        other = flatten(*mesh, cones="greedy", method=method)
+        assert other.distortion.qc_mean == pytest.approx(base.distortion.qc_mean, rel=1e-7)
+        assert other.distortion.qc_max == pytest.approx(base.distortion.qc_max, rel=1e-6)
+    np.testing.assert_array_equal(other.cones, new[base.cones])
+    np.testing.assert_allclose(other.log_scale[new], base.log_scale, atol=accuracy)

@@ -246,22 +246,6 @@ def test_what_can_be_unrolled_is_unrolled():
         assert result.distortion.area_std < 1e-8
 
 
-def test_scale_motion_and_numbering():
-    vertices, faces = shapes.sphere(3)
-    other_vertices, other_faces, new = shapes.renumber(vertices, faces)
-    base = flatten(vertices, faces, cones="greedy", method="ricci")
-    for mesh in (
-        (vertices * 1e-6, faces),
-        (vertices * 1e6, faces),
-        (vertices @ shapes.rotation().T, faces),
-        (other_vertices, other_faces),
-    ):
-        other = flatten(*mesh, cones="greedy", method="ricci")
-        assert other.distortion.qc_mean == pytest.approx(base.distortion.qc_mean, rel=1e-7)
-        assert other.distortion.qc_max == pytest.approx(base.distortion.qc_max, rel=1e-6)
-    np.testing.assert_allclose(other.log_scale[new], base.log_scale, atol=1e-8)
-
-
 def test_impossible_curvatures():
     mesh = TriangleMesh(*shapes.sphere(2))
     for value, message in ((2 * np.pi, "2 pi or more"), (np.pi, "must sum to")):

@@ -2,45 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 from click.core import ParameterSource
 
-from .figure import Eye
 from .search import as_keywords, place_options, search_options
+from .shared import Eye, repair_option, up_option
 from .talk import talk_options
-
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 #: What `compare` writes.
 COMPARED = ("compare.md", "compare.csv", "layouts.png", "quality.png")
 
-_SIGHT = (
-    click.option(
-        "--eye",
-        type=Eye(),
-        metavar="EYE",
-        default="front-right",
-        show_default=True,
-        help="Where to look from in pictures: front, back, left, right, top, bottom, two of them, or X,Y,Z.",
-    ),
-    click.option(
-        "--up",
-        type=click.Choice(["x", "y", "z"]),
-        default="y",
-        show_default=True,
-        help="The model's upward axis in pictures.",
-    ),
+eye_option = click.option(
+    "--eye",
+    type=Eye(),
+    metavar="EYE",
+    default="front-right",
+    show_default=True,
+    help="Where to look from in pictures: front, back, left, right, top, bottom, two of them, or X,Y,Z.",
 )
-
-
-def _sight(command: Command) -> Command:
-    for option in reversed(_SIGHT):
-        command = option(command)
-    return command
 
 
 @click.command(short_help="Flatten a mesh by all methods, with the same cones and cut.")
@@ -60,8 +42,9 @@ def _sight(command: Command) -> Command:
 @click.option("--paper", is_flag=True, help="The cones of the published method (greedy, epsilon 1).")
 @search_options
 @place_options
-@_sight
-@click.option("--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces.")
+@eye_option
+@up_option
+@repair_option
 @talk_options
 @click.pass_context
 def compare(
@@ -143,7 +126,8 @@ def compare(
     show_default=True,
     help="Folder for tables (Markdown and CSV) and figures.",
 )
-@_sight
+@eye_option
+@up_option
 @talk_options
 def paper(meshes: tuple[Path, ...], output: Path, eye: Any, up: str, talk: str | None) -> None:
     """Run the experiments of the paper (Section 5) on MESHES, files or folders, its numbers beside ours.

@@ -12,6 +12,7 @@ from click.core import ParameterSource
 
 from ..text import plural
 from .search import as_keywords, place_options, search_options
+from .shared import repair_option
 from .talk import talk_options
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path),
     help="With --curve: the picture to write.  [default: MESH's name with _cones, as .png]",
 )
-@click.option("--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces.")
+@repair_option
 @talk_options
 @click.pass_context
 def cones(

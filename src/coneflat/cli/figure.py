@@ -8,6 +8,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from .shared import Eye, repair_option, up_option
 from .talk import talk_options
 
 KINDS = ("layout", "checker", "quality", "cones", "curvature", "curve")
@@ -22,21 +23,6 @@ _TAKEN_BY = {
     "color_charts": ("layout",),
     "most": ("curve",),
 }
-
-
-class Eye(click.ParamType):  # type: ignore[type-arg]
-    """A direction: 1,0.5,2, or words such as front-right."""
-
-    name = "eye"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return three numbers, or the words."""
-        if not isinstance(value, str) or "," not in value:
-            return value
-        try:
-            return tuple(float(number) for number in value.split(","))
-        except ValueError:
-            self.fail(f"{value!r} is no direction; write 1,0.5,2 or front-right", param, ctx)
 
 
 @click.command(short_help="Draw a flattening: its layout, texture, quality, cones or curvature.")
@@ -64,13 +50,7 @@ class Eye(click.ParamType):  # type: ignore[type-arg]
     help="Where to look from: front, back, left, right, top, bottom, two of them for three quarters, or a direction "
     "X,Y,Z; repeat for several views.  [default: front-right]",
 )
-@click.option(
-    "--up",
-    type=click.Choice(["x", "y", "z"]),
-    default="y",
-    show_default=True,
-    help="The model's upward axis.",
-)
+@up_option
 @click.option("--size", type=float, nargs=2, metavar="WIDTH HEIGHT", help="Inches.  [default: what it needs]")
 @click.option("--dpi", type=float, default=300.0, show_default=True, help="Dots per inch of pictures.")
 @click.option("--colors", metavar="NAME", help="Of quality and curvature: a colour map of matplotlib.")
@@ -85,7 +65,7 @@ class Eye(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     "--most", type=int, default=30, show_default=True, help="Of the curve: the largest number of cones."
 )
-@click.option("--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces.")
+@repair_option
 @click.option("--title", default="", help="A line above all.")
 @talk_options
 @click.pass_context

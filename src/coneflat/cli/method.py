@@ -9,6 +9,7 @@ import click
 from click.core import ParameterSource
 
 from .search import PURSUIT_OPTIONS, Angle, Direction, as_keywords, search_options
+from .shared import repair_option
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -134,9 +135,7 @@ _AFTER_SEARCH = (
         help="Seams prefer what can hardly be seen: a tenth of the cost in deep folds and, with --up, below.",
     ),
     click.option("--keep-seams", is_flag=True, help="Cut where the file's own UV coordinates have seams."),
-    click.option(
-        "--repair", is_flag=True, help="Split non-manifold edges and vertices, drop degenerate faces."
-    ),
+    repair_option,
     click.option("--strict", is_flag=True, help="Refuse triangles without area instead of opening them."),
     click.option(
         "--solver",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from .shared import up_option
 from .talk import talk_options
 
 
@@ -25,13 +26,7 @@ from .talk import talk_options
     type=click.Choice(["checker", "picture", "charts", "qc", "area", "curvature", "flat", "plain"]),
     help="What the page shows first.  [default: checker, or picture with --texture]",
 )
-@click.option(
-    "--up",
-    type=click.Choice(["x", "y", "z"]),
-    default="y",
-    show_default=True,
-    help="The model's upward axis.",
-)
+@up_option
 @click.option(
     "--most-triangles",
     type=int,
