@@ -12,7 +12,7 @@ from coneflat.conformal.doubling import double
 from coneflat.conformal.exact import exact_metric
 from coneflat.conformal.hessian import HessianPattern
 from coneflat.conformal.linear import scaled_lengths
-from coneflat.conformal.newton import conjugate_gradients
+from coneflat.conformal.preconditioner import conjugate_gradients, corrected
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths
 from coneflat.geometry.intrinsic import intrinsic_triangulation
 from coneflat.layout.straighten import straight_triangles
@@ -279,8 +279,8 @@ class Scaled:
     """The inverse of the Laplacian of the input, or nothing like it."""
 
     def __init__(self, mesh, worth, is_good):
-        laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths_of(mesh)), len(mesh.vertices))
-        self.inverse = np.linalg.pinv(laplacian.toarray()) if is_good else np.eye(len(mesh.vertices))
+        self.laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths_of(mesh)), len(mesh.vertices))
+        self.inverse = np.linalg.pinv(self.laplacian.toarray()) if is_good else np.eye(len(mesh.vertices))
         self.worth, self.calls = worth, 0
 
     def solve(self, right):
@@ -299,6 +299,41 @@ def test_a_preconditioner_changes_the_way_not_the_end(worth, is_good):
     assert metric.residual < 1e-12
     assert inverse.calls
     assert metric.log_scale == pytest.approx(expected.log_scale, abs=1e-9)
+
+
+def test_an_inverse_is_corrected_where_the_matrix_differs():
+    mesh = random_sphere(400, 3)
+    lengths = lengths_of(mesh)
+    inverse = Scaled(mesh, 60, True)
+    phi = np.zeros(400)
+    phi[::50] = 0.15  # the triangles around change
+    scaled = lengths * np.exp(
+        (phi[np.roll(mesh.faces, -1, axis=1)] + phi[np.roll(mesh.faces, -2, axis=1)]) / 2
+    )
+    matrix = cotangent_laplacian(mesh.faces, cotangents(scaled), 400)
+    matrix.sort_indices()
+    held = np.zeros(400, dtype=bool)
+    right = np.random.default_rng(0).normal(size=400)
+    right -= right.mean()
+
+    def calls(one):
+        inverse.calls = 0
+        solution = conjugate_gradients(matrix, right, one, 1e-12)
+        assert matrix @ solution == pytest.approx(right, abs=1e-9)
+        return inverse.calls
+
+    better = corrected(inverse, matrix, held)
+    around = np.unique(mesh.faces[(mesh.faces % 50 == 0).any(axis=1)])
+    assert len(better.chosen) == 40
+    assert set(better.chosen) <= set(around)
+    # It is symmetric, or conjugate gradients would go astray.
+    one, other = np.random.default_rng(1).normal(size=(2, 400))
+    one, other = one - one.mean(), other - other.mean()
+    assert one @ better.solve(other) == pytest.approx(other @ better.solve(one), rel=1e-9)
+    assert calls(better) < 0.6 * calls(inverse)
+    # Nothing differs, or what differs is held.
+    assert corrected(inverse, inverse.laplacian, held) is inverse
+    assert corrected(inverse, matrix, ~held) is inverse
 
 
 def test_conjugate_gradients_tell_what_they_cannot_solve():

@@ -23,11 +23,13 @@ class LaplacianInverse:
 
     Attributes:
         apply: the function.
+        laplacian: (n, n), of all vertices.
         is_zero: (n,) the vertices where its solutions are zero.
         worth: how many solutions take as long as another factorization.
     """
 
     apply: Callable[[FloatArray], FloatArray]
+    laplacian: csc_matrix
     is_zero: BoolArray
     worth: int
 

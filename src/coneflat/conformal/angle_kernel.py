@@ -26,9 +26,11 @@ def add_angles(
         return True, 0.0, 0.0, 0.0, 0.0
     perimeter = a + b + c
     root = math.sqrt(perimeter * slack_a * slack_b * slack_c)
-    angle_sum[i] += 2 * math.atan2(root, perimeter * slack_a)
-    angle_sum[j] += 2 * math.atan2(root, perimeter * slack_b)
-    angle_sum[k] += 2 * math.atan2(root, perimeter * slack_c)
+    angle_i = 2 * math.atan2(root, perimeter * slack_a)
+    angle_j = 2 * math.atan2(root, perimeter * slack_b)
+    angle_sum[i] += angle_i
+    angle_sum[j] += angle_j
+    angle_sum[k] += math.pi - angle_i - angle_j  # a third of the time less, and as exact as their sum is
     return (
         False,
         root,
@@ -66,11 +68,13 @@ def sum_angles(
 
 
 @compiled
-def has_negative_weight(twin: IntArray, cots: FloatArray) -> bool:
-    """Return whether the cotangents opposite some edge sum to less than 0: it is not Delaunay."""
+def find_negative_weights(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
+    """Write a half-edge of each edge whose cotangents sum to less than 0, so is not Delaunay; return their number."""
+    count = 0
     for h in range(len(twin)):
         t = twin[h]
         # The margin is the rounding of the cotangents; the test that decides on a flip has its own.
         if t > h and cots[h] + cots[t] < -1e-13 * (abs(cots[h]) + abs(cots[t])):
-            return True
-    return False
+            found[count] = h
+            count += 1
+    return count

@@ -12,7 +12,8 @@ from ..geometry.intrinsic import IntrinsicTriangulation, intrinsic_triangulation
 from ..geometry.triangles import double_areas
 from ..mesh import TriangleMesh
 from .doubling import double
-from .newton import ConformalProblem, Inverse, State, minimize
+from .newton import ConformalProblem, State, minimize
+from .preconditioner import Inverse
 
 # How far, in radians, prescribed curvatures may miss Gauss-Bonnet; decimals typed by hand are good to more.
 SUM_TOLERANCE = 1e-8

@@ -130,3 +130,42 @@ def fill_values(
     for v in range(len(held)):
         if held[v]:
             values[diagonal[v]] = 1.0
+
+
+@compiled
+def changed_share(
+    starts: Int32Array,
+    rows: Int32Array,
+    values: FloatArray,
+    other_starts: Int32Array,
+    other_rows: Int32Array,
+    other_values: FloatArray,
+    held: BoolArray,
+) -> FloatArray:
+    """Return (n,) by how much two symmetric matrices differ in each column, as a share of the other's diagonal.
+
+    Both have sorted rows. Rows and columns that are held do not count.
+    """
+    share = np.zeros(len(held))
+    for v in range(len(held)):
+        if held[v]:
+            continue
+        change, diagonal = 0.0, 0.0
+        at, other = starts[v], other_starts[v]
+        while at < starts[v + 1] or other < other_starts[v + 1]:
+            row = rows[at] if at < starts[v + 1] else len(held)
+            if other < other_starts[v + 1]:
+                row = min(row, other_rows[other])
+            value = 0.0
+            if at < starts[v + 1] and rows[at] == row:
+                value += values[at]
+                at += 1
+            if other < other_starts[v + 1] and other_rows[other] == row:
+                value -= other_values[other]
+                if row == v:
+                    diagonal = other_values[other]
+                other += 1
+            if not held[row]:
+                change += abs(value)
+        share[v] = change / diagonal if diagonal > 0 else np.inf
+    return share

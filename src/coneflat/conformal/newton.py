@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -16,79 +15,20 @@ from ..geometry.intrinsic import IntrinsicTriangulation
 from ..mesh import NEXT
 from ..solver import Factor, factorize
 from .hessian import HessianPattern
+from .preconditioner import HeldInverse, Inverse, conjugate_gradients, corrected
 
 # Residual, radians, below which nothing is left to gain: the rounding of a sum of a few angles.
 GOAL = 1e-13
 # Largest change of phi in one step. Beyond e^5 in length the quadratic model says nothing any more.
 LARGEST_STEP = 5.0
-# A factorization serves on as the preconditioner of later steps while the iterations that these take, as the first few
-# foretell, cost less than a new one.
-FIRST_FEW = 4
 # A step is solved for to the accuracy of the residual, but to this at least: more is lost to the next.
 COARSEST = 0.05
+# Log scales that differ by less than this have nearly the same Hessian.
+NEARLY = 0.05
 # Halvings of a step after which it is taken for rounding: the change is then below 1e-9 of the first trial.
 HALVINGS = 30
 # The same where the surface can be doubled instead of creeping along triangles that are about to break.
 HALVINGS_BOUNDED = 6
-
-
-class Inverse(Protocol):
-    """What applies the inverse of a Laplacian, or something close to it; see `coneflat.solver.Factor`."""
-
-    @property
-    def worth(self) -> int:
-        """How many solutions take as long as another factorization."""
-        ...
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Return (n,) the solution for a right-hand side (n,)."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class HeldInverse:
-    """A factorized Laplacian with rows and columns of the identity where the solution is held at 0."""
-
-    factor: Factor
-    held: BoolArray
-
-    @property
-    def worth(self) -> int:
-        """How many solutions take as long as another factorization."""
-        return self.factor.worth
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Return (n,) the solution, 0 where it is held."""
-        return np.where(self.held, 0.0, self.factor.solve(np.where(self.held, 0.0, right)))
-
-
-def conjugate_gradients(
-    matrix: csc_matrix, right: FloatArray, inverse: Inverse, accuracy: float
-) -> FloatArray | None:
-    """Solve a semidefinite system whose right side is in its range; None if it is not one or takes too long.
-
-    accuracy: what the residual, in the norm of the inverse that preconditions it, comes down to, relatively.
-    """
-    solution, residual = np.zeros_like(right), right.copy()
-    step = towards = inverse.solve(residual)
-    size = first = float(residual @ towards)
-    for done in range(1, inverse.worth + 1):
-        if not 0 < size < np.inf:
-            return None
-        image = matrix @ step
-        bend = float(step @ image)
-        if not bend > 0:
-            return None
-        solution += size / bend * step
-        residual -= size / bend * image
-        towards = inverse.solve(residual)
-        size, before = float(residual @ towards), size
-        if abs(size) <= accuracy**2 * first:
-            return solution
-        if done == FIRST_FEW and not size <= accuracy ** (2 * FIRST_FEW / inverse.worth) * first:
-            return None
-        step = towards + size / before * step
-    return None
 
 
 @dataclass(eq=False)
@@ -144,6 +84,7 @@ class ConformalProblem:
     last: State | None = None
     _pattern: HessianPattern | None = None
     _factor: Factor | None = None
+    _known: tuple[Inverse, FloatArray, Inverse] | None = None
 
     @cached_property
     def is_bounded(self) -> bool:
@@ -171,20 +112,22 @@ class ConformalProblem:
         scale = np.exp(centred(log_scale) / 2)
         return sum_angles(self.triangulation.tail, self.triangulation.length, scale, sums, cots)
 
-    def flip(self, log_scale: FloatArray) -> IntArray:
-        """Flip to Delaunay in the scaled metric; return the half-edges flipped."""
-        return make_delaunay(self.triangulation, log_scale)
+    def flip(self, log_scale: FloatArray, suspects: IntArray | None) -> IntArray:
+        """Flip to Delaunay in the scaled metric, from some half-edges or all; return the half-edges flipped."""
+        return make_delaunay(self.triangulation, log_scale, suspects=suspects)
 
     def evaluate(self, log_scale: FloatArray) -> State:
         """Flip to Delaunay in the scaled metric and return the curvature there."""
-        from .angle_kernel import has_negative_weight
+        from .angle_kernel import find_negative_weights
 
         sums = np.empty(len(log_scale))
         cots = np.empty(len(self.triangulation.tail))
         broken = self.sum_angles(log_scale, sums, cots)
         # The cotangents are needed anyway and tell at a glance where there is nothing to flip.
-        if broken or has_negative_weight(self.triangulation.twin, cots):
-            flipped = self.flip(log_scale)
+        found = np.empty(len(cots), dtype=np.int64)
+        suspects = found[: find_negative_weights(self.triangulation.twin, cots, found)]
+        if broken or len(suspects):
+            flipped = self.flip(log_scale, None if broken else suspects)
             if len(flipped):
                 self.records.append(flipped)
                 self._pattern = None
@@ -209,13 +152,25 @@ class ConformalProblem:
         if self.preconditioner is not None:
             accuracy = min(max(state.largest, GOAL / state.largest / 4), COARSEST)
             hessian = self._pattern.matrix(state.cots, self.fixed)
-            step = conjugate_gradients(hessian, state.residual, self.preconditioner, accuracy)
+            inverse = self._corrected(self.preconditioner, hessian, state.log_scale)
+            step = conjugate_gradients(hessian, state.residual, inverse, accuracy)
             if step is not None:
                 return np.where(self.fixed, 0.0, step), False
         held = self.fixed | self.pinned
-        self._factor = factorize(self._pattern.matrix(state.cots, held), self._factor)
-        self.preconditioner = HeldInverse(self._factor, held)
+        hessian = self._pattern.matrix(state.cots, held)
+        self._factor = factorize(hessian, self._factor)
+        self.preconditioner = HeldInverse(self._factor, hessian, held)
         return self.preconditioner.solve(state.residual), True
+
+    def _corrected(self, inverse: Inverse, hessian: csc_matrix, log_scale: FloatArray) -> Inverse:
+        """Return an inverse corrected for the Hessian, or for one that was nearly the same."""
+        if (
+            self._known is None
+            or self._known[0] is not inverse
+            or np.ptp(log_scale - self._known[1]) > NEARLY
+        ):
+            self._known = inverse, log_scale, corrected(inverse, hessian, self.fixed)
+        return self._known[2]
 
 
 def minimize(problem: ConformalProblem, log_scale: FloatArray, tolerance: float, max_steps: int) -> State:

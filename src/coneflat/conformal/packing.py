@@ -59,11 +59,10 @@ class PackingProblem(ConformalProblem):
         radii = self.radii * np.exp(centred(log_scale))
         return sum_packing_angles(self.triangulation.tail, self.triangulation.length, radii, sums, cots)
 
-    def flip(self, log_scale: FloatArray) -> IntArray:
-        """Flip to weighted Delaunay for the radii; return the half-edges flipped."""
-        return make_delaunay(
-            self.triangulation, radii=self.radii * np.exp(centred(log_scale)), has_lengths=False
-        )
+    def flip(self, log_scale: FloatArray, suspects: IntArray | None) -> IntArray:
+        """Flip to weighted Delaunay for the radii, from some half-edges or all; return the half-edges flipped."""
+        radii = self.radii * np.exp(centred(log_scale))
+        return make_delaunay(self.triangulation, radii=radii, has_lengths=False, suspects=suspects)
 
     def _ends(self, radii: FloatArray) -> tuple[FloatArray, FloatArray]:
         tail = self.triangulation.tail
@@ -74,7 +73,7 @@ class PackingProblem(ConformalProblem):
 class FixedPackingProblem(PackingProblem):
     """The same on the triangles as they are; a minimum may lie where some break the triangle inequality."""
 
-    def flip(self, log_scale: FloatArray) -> IntArray:
+    def flip(self, log_scale: FloatArray, suspects: IntArray | None) -> IntArray:
         """Flip nothing."""
         return np.empty(0, dtype=np.int64)
 

@@ -18,6 +18,7 @@ def make_delaunay(
     log_scale: FloatArray | None = None,
     radii: FloatArray | None = None,
     has_lengths: bool = True,
+    suspects: IntArray | None = None,
 ) -> IntArray:
     """Flip a triangulation, in place, until it is Delaunay; return the half-edges flipped, in order.
 
@@ -29,6 +30,7 @@ def make_delaunay(
         radii: (n,) of circles at the vertices, to make the triangulation weighted Delaunay for.
         has_lengths: False if the triangulation has the circles' inversive distances for lengths: flips then keep these
             (Bobenko, Lutz 2023).
+        suspects: half-edges of the edges that may fail the condition at first; None: all.
 
     Notes:
         Where nothing fails the condition the cost is one pass over the edges. The condition is meaningful
@@ -46,7 +48,11 @@ def make_delaunay(
         scale = np.exp((log_scale - (log_scale.max() + log_scale.min()) / 2) / 2)
     arrays = triangulation.twin, triangulation.tail, triangulation.length
     stack = np.empty(len(triangulation.twin), dtype=np.int64)
-    top = find_violations(*arrays, scale, kind, stack)
+    if suspects is None:
+        top = find_violations(*arrays, scale, kind, stack)
+    else:
+        top = len(suspects)
+        stack[:top] = suspects
     if top == 0:
         return np.empty(0, dtype=np.int64)
     queued = np.zeros(len(stack), dtype=np.bool_)

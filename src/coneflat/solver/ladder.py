@@ -66,12 +66,13 @@ def solving(name: str) -> Iterator[Choice]:
         _choice.reset(token)
 
 
-def factorize(matrix: csc_matrix, used_up: Factor | None = None) -> Factor:
+def factorize(matrix: csc_matrix, used_up: Factor | None = None, is_noted: bool = True) -> Factor:
     """Factorize a sparse symmetric positive definite matrix.
 
     Args:
         matrix: (n, n), both triangles, with sorted indices.
         used_up: the factor of another matrix of the same size, needed no more, whose analysis may serve.
+        is_noted: whether the back end counts as used, as it does not for a small part of something larger.
 
     Raises:
         MetricError: it is singular in double precision.
@@ -90,7 +91,8 @@ def factorize(matrix: csc_matrix, used_up: Factor | None = None) -> Factor:
         if choice.name != "auto" or not available("amg"):
             raise
         name, factor = "amg", _open("amg", matrix)
-    choice.used[name] = None
+    if is_noted:
+        choice.used[name] = None
     return factor
 
 
