@@ -15,6 +15,8 @@ from .green import GreenOperator
 
 # E^2 that is zero but for rounding.
 ROUNDING = 1e-18
+# Rows of a dense product made at a time.
+BLOCK = 128
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +75,9 @@ def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> C
         # Makes it definite, and means the same: what a source has in sum is taken off in proportion to area.
         stiffness += np.outer(weights, weights) * (stiffness.trace() / (weights @ weights) / len(weights))
     green = inverse_of_definite(stiffness)
-    weighted = np.asarray(coarse.mass @ green) - np.outer(weights, weights @ green)
-    kernel = green @ weighted
-    kernel = (kernel + kernel.T) / 2
+    kernel = symmetric_product(green, coarse.mass @ green)
+    mean = green @ weights
+    kernel -= np.outer(mean, mean)
     bare = basis.T @ curvature
     slope = -(kernel @ bare)
     return CoarseModel(basis, kernel, slope, float(-(slope @ bare)))
@@ -97,12 +99,26 @@ def inverse_of_definite(matrix: FloatArray) -> FloatArray:
     Raises:
         MetricError: rounding has made it indefinite.
     """
-    factor, failed = lapack.dpotrf(matrix, lower=0)
+    # Transposed, as LAPACK wants columns: nothing is copied on the way.
+    factor, failed = lapack.dpotrf(matrix.T.copy(order="F"), lower=0, overwrite_a=1)
     if failed:
         raise MetricError(
             f"the coarse Laplacian of {len(matrix)} unknowns is not positive definite: the mesh has triangles too "
             "thin for double precision; remesh them, or run with --repair"
         )
-    half, _ = lapack.dpotri(factor, lower=0)
-    upper = np.triu(half)
-    return upper + np.triu(half, 1).T
+    half, _ = lapack.dpotri(factor, lower=0, overwrite_c=1)  # the upper triangle; below are zeros
+    inverse: FloatArray = half + half.T
+    inverse[np.diag_indices(len(inverse))] /= 2
+    return inverse
+
+
+def symmetric_product(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return one other, (n, n) arrays whose product is symmetric: the upper triangle in blocks, and its mirror."""
+    half = np.zeros_like(one)
+    for start in range(0, len(one), BLOCK):
+        end = start + BLOCK
+        half[start:end, start:] = one[start:end] @ other[:, start:]
+        half[start:end, start:end] = np.triu(half[start:end, start:end])
+    product = half + half.T
+    product[np.diag_indices(len(product))] /= 2
+    return product

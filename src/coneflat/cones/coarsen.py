@@ -19,6 +19,8 @@ LARGEST_AGGREGATE = 7.0
 WEAK = 0.02
 # Damping of the Jacobi step that smooths the aggregates: 4/3 over the largest eigenvalue of D^-1 L, about 2.
 DAMPING = 2 / 3
+# The last level has at most so many times the number of functions wanted, if a few tries can do it.
+CLOSE, TRIES = 1.05, 4
 # Values that differ by less, relatively, are equal, and the first in the order of vertices is taken.
 TIE = 1e-9
 
@@ -53,7 +55,7 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
     while level.shape[0] > 1.2 * size:
         ratio = level.shape[0] / size
         steps = max(1, round(np.log(ratio) / np.log(LARGEST_AGGREGATE)))
-        part = _smoothed_aggregates(level, order, ratio ** (1 / steps))
+        part = _smoothed_aggregates(level, order, ratio ** (1 / steps), size if steps == 1 else None)
         if part.shape[1] > 0.9 * level.shape[0]:
             break
         transposed = csr_matrix(part.T)
@@ -72,14 +74,20 @@ def _with_scaled_rows(matrix: csr_matrix, factors: FloatArray) -> csr_matrix:
     return csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
-def _smoothed_aggregates(level: csr_matrix, order: IntArray, size: float) -> csr_matrix:
+def _smoothed_aggregates(level: csr_matrix, order: IntArray, size: float, most: int | None) -> csr_matrix:
+    """Return basis functions made of about `size` vertices each, `most` of them if that can be had."""
     from .aggregate_kernel import aggregate
 
     count = level.shape[0]
     diagonal = np.maximum(level.diagonal(), 1e-300)
-    labels, number = aggregate(
-        level.indptr.astype(np.int64), level.indices.astype(np.int64), level.data, diagonal, order, size, WEAK
-    )
+    rows = level.indptr.astype(np.int64), level.indices.astype(np.int64), level.data, diagonal, order
+    labels, number = aggregate(*rows, size, WEAK)
+    for _ in range(TRIES):
+        if most is None or number <= most * CLOSE:
+            break
+        # Vertices left over make aggregates smaller than wished, and another level for that little makes all dense.
+        size *= number / most
+        labels, number = aggregate(*rows, size, WEAK)
     pieces = csr_matrix((np.ones(count), (np.arange(count), labels)), shape=(count, number))
     return csr_matrix(pieces - diags(DAMPING / diagonal) @ (level @ pieces))
 
