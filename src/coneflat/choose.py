@@ -17,6 +17,7 @@ from .geometry.ties import tie_key
 from .mesh import TriangleMesh
 from .options import Options
 from .stages import Stages
+from .threads import HUGE
 from .wishes import Wishes
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ DEARER = 1.15
 Turned: TypeAlias = Callable[[ConeSolution], FloatArray]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Surface:
     """A connected mesh with what the choice of cones needs of its metric.
 
@@ -44,6 +45,7 @@ class Surface:
         laplacian: (n, n) cotangent Laplacian.
         curvature: (n,) angle defect, radians.
         areas: (n,) vertex areas.
+        search: the search for cones that has been opened on it, if any.
     """
 
     mesh: TriangleMesh
@@ -51,6 +53,7 @@ class Surface:
     laplacian: csc_matrix
     curvature: FloatArray
     areas: FloatArray
+    search: ConeSearch | None = None
 
     @classmethod
     def of(cls, mesh: TriangleMesh, lengths: FloatArray) -> Surface:
@@ -159,7 +162,10 @@ def only_choice(surface: Surface, wishes: Wishes, options: Options) -> ConeSolut
 
 
 def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages) -> ConeSearch:
-    """Return a search for cones as the options and the user's wishes have it."""
+    """Return a search for cones as the options and the user's wishes have it.
+
+    One that is open on the surface goes on: only where cones are allowed may have changed.
+    """
     from .cones.pursuit import open_search
 
     mesh = surface.mesh
@@ -167,6 +173,9 @@ def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages
     room = (
         ROOM * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)) + np.pi * mesh.is_boundary_vertex
     )
+    if surface.search is not None:
+        surface.search.restrict(~surface.search.is_boundary & wishes.is_allowed)
+        return surface.search
     search = open_search(
         surface.laplacian,
         surface.curvature,
@@ -185,4 +194,6 @@ def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages
         room=None if options.refine else room.astype(np.float64),
     )
     search.tell = stages.tell
+    if len(mesh.faces) <= HUGE:  # else it holds too much memory
+        surface.search = search
     return search

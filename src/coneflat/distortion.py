@@ -7,9 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from ._arrays import BoolArray, FloatArray, IntArray, dots
+from ._arrays import FloatArray, IntArray, dots
 from .atlas.overlap import find_overlaps
-from .geometry.planar import signed_double_areas
 from .mesh import TriangleMesh, end_corners, label_components
 from .threads import meanwhile
 
@@ -111,15 +110,13 @@ def _measure(
     cones: IntArray | None,
 ) -> Distortion:
     """Return all measures but those of overlaps."""
-    area, longest = _model_areas(mesh)
-    one, two = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
-    uv_area = signed_double_areas(corner_uv)
-    uv_longest = np.sqrt(np.maximum.reduce([dots(side, side) for side in (one, two, two - one)]))
-    has_area = area > ZERO_AREA * longest**2
-    has_uv_area = np.abs(uv_area) > ZERO_AREA * uv_longest**2
+    from .distortion_kernel import measure_triangles
+
+    corner_uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
+    area, has_area, uv_area, has_uv_area, qc = measure_triangles(
+        mesh.vertices, mesh.faces, corner_uv, ZERO_AREA
+    )
     valid = has_area & has_uv_area
-    qc = np.full(len(area), np.nan)
-    qc[valid] = _singular_value_ratio(mesh, valid, one[valid], two[valid], area[valid], uv_area[valid])
     log_scale = np.full(len(area), np.nan)
     log_scale[valid] = np.log(np.abs(uv_area[valid]) / area[valid]) / 2
     weights = area[valid]
@@ -153,45 +150,6 @@ def _measure(
     )
 
 
-def _model_areas(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
-    """Return twice the area of each triangle in space, and its longest side."""
-    corners = mesh.vertices[mesh.faces]
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    longest = np.sqrt(np.maximum.reduce([dots(side, side) for side in (one, two, two - one)]))
-    normal = np.cross(one, two)
-    return np.sqrt(dots(normal, normal)), longest
-
-
-def _singular_value_ratio(
-    mesh: TriangleMesh,
-    chosen: BoolArray,
-    one: FloatArray,
-    two: FloatArray,
-    area: FloatArray,
-    uv_area: FloatArray,
-) -> FloatArray:
-    """Return the ratio of the singular values of the maps of the chosen triangles.
-
-    Args:
-        one, two: (k, 2) UV sides from corner 0.
-        area, uv_area: (k,) twice the areas.
-    """
-    corners = mesh.vertices[mesh.faces[chosen]]
-    along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    base = np.sqrt(dots(along, along))
-    x = dots(along, across) / base
-    height = area / base
-    column_x = one / base[:, None]
-    column_y = (two - column_x * x[:, None]) / height[:, None]
-    similar = np.hypot(column_x[:, 0] + column_y[:, 1], column_x[:, 1] - column_y[:, 0])
-    mirrored = np.hypot(column_x[:, 0] - column_y[:, 1], column_x[:, 1] + column_y[:, 0])
-    # The smaller one from the determinant: their difference would cancel.
-    larger = (similar + mirrored) / 2
-    smaller = np.abs(uv_area) / area / larger
-    ratio: FloatArray = np.maximum(larger / smaller, 1.0)
-    return ratio
-
-
 def _sides(mesh: TriangleMesh, corner_uv: FloatArray, edges: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return the UV ends (k, 2, 2) of interior edges as each of their two faces sees them, in one order."""
     corners = corner_uv.reshape(-1, 2)
@@ -206,20 +164,17 @@ def _side_lengths(ends: FloatArray) -> FloatArray:
 
 def seams_of(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
     """Return the inner edges whose two sides have different UVs."""
-    return _seams_and_charts(mesh, corner_uv)[0]
+    return _seams_and_charts(mesh, np.ascontiguousarray(corner_uv, dtype=np.float64))[0]
 
 
 def _seams_and_charts(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[IntArray, int, IntArray]:
     """Return the interior edges whose UVs differ, the number of charts, and the chart of each face."""
-    inside = np.flatnonzero(~mesh.is_boundary_edge)
-    here, there = _sides(mesh, corner_uv, inside)
-    joined = np.logical_and.reduce((here == there).reshape(-1, 4).T)
-    apart = np.flatnonzero(~joined)
-    gap = np.sqrt(dots(here[apart] - there[apart], here[apart] - there[apart])).max(axis=1)
-    joined[apart] = gap <= JOINED * np.maximum(_side_lengths(here[apart]), _side_lengths(there[apart]))
-    faces = mesh.edge_faces[inside[joined]]
+    from .distortion_kernel import find_joined
+
+    joined = find_joined(mesh.edge_halfedges, corner_uv, JOINED)
+    faces = mesh.edge_faces[joined]
     count, chart = label_components(len(mesh.faces), faces[:, 0], faces[:, 1])
-    return inside[~joined], count, chart
+    return np.flatnonzero(~joined & ~mesh.is_boundary_edge), count, chart
 
 
 def _seam_mismatch(
@@ -275,6 +230,6 @@ def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
     """Return the value below which lies a fraction of the weight; NaN of nothing."""
     if not len(values):
         return float("nan")
-    order = np.argsort(values, kind="stable")
+    order = np.argsort(values)
     cumulated = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(cumulated, fraction * cumulated[-1])])

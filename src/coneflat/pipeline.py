@@ -223,8 +223,10 @@ def _flatten_components(prepared: Prepared, options: Options, stages: Stages) ->
 
 def flatten_component(part: Component, options: Options, stages: Stages) -> LaidOut:
     """Flatten a connected mesh to one disk."""
+    with stages("cones", 0.1):
+        surface = Surface.of(part.mesh, part.lengths)
     for _ in range(SEARCHES):
-        laid_out = _flatten_once(part, options, stages)
+        laid_out = _flatten_once(surface, part, options, stages)
         unheld = unheld_cones(laid_out)
         if not len(unheld) or not pursues(part.mesh, options) or options.method not in UNFOLDED:
             break
@@ -279,9 +281,8 @@ def unheld_cones(laid_out: LaidOut) -> IntArray:
     return laid_out.cones[np.abs(error[laid_out.cones]) > UNHELD]
 
 
-def _flatten_once(part: Component, options: Options, stages: Stages) -> LaidOut:
+def _flatten_once(surface: Surface, part: Component, options: Options, stages: Stages) -> LaidOut:
     with stages("cones", 0.4):
-        surface = Surface.of(part.mesh, part.lengths)
         solution = choose_cones(
             surface, part.wishes, options, stages, _turning_meter(surface, part.wishes, options)
         )

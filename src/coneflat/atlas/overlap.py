@@ -81,19 +81,23 @@ def _corners(points: ArrayLike, triangles: ArrayLike | None) -> FloatArray:
     shape = "(n, 2)" if triangles is not None else "(m, 3, 2)"
     if places.shape[1:] != ((2,) if triangles is not None else (3, 2)):
         raise ArrayShapeError(f"points must have the shape {shape}, not {places.shape}")
-    if triangles is None:
-        triangles = np.arange(3 * len(places)).reshape(-1, 3)
-        places = places.reshape(-1, 2)
-    faces = as_faces(triangles, len(places))
-    require_finite(places, faces)
-    return places[faces]
+    if triangles is not None:
+        faces = as_faces(triangles, len(places))
+        require_finite(places, faces)
+        return places[faces]
+    if not len(places) or not np.isfinite(places).all():
+        faces = as_faces(np.arange(3 * len(places)).reshape(-1, 3), 3 * len(places))
+        require_finite(places.reshape(-1, 2), faces)
+    return places
 
 
 def _at_unit_size(corners: FloatArray) -> tuple[FloatArray, int]:
     """Return the corners divided by a power of two, which rounds nothing, and its exponent."""
-    exponent = int(np.frexp(np.abs(corners).max())[1])
-    scaled = np.ldexp(corners, -exponent)
-    return np.where(np.abs(scaled) < TINY, 0.0, scaled), exponent
+    exponent = int(np.frexp(max(corners.max(), -corners.min()))[1])
+    # By a product, which takes a fifth of the time, unless the factor is not finite.
+    scaled = corners * 2.0**-exponent if exponent > -1000 else np.ldexp(corners, -exponent)
+    scaled[np.abs(scaled) < TINY] = 0.0
+    return scaled, exponent
 
 
 def _counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:

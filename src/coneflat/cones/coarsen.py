@@ -104,10 +104,10 @@ def _order_of_aggregates(part: csr_matrix, order: IntArray) -> IntArray:
 def representatives(basis: csr_matrix, fitness: FloatArray) -> IntArray:
     """Return for each coarse function the vertex where it is largest, times the fitness, without repetitions."""
     columns = basis.tocsc()
-    found = []
-    for j in range(basis.shape[1]):
-        rows = columns.indices[columns.indptr[j] : columns.indptr[j + 1]]
-        values = columns.data[columns.indptr[j] : columns.indptr[j + 1]] * fitness[rows]
-        if len(rows) and values.max() > 0:
-            found.append(rows[np.argmax(values >= values.max() * (1 - TIE))])
-    return np.unique(np.array(found, dtype=np.int64))
+    values = columns.data * fitness[columns.indices]
+    of = np.repeat(np.arange(columns.shape[1]), np.diff(columns.indptr))
+    largest = np.zeros(columns.shape[1])
+    np.maximum.at(largest, of, values)
+    near = np.flatnonzero((values > 0) & (values >= largest[of] * (1 - TIE)))
+    first = near[np.unique(of[near], return_index=True)[1]]
+    return np.unique(columns.indices[first]).astype(np.int64)

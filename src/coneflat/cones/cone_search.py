@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..errors import CurvatureError
 from ..text import plural
 from ..threads import meanwhile
 from .coarse_model import candidates, coarse_model
@@ -37,6 +38,16 @@ ROOMY = 4 * np.pi
 NOTHING = 1e-9
 # How many local optima of the coarse model are tried on the mesh when the best one misses narrowly.
 RUNNERS = 3
+
+
+def check_available(usable: BoolArray, required: IntArray, limits: Limits) -> None:
+    """Raise CurvatureError if cones at the (n,) usable vertices and the required ones cannot carry the curvature."""
+    available = np.count_nonzero(usable) + np.count_nonzero(~usable[required])
+    if available < limits.fewest:
+        raise CurvatureError(
+            f"cones are allowed at {plural(available, 'vertex', 'vertices')}, but {limits.fewest} or more cones are "
+            f"needed for a total curvature of {limits.total / np.pi:.4g} pi"
+        )
 
 
 class ConeSearch:
@@ -69,7 +80,8 @@ class ConeSearch:
         usable: BoolArray,
         room: FloatArray | None = None,
     ) -> None:
-        self._laplacian, self.curvature, self._is_boundary = laplacian, curvature, is_boundary
+        check_available(usable, required, limits)
+        self._laplacian, self.curvature, self.is_boundary = laplacian, curvature, is_boundary
         self.limits = limits
         self.tell: Callable[[str], None] = lambda _: None
         self.operator = GreenOperator(laplacian, areas, is_boundary, order)
@@ -83,22 +95,39 @@ class ConeSearch:
         with meanwhile(partial(coarse_model, self.operator, inner, size), 2 * len(vertices)) as modelling:
             log_scale = -self.operator.solve(inner)
             coarse = modelling.result().scaled_to(float(log_scale @ self.operator.weighted(log_scale)))
-        is_usable = usable[vertices].copy()
-        is_usable[free] = False
-        least = np.full(len(vertices), limits.least)
-        fitness = is_usable.astype(np.float64)
+        self._coarse_model, self._free = coarse, free
+        self._least = np.full(len(vertices), limits.least)
+        self._fitness = np.ones(len(vertices))
         if room is not None:
-            least = np.maximum(least, np.minimum(FULL_TURN - room[vertices], 0.0))
-            fitness *= np.minimum(room[vertices], ROOMY) / ROOMY
-        self.places = np.concatenate([free, candidates(coarse, fitness)])
-        kernel, slope = coarse.at(self.places)
+            self._least = np.maximum(self._least, np.minimum(FULL_TURN - room[vertices], 0.0))
+            self._fitness = np.minimum(room[vertices], ROOMY) / ROOMY
+        self.pool = Pool(self.operator, coarse, log_scale, free, limits, self._least)
+        self.restrict(usable)
+
+    def restrict(self, usable: BoolArray) -> None:
+        """Search on among the (n,) usable vertices, with what is known about the mesh.
+
+        Raises:
+            CurvatureError: they cannot carry the curvature.
+        """
+        limits, free = self.limits, self._free
+        check_available(usable, self.operator.vertices[free], limits)
+        is_usable = usable[self.operator.vertices]
+        is_usable[free] = False
+        self.places = np.concatenate([free, candidates(self._coarse_model, is_usable * self._fitness)])
+        kernel, slope = self._coarse_model.at(self.places)
         mask = np.ones(len(self.places), dtype=bool)
         mask[: len(free)] = False
-        fixed = np.arange(len(free))
         self.coarse = DenseSearch(
-            np.ascontiguousarray(kernel), slope, coarse.constant, mask, fixed, limits, least[self.places]
+            np.ascontiguousarray(kernel),
+            slope,
+            self._coarse_model.constant,
+            mask,
+            np.arange(len(free)),
+            limits,
+            self._least[self.places],
         )
-        self.pool = Pool(self.operator, coarse, log_scale, is_usable, free, limits, least)
+        self.pool.restrict(is_usable)
 
     @property
     def most_cones(self) -> int:
@@ -284,7 +313,7 @@ class ConeSearch:
         target[cones] = curvatures
         log_scale = np.zeros(len(target))
         log_scale[operator.vertices] = operator.solve((target - self.curvature)[operator.vertices])
-        absorbed = target_from_log_scale(self._laplacian, self.curvature, log_scale, self._is_boundary)
+        absorbed = target_from_log_scale(self._laplacian, self.curvature, log_scale, self.is_boundary)
         is_zero = np.ones(len(target), dtype=bool)
         is_zero[operator.vertices] = False
         inverse = LaplacianInverse(operator.solve_at_vertices, self._laplacian, is_zero, operator.worth)

@@ -28,14 +28,13 @@ class Pool:
         operator: GreenOperator,
         coarse: CoarseModel,
         log_scale: FloatArray,
-        usable: BoolArray,
         required: IntArray,
         limits: Limits,
         least: FloatArray,
     ) -> None:
         self._operator = operator
         self._coarse = coarse
-        self._usable = usable
+        self._usable = np.ones(len(log_scale), dtype=bool)
         self._indptr = operator.laplacian.indptr.astype(np.int64)
         self._indices = operator.laplacian.indices.astype(np.int64)
         self._log_scale = log_scale
@@ -49,6 +48,20 @@ class Pool:
         )
         self._least = least
         self.insert(required)
+
+    def restrict(self, usable: BoolArray) -> None:
+        """Let cones move to the (f,) usable unknowns alone, and forget the sets found; energies stay known."""
+        self._usable = usable
+        model = self.model
+        self.model = DenseSearch(
+            model.gram,
+            model.slope,
+            model.constant,
+            usable[self.unknowns],
+            model.fixed,
+            model.limits,
+            model.least,
+        )
 
     def insert(self, unknowns: IntArray) -> IntArray:
         """Add vertices, if they are not in, and return the places of all."""
@@ -70,7 +83,7 @@ class Pool:
             gram[old:, old:] = (rows[:, old:] + rows[:, old:].T) / 2
             model.gram = gram
             model.slope = self._slope[self.unknowns]
-            model.usable = np.ones(len(self.unknowns), dtype=bool)
+            model.usable = self._usable[self.unknowns]
             model.usable[model.fixed] = False
             model.least = self._least[self.unknowns]
         order = np.argsort(self.unknowns, kind="stable")

@@ -84,12 +84,6 @@ def open_search(
     )
     usable = ~is_boundary if allowed is None else ~is_boundary & allowed
     cones = required_vertices(required, is_boundary)
-    available = np.count_nonzero(usable) + np.count_nonzero(~usable[cones])
-    if available < limits.fewest:
-        raise CurvatureError(
-            f"cones are allowed at {plural(available, 'vertex', 'vertices')}, but {limits.fewest} or more cones are "
-            f"needed for a total curvature of {limits.total / np.pi:.4g} pi"
-        )
     order = np.lexsort((curvature, areas)) if tie_key is None else np.argsort(tie_key, kind="stable")
     share = weighted_areas(areas, weights)
     return ConeSearch(laplacian, curvature, share, is_boundary, order, limits, cones, usable, room)

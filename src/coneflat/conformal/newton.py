@@ -199,16 +199,14 @@ def minimize(problem: ConformalProblem, log_scale: FloatArray, tolerance: float,
         except MetricError:  # singular in double precision: the best so far has to do
             break
         halvings = 0
-        if is_exact and best.largest > tolerance:
+        if best.largest > tolerance:
             halvings = HALVINGS_BOUNDED if bounded else HALVINGS
-        trial, length = search_line(problem, state, step, best.largest, halvings)
+        trial = search_line(problem, state, step, best.largest, halvings)
         if trial is None:
             if is_exact or best.largest <= tolerance:
                 break
             problem.preconditioner = None
             continue
-        if length < 1:
-            problem.preconditioner = None
         gained = trial.largest <= best.largest / 2
         state = trial
         if state.largest < best.largest:
@@ -220,16 +218,16 @@ def minimize(problem: ConformalProblem, log_scale: FloatArray, tolerance: float,
 
 def search_line(
     problem: ConformalProblem, state: State, step: FloatArray, least: float, halvings: int
-) -> tuple[State | None, float]:
-    """Return the first trial accepted and its length; None if there is none."""
+) -> State | None:
+    """Return the first trial accepted; None if there is none."""
     reach = float(np.abs(step).max(initial=0.0))
     if not np.isfinite(reach) or reach == 0.0:
-        return None, 0.0
+        return None
     length = min(1.0, LARGEST_STEP / reach)
     for _ in range(halvings + 1):
         trial = problem.evaluate(state.log_scale + length * step)
         slope = -float(trial.residual @ step)
         if (slope <= 0 or trial.largest <= least / 2) and not (problem.is_bounded and trial.broken):
-            return trial, length
+            return trial
         length /= 2
-    return None, 0.0
+    return None
