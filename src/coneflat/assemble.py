@@ -58,7 +58,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     residual = target - spread([one.curvature for one in laid_out])
     cones = np.concatenate([ids[one.cones] for ids, one in zip(numbers, laid_out, strict=True)])
     with stages("measure"):
-        scaled = TriangleMesh(np.ldexp(positions, checked.exponent), faces)
+        scaled = _known_or_new(checked.mesh, np.ldexp(positions, checked.exponent), faces)
         errors = curvature_errors(residual[np.isfinite(residual)])
         distortion = measure(scaled, uv[corners], errors, cones).rescaled(checked.exponent * np.log(2))
         if options.charts == "atlas" and distortion.overlapping_pairs:
@@ -91,13 +91,22 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         seconds=dict(stages.seconds),
         notes=(*checked.notes, *prepared.notes, *_distinct_notes(laid_out), *lost),
         settings=options.as_dict(),
-        solve=SolveFigures.of_all([one.figures for one in laid_out], [one.area for one in laid_out]),
+        solve=SolveFigures.of_all(
+            [one.figures for one in laid_out], [one.area if len(laid_out) > 1 else 1.0 for one in laid_out]
+        ),
         rotations=Rotations.of_all(one.rotations for one in laid_out),
         vertex_origin=np.concatenate([vertex_origin, np.full(len(positions) - len(vertex_origin), -1)]),
         face_origin=checked.face_origin[face_origin[order]],
         face_corners=face_corners,
         source=given.source,
     )
+
+
+def _known_or_new(known: TriangleMesh, positions: FloatArray, faces: IntArray) -> TriangleMesh:
+    """Return a mesh, the known one if it is that: its edges have been found."""
+    if np.array_equal(known.faces, faces) and np.array_equal(known.vertices, positions):
+        return known
+    return TriangleMesh(positions, faces)
 
 
 def _distinct_notes(laid_out: Sequence[LaidOut]) -> tuple[str, ...]:
