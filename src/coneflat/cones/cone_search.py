@@ -27,6 +27,8 @@ VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 15, 400, 1200
 MOST_CONES = 200
 # How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself.
 COARSE_DOUBT = 1.35
+# The same where the factor by which the coarse model is off is known from one cone more.
+HOPE = 1.15
 # Where the best set of a size misses by less than this factor of E^2, others are tried.
 NARROW = 1.1
 # Perturbations tried for each number of cones about the answer: one for so many vertices, within bounds, so that they
@@ -164,7 +166,7 @@ class ConeSearch:
             else:
                 failed = middle
         # Then down one by one, with all means.
-        if not self.polished(count, goal) <= goal and count < most:
+        if not self._best(count) <= goal and not self.polished(count, goal) <= goal and count < most:
             count = min(count + 1, most)
             self.polished(count, goal)
         while count - 1 >= len(self.coarse.fixed) and self._is_promising(count - 1, goal):
@@ -205,6 +207,10 @@ class ConeSearch:
                 found.append((energy, members))
         return found
 
+    def _best(self, count: int) -> float:
+        """Return the least E^2 found on the mesh with so many cones."""
+        return self.pool.model.best[count][0] if count in self.pool.model.best else math.inf
+
     def _result(self, count: int) -> tuple[float, IntArray]:
         energy, members = self.pool.model.best[count]
         return float(np.sqrt(max(energy, 0.0))), members
@@ -242,14 +248,14 @@ class ConeSearch:
         """Whether fewer cones may do, by the coarse model or by the sets tried."""
         if count < self.limits.fewest:
             return False
-        coarse = self.coarse.best.get(count)
-        if coarse is not None and coarse[0] <= goal * COARSE_DOUBT:
+        coarse, known = self.coarse.best.get(count), self.pool.model.best.get(count)
+        larger, coarse_larger = self.pool.model.best.get(count + 1), self.coarse.best.get(count + 1)
+        if known is not None and known[0] <= goal * HOPE:
             return True
-        larger = self.pool.model.best.get(count + 1)
-        if larger is not None and larger[0] <= goal / COARSE_DOUBT:
-            return True  # The coarse model is far off: it is the mesh that tells.
-        known = self.pool.model.best.get(count)
-        return known is not None and known[0] <= goal * COARSE_DOUBT
+        if larger is None or coarse_larger is None or coarse is None:
+            return known is None or known[0] <= goal * COARSE_DOUBT
+        # The coarse model is off by nearly the same factor for one cone less.
+        return coarse[0] * larger[0] <= goal * HOPE * coarse_larger[0]
 
     def polished(self, count: int, goal: float, rough: bool = False) -> float:
         """Return E^2 of the best set of a size that the mesh itself shows, infinite if there is none.

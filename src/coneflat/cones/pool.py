@@ -12,7 +12,7 @@ from .dense_search import DenseSearch
 from .green import GreenOperator
 
 # A move is tried if it promises to lower E^2 by this share.
-WORTHWHILE = 2e-4
+WORTHWHILE = 1e-3
 # Rounds of moves for a set of cones; most come to rest after three or four.
 ROUNDS = 12
 # A cone is tried at the end of a longer and of a more cautious step, as the distances are those of a coarse model; of
