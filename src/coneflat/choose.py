@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 # The angle of a cone for which each triangle around it has room on its straight sides: less than half a turn, as not
 # all of them can be spread alike.
 ROOM = 0.6 * np.pi
+# On meshes of so many vertices, a neighbour is as good a place: corners of cones there, all widened alike, must not
+# exceed this, or the straight sides of a triangle may have no room for one, and the search has to be repeated.
+FINE, WIDEST = 30_000, 0.95 * np.pi
 # Up to so many corners of a polyhedron are all made cones. Below so many radians a vertex is none.
 FEW, FLAT = 24, 1e-6
 # How much larger E may get for the sake of rotations along handles.
@@ -45,6 +48,7 @@ class Surface:
         laplacian: (n, n) cotangent Laplacian.
         curvature: (n,) angle defect, radians.
         areas: (n,) vertex areas.
+        widest: (n,) the widest corner at each vertex as a share of all there.
         search: the search for cones that has been opened on it, if any.
     """
 
@@ -53,14 +57,19 @@ class Surface:
     laplacian: csc_matrix
     curvature: FloatArray
     areas: FloatArray
+    widest: FloatArray
     search: ConeSearch | None = None
 
     @classmethod
     def of(cls, mesh: TriangleMesh, lengths: FloatArray) -> Surface:
         """Return a mesh with what follows from its lengths."""
-        curvature = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
-        laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths), len(mesh.vertices))
-        return cls(mesh, lengths, laplacian, curvature, vertex_areas(mesh.faces, lengths, len(mesh.vertices)))
+        angles, n = corner_angles(lengths), len(mesh.vertices)
+        curvature = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+        laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths), n)
+        widest = np.zeros(n)
+        np.maximum.at(widest, mesh.faces.ravel(), angles.ravel())
+        widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
+        return cls(mesh, lengths, laplacian, curvature, vertex_areas(mesh.faces, lengths, n), widest)
 
 
 def pursues(mesh: TriangleMesh, options: Options) -> bool:
@@ -176,6 +185,8 @@ def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages
     if surface.search is not None:
         surface.search.restrict(~surface.search.is_boundary & wishes.is_allowed)
         return surface.search
+    if len(room) >= FINE:
+        room = np.minimum(room, WIDEST / surface.widest)
     search = open_search(
         surface.laplacian,
         surface.curvature,

@@ -34,8 +34,9 @@ NARROW = 1.1
 # Perturbations tried for each number of cones about the answer: one for so many vertices, within bounds, so that they
 # take a like share of the time on all meshes.
 VERTICES_PER_SHAKE, LEAST_SHAKES, MOST_SHAKES = 400, 12, 40
-# Of vertices side by side, those with room for such an angle represent the others on the coarse model.
-ROOMY = 4 * np.pi
+# Of vertices side by side, those with room for such an angle represent the others on the coarse model, the more so the
+# higher the power.
+ROOMY, PREFERENCE = 4 * np.pi, 4
 # An E that is zero but for rounding.
 NOTHING = 1e-9
 # How many local optima of the coarse model are tried on the mesh when the best one misses narrowly.
@@ -102,7 +103,7 @@ class ConeSearch:
         self._fitness = np.ones(len(vertices))
         if room is not None:
             self._least = np.maximum(self._least, np.minimum(FULL_TURN - room[vertices], 0.0))
-            self._fitness = np.minimum(room[vertices], ROOMY) / ROOMY
+            self._fitness = (np.minimum(room[vertices], ROOMY) / ROOMY) ** PREFERENCE
         self.pool = Pool(self.operator, coarse, log_scale, free, limits, self._least)
         self.restrict(usable)
 
