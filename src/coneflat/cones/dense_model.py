@@ -75,9 +75,9 @@ class Fit:
 
 def first_least(values: FloatArray) -> int:
     """Return the first index whose value is the least but for rounding."""
-    least = values.min()
-    limit = least + TIE * abs(least) if np.isfinite(least) else least
-    return int(np.argmax(values <= limit))
+    from .fit_kernel import index_of_least
+
+    return int(index_of_least(values, TIE))
 
 
 def is_less(value: float, than: float) -> bool:
@@ -121,14 +121,11 @@ class DenseModel:
 
     def fit(self, members: IntArray) -> Fit:
         """Return the best curvatures of a set."""
-        from .fit_kernel import fit_curvatures
+        from .fit_kernel import fit_members
 
         limits = self.limits
-        gram, slope = self.gram[members[:, None], members], self.slope[members]
-        least, most = self.least[members], np.full(len(members), limits.most)
-        curvatures, multiplier, feasible = fit_curvatures(gram, slope, least, most, limits.total)
-        energy = self.constant + (2 * slope + gram @ curvatures) @ curvatures
-        return Fit(curvatures, multiplier, feasible, float(energy) if feasible else math.inf)
+        given = self.gram, self.slope, self.constant, self.least, limits.most, limits.total
+        return Fit(*fit_members(*given, members))
 
     def energy(self, members: IntArray) -> float:
         """Return E^2 of a set, infinite where bounds leave no curvatures."""

@@ -174,3 +174,49 @@ def fit_curvatures(
         else:
             state[low] = 0
     return curvatures, multiplier, feasible
+
+
+@compiled
+def fit_members(
+    gram: FloatArray,
+    slope: FloatArray,
+    constant: float,
+    least: FloatArray,
+    most: float,
+    total: float,
+    members: IntArray,
+) -> tuple[FloatArray, float, bool, float]:
+    """Return what `fit_curvatures` finds for some of m candidates, and E^2 = constant + (2 slope + gram k) k.
+
+    E^2 is infinite where the bounds do not allow the sum. gram: (m, m), slope, least: (m,).
+    """
+    size = len(members)
+    small, linear = np.empty((size, size)), np.empty(size)
+    low, high = np.empty(size), np.full(size, most)
+    for i in range(size):
+        linear[i], low[i] = slope[members[i]], least[members[i]]
+        for j in range(size):
+            small[i, j] = gram[members[i], members[j]]
+    curvatures, multiplier, feasible = fit_curvatures(small, linear, low, high, total)
+    if not feasible:
+        return curvatures, multiplier, feasible, np.inf
+    energy = constant
+    for i in range(size):
+        value = 2 * linear[i]
+        for j in range(size):
+            value += small[i, j] * curvatures[j]
+        energy += value * curvatures[i]
+    return curvatures, multiplier, feasible, energy
+
+
+@compiled
+def index_of_least(values: FloatArray, tie: float) -> int:
+    """Return the first index whose value is the least, or above it by no more than a share of it."""
+    least = np.inf
+    for i in range(len(values)):
+        least = min(least, values[i])
+    limit = least + tie * abs(least) if abs(least) < np.inf else least
+    for i in range(len(values)):
+        if values[i] <= limit:
+            return i
+    return 0

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..geometry.compiled import compiled
-from .fit_kernel import factor_lower, fit_curvatures
+from .fit_kernel import factor_lower, fit_members
 
 # What must remain of a candidate's diagonal for it to be independent of the members.
 INDEPENDENT = 1e-9
@@ -130,25 +130,11 @@ def energies_with(
     candidates: IntArray,
 ) -> FloatArray:
     """Return (c,) E^2 of the members with each of the candidates, infinite where bounds leave no curvatures."""
-    size = len(members) + 1
-    small, linear = np.empty((size, size)), np.empty(size)
-    low, high = np.empty(size), np.full(size, most)
-    chosen = np.empty(size, np.int64)
+    size = len(members)
+    chosen = np.empty(size + 1, np.int64)
+    chosen[:size] = members
     energies = np.empty(len(candidates))
     for c in range(len(candidates)):
-        for i in range(size):
-            chosen[i] = members[i] if i < size - 1 else candidates[c]
-        for i in range(size):
-            linear[i], low[i] = slope[chosen[i]], least[chosen[i]]
-            for j in range(size):
-                small[i, j] = gram[chosen[i], chosen[j]]
-        curvatures, _, feasible = fit_curvatures(small, linear, low, high, total)
-        energies[c] = np.inf
-        if feasible:
-            energies[c] = constant
-            for i in range(size):
-                value = 2 * linear[i]
-                for j in range(size):
-                    value += small[i, j] * curvatures[j]
-                energies[c] += value * curvatures[i]
+        chosen[size] = candidates[c]
+        energies[c] = fit_members(gram, slope, constant, least, most, total, chosen)[3]
     return energies
