@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csr_matrix
 
 from ._arrays import BoolArray, FloatArray, IntArray
 
@@ -22,9 +21,10 @@ PREVIOUS = np.array([2, 0, 1])
 
 def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
     """Return the number of connected components of a graph and the component of each of its nodes."""
-    graph = coo_matrix((np.ones(len(tails), dtype=np.int8), (tails, heads)), shape=(count, count))
-    number, labels = connected_components(graph, directed=False)
-    return int(number), labels.astype(np.int64)
+    from .geometry.component_kernel import label_nodes
+
+    number, labels = label_nodes(count, np.asarray(tails, dtype=np.int64), np.asarray(heads, dtype=np.int64))
+    return int(number), labels
 
 
 def sort_by_counting(keys: IntArray, bound: int) -> IntArray:

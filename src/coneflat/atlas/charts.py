@@ -47,8 +47,9 @@ class Charts:
         extent = np.zeros((2, self.count))
         for part, of in zip(extent, (self.corners.real, self.corners.imag), strict=True):
             low, high = np.full(self.count, np.inf), np.full(self.count, -np.inf)
-            np.minimum.at(low, self.chart, of.min(axis=1))
-            np.maximum.at(high, self.chart, of.max(axis=1))
+            one, two, three = of.T
+            np.minimum.at(low, self.chart, np.minimum(np.minimum(one, two), three))
+            np.maximum.at(high, self.chart, np.maximum(np.maximum(one, two), three))
             part[:] = high - low
         return np.abs(self.sums(self.areas)) > NO_AREA * extent.max(axis=0) ** 2
 

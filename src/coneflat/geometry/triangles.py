@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray, dots
+from .._arrays import BoolArray, FloatArray, IntArray
 from ..mesh import NEXT, PREVIOUS
 
 
 def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return (m, 3) side lengths in model units; both sides of an edge get the same bits."""
-    lengths = np.empty(faces.shape)
-    for i in range(3):
-        side = vertices[faces[:, PREVIOUS[i]]] - vertices[faces[:, NEXT[i]]]
-        lengths[:, i] = np.sqrt(dots(side, side))
+    from .component_kernel import measure_sides
+
+    lengths: FloatArray = measure_sides(
+        np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
+    )
     return lengths
 
 
