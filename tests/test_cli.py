@@ -115,9 +115,11 @@ def test_bad_input_is_one_line_and_exit_code_2(model, tmp_path, arguments, messa
     before = sorted(tmp_path.iterdir())
     done = run("flatten", *arguments, cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr.startswith("coneflat: error: ")
-    assert done.stderr.count("\n") == 1
-    assert message in done.stderr
+    *progress, last = done.stderr.splitlines()
+    assert last.startswith("coneflat: error: ")
+    assert message in last
+    # On a machine that is busy, what is going on has been told by then.
+    assert all(re.match(r" *[\d.]+ s +\d+%  \w+", line) for line in progress)
     assert done.stdout == ""
     assert sorted(tmp_path.iterdir()) == before
 
