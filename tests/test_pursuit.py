@@ -3,9 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
+from scipy.sparse import csr_matrix
 
 from coneflat import check_mesh, edge_lengths, read_mesh
 from coneflat.cones import pursuit
+from coneflat.cones.coarsen import coarse_basis
 from coneflat.cones.fit_kernel import fit_curvatures
 from coneflat.cones.pursuit import open_search
 from coneflat.errors import CurvatureError, OptionError
@@ -249,3 +251,21 @@ def test_long_thin_triangles_take_no_more_cones_than_needed(shared):
     found = pursue(model.vertices * [30, 1, 1], model.corners.reshape(-1, 3), distortion=0.2)
     assert found.distortion <= 0.2
     assert len(found.solution.cones) <= 16
+
+
+def test_scale_does_not_change_the_coarse_model():
+    """Weights across right angles are 0 or rounding, as the scale has it."""
+    vertices, faces = shapes.grid(60, 60)
+
+    def basis(scale):
+        cots = cotangents(edge_lengths(vertices * scale, faces))
+        laplacian = csr_matrix(cotangent_laplacian(faces, cots, len(vertices)))
+        return coarse_basis(laplacian, np.full(len(vertices), 1 / len(vertices)), 60)
+
+    one = basis(1.0)
+    for scale in (7.0, 1e-6, 0.3):
+        other = basis(scale)
+        for matrix in ("functions", "laplacian", "mass"):
+            known, found = getattr(one, matrix), getattr(other, matrix)
+            np.testing.assert_array_equal(found.indices, known.indices)
+            np.testing.assert_allclose(found.data, known.data, rtol=1e-9, atol=1e-12)

@@ -19,6 +19,8 @@ LARGEST_AGGREGATE = 7.0
 WEAK = 0.02
 # Damping of the Jacobi step that smooths the aggregates: 4/3 over the largest eigenvalue of D^-1 L, about 2.
 DAMPING = 2 / 3
+# Entries below this share of what is large in their row are rounding.
+ROUNDED = 1e-12
 # The last level has at most so many times the number of functions wanted, if a few tries can do it.
 CLOSE, TRIES = 1.05, 4
 # Values that differ by less, relatively, are equal, and the first in the order of vertices is taken.
@@ -53,6 +55,7 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
     level, mass = laplacian, csr_matrix(diags(areas))
     order = np.arange(laplacian.shape[0])
     while level.shape[0] > 1.2 * size:
+        level = _without_rounding(level, level.diagonal())
         ratio = level.shape[0] / size
         steps = max(1, round(np.log(ratio) / np.log(LARGEST_AGGREGATE)))
         part = _smoothed_aggregates(level, order, ratio ** (1 / steps), size if steps == 1 else None)
@@ -87,9 +90,25 @@ def _smoothed_aggregates(level: csr_matrix, order: IntArray, size: float, most: 
             break
         # Vertices left over make aggregates smaller than wished, and another level for that little makes all dense.
         size *= number / most
+        before = number
         labels, number = aggregate(*rows, size, WEAK)
+        if number == before:
+            break
     pieces = csr_matrix((np.ones(count), (np.arange(count), labels)), shape=(count, number))
-    return csr_matrix(pieces - diags(DAMPING / diagonal) @ (level @ pieces))
+    smoothed = csr_matrix(pieces - diags(DAMPING / diagonal) @ (level @ pieces))
+    return _without_rounding(smoothed, np.ones(count))
+
+
+def _without_rounding(matrix: csr_matrix, sizes: FloatArray) -> csr_matrix:
+    """Return a matrix without the entries that are rounding, given the (n,) sizes of its rows.
+
+    Edges across right angles have a weight of 0 or nearly so. SciPy drops it or not, as it comes out, and the order in
+    which aggregates are made must not depend on that.
+    """
+    kept = matrix.copy()
+    kept.data[np.abs(kept.data) <= ROUNDED * np.repeat(sizes, np.diff(kept.indptr))] = 0.0
+    kept.eliminate_zeros()
+    return kept
 
 
 def _order_of_aggregates(part: csr_matrix, order: IntArray) -> IntArray:
