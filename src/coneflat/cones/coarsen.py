@@ -21,6 +21,8 @@ WEAK = 0.02
 DAMPING = 2 / 3
 # Entries below this share of what is large in their row are rounding.
 ROUNDED = 1e-12
+# So many unknowns are few enough in any case.
+SMALL = 600
 # The last level has at most so many times the number of functions wanted, if a few tries can do it.
 CLOSE, TRIES = 1.05, 4
 # Values that differ by less, relatively, are equal, and the first in the order of vertices is taken.
@@ -54,7 +56,7 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
     )
     level, mass = laplacian, csr_matrix(diags(areas))
     order = np.arange(laplacian.shape[0])
-    while level.shape[0] > 1.2 * size:
+    while level.shape[0] > max(1.2 * size, SMALL):
         level = _without_rounding(level, level.diagonal())
         ratio = level.shape[0] / size
         steps = max(1, round(np.log(ratio) / np.log(LARGEST_AGGREGATE)))
