@@ -8,7 +8,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -115,11 +114,9 @@ def test_bad_input_is_one_line_and_exit_code_2(model, tmp_path, arguments, messa
     before = sorted(tmp_path.iterdir())
     done = run("flatten", *arguments, cwd=tmp_path)
     assert done.returncode == 2
-    *progress, last = done.stderr.splitlines()
-    assert last.startswith("coneflat: error: ")
-    assert message in last
-    # On a machine that is busy, what is going on has been told by then.
-    assert all(re.match(r" *[\d.]+ s +\d+%  \w+", line) for line in progress)
+    assert done.stderr.startswith("coneflat: error: ")
+    assert done.stderr.count("\n") == 1
+    assert message in done.stderr
     assert done.stdout == ""
     assert sorted(tmp_path.iterdir()) == before
 
@@ -176,25 +173,20 @@ def test_nonmanifold_is_refused_and_repaired(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other signals")
-def test_interrupt_leaves_nothing_half_written(tmp_path):
+@pytest.mark.parametrize("step", ["read", "cones", "metric", "pack", "write"])
+def test_interrupt_leaves_nothing_half_written(tmp_path, step):
     write_obj(tmp_path / "big.obj", *shapes.sphere(6))
-    command = [sys.executable, "-m", "coneflat", "flatten", "big.obj", "-o", "out.obj"]
-    for delay in (0.4, 0.9, 1.5):
-        process = subprocess.Popen(
-            command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        time.sleep(delay)
-        process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=60)
-        assert process.returncode in (0, 130, -signal.SIGINT)
-        if process.returncode == 130:
-            assert said.splitlines()[-1] == "coneflat: error: interrupted; nothing was left half-written"
-        left = {path.name for path in tmp_path.iterdir()} - {"big.obj"}
-        # A file that was finished just before is whole.
-        assert left <= {"out.obj"}
-        if left:
-            assert len(read_mesh(tmp_path / "out.obj").corners) == 3 * 20 * 4**6
-            (tmp_path / "out.obj").unlink()
+    command = [sys.executable, "-m", "coneflat", "flatten", "-v", "big.obj", "-o", "out.obj"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if line.split()[-1] == step:
+                process.send_signal(signal.SIGINT)
+                break
+        said = process.stderr.read()
+    assert process.returncode == 130
+    assert said.splitlines()[-1] == "coneflat: error: interrupted; nothing was left half-written"
+    assert [path.name for path in tmp_path.iterdir()] == ["big.obj"]
 
 
 def test_demo(tmp_path):

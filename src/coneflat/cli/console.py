@@ -22,6 +22,7 @@ from ..stages import Stages
 from .talk import QUIET, VERBOSE
 
 PATIENCE = 1.0  # seconds between the plain lines that say what is going on
+QUICK = 2.0  # seconds before the first patience begins: what is done soon, or fails, says nothing before
 PLAIN_WIDTH = 110
 EXTREME_QC = 2.0  # far from conformal, on average
 
@@ -29,7 +30,7 @@ EXTREME_QC = 2.0  # far from conformal, on average
 class Console:
     """Progress while a command runs, what came out when it is done; nothing if quiet.
 
-    Progress is a bar in a terminal, else a line about every second; if verbose, a line for every step.
+    Progress is a bar in a terminal, else a line about every second if it takes long; if verbose, a line for every step.
 
     Attributes:
         seconds: wall time of each stage.
@@ -40,7 +41,7 @@ class Console:
         self._stages = Stages(self.progress)
         self.seconds = self._stages.seconds
         self._start = time.perf_counter()
-        self._last_line = 0.0
+        self._last_line = QUICK
         self._bar: Progress | None = None
         if talk is None and sys.stderr.isatty():
             self._bar = Progress(

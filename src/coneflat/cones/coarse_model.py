@@ -99,7 +99,7 @@ def inverse_of_definite(matrix: FloatArray) -> FloatArray:
     Raises:
         MetricError: rounding has made it indefinite.
     """
-    # Transposed, as LAPACK wants columns: nothing is copied on the way.
+    # By columns, as LAPACK wants them, or it would make copies of its own.
     factor, failed = lapack.dpotrf(matrix.T.copy(order="F"), lower=0, overwrite_a=1)
     if failed:
         raise MetricError(
