@@ -229,6 +229,14 @@ def test_extreme_metrics_are_refused_in_one_line():
         flatten(*shapes.hill(20, 20), cones={200: 1.0, 220: -1e6}, method="linear")
 
 
+def test_surfaces_with_very_many_handles_come_through():
+    result = flatten(*shapes.genus(60))
+    assert len(result.cones) > 118
+    assert result.distortion.flipped == 0
+    assert result.distortion.seam_mismatch_max < 1e-11
+    assert any("60 handles" in note for note in result.notes)
+
+
 def test_search_for_very_many_cones_ends():
     vertices, faces = SHAPES["sphere"]
     result = flatten(vertices, faces, cones="greedy", epsilon=1e-3, method="linear")

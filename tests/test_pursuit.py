@@ -205,8 +205,8 @@ def test_options_that_make_no_sense(options, error):
 
 def test_fit_agrees_with_the_optimality_conditions():
     rng = np.random.default_rng(3)
-    for _ in range(200):
-        size = int(rng.integers(1, 9))
+    for trial in range(210):
+        size = int(rng.integers(1, 9)) if trial < 200 else 60
         root = rng.normal(size=(size, size + 2))
         gram, slope = root @ root.T, 3 * rng.normal(size=size)
         least, most = -rng.uniform(0, 2), rng.uniform(0, 2)
@@ -269,3 +269,27 @@ def test_scale_does_not_change_the_coarse_model():
             known, found = getattr(one, matrix), getattr(other, matrix)
             np.testing.assert_array_equal(found.indices, known.indices)
             np.testing.assert_allclose(found.data, known.data, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", ["hub", "strip", "pockets"])
+def test_coarse_model_of_odd_connectivity_stays_small(shape):
+    """One vertex that all others meet, a line of vertices between two boundaries, vertices that meet no other."""
+    if shape == "hub":
+        vertices, faces = shapes.cylinder(3000, 1, caps=True)
+    else:
+        vertices, faces = shapes.grid(3000, 2)
+    laplacian, _, areas, is_boundary, _ = surface(vertices, faces)
+    inside = np.flatnonzero(~is_boundary)
+    if shape == "pockets":
+        inside = inside[::2]
+    inner = csr_matrix(laplacian)[inside][:, inside]
+    basis = coarse_basis(inner, areas[inside] / areas[inside].sum(), 400)
+    assert basis.functions.shape[1] <= 700
+    assert basis.functions.nnz < 30 * len(inside)
+
+
+def test_more_cones_than_are_searched_for_is_an_error():
+    with pytest.raises(CurvatureError, match="400 cones or more"):
+        pursue(*SHAPES["sphere"], min_cone_angle=1.99 * np.pi)
+    with pytest.raises(CurvatureError, match="cones were found"):
+        pursue(*HANDLE, room=np.full(len(HANDLE[0]), 2 * np.pi))

@@ -76,8 +76,22 @@ def pursues(mesh: TriangleMesh, options: Options) -> bool:
     """Whether the pursuit finds the cones of a mesh."""
     is_prescribed = options.boundary_kind in ("disk", "polygon") and mesh.is_boundary_vertex.any()
     return options.cone_choice == "pursuit" or (
-        options.cone_choice == "auto" and (options.wishes_cones or not is_prescribed)
+        options.cone_choice == "auto"
+        and (options.wishes_cones or not (is_prescribed or is_riddled(mesh, options)))
     )
+
+
+def is_riddled(mesh: TriangleMesh, options: Options) -> bool:
+    """Whether a mesh has so many handles, and needs so many cones for them, that few of them are no aim."""
+    from .cones.cone_search import MOST_CONES
+    from .cones.pursuit import curvature_limits
+
+    if options.cone_choice != "auto" or options.wishes_cones or mesh.is_boundary_vertex.any():
+        return False
+    limits = curvature_limits(
+        mesh.euler_characteristic, options.min_cone_angle, options.max_cone_angle, False
+    )
+    return limits.fewest > MOST_CONES // 2
 
 
 def choose_cones(
@@ -89,7 +103,7 @@ def choose_cones(
         corners = corners_alone(surface, wishes, options)
         return _pursued(surface, wishes, options, stages, turned) if corners is None else corners
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
-    if options.cone_choice == "greedy":
+    if options.cone_choice == "greedy" or is_riddled(mesh, options):
         solution = greedy_cones(
             *given,
             epsilon=options.epsilon,

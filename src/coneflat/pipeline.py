@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ._arrays import FloatArray, IntArray
 from .assemble import assemble
-from .choose import DEARER, Surface, Turned, choose_cones, pursues
+from .choose import DEARER, Surface, Turned, choose_cones, is_riddled, pursues
 from .cones import ConeSolution
 from .conformal.boundary import prescribed_boundary, straight_boundary
 from .conformal.turning import open_turning
@@ -235,6 +235,10 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
         with stages("atlas", 1.0):
             laid_out = without_overlaps(laid_out, part, options)
     notes = _missed_distortion(laid_out, part, options)
+    if is_riddled(part.mesh, options):
+        notes += (
+            f"A surface with {part.mesh.genus():,} handles needs so many cones that the greedy search placed them.",
+        )
     if options.method in UNFOLDED:
         notes += shortfalls(laid_out, part.wishes.names)
     return replace(laid_out, notes=laid_out.notes + notes)

@@ -21,10 +21,14 @@ WEAK = 0.02
 DAMPING = 2 / 3
 # Entries below this share of what is large in their row are rounding.
 ROUNDED = 1e-12
+# Functions that meet at an unknown at most, or it is not smoothed: a hub, which would join all of them to one another.
+MEETING = 100
 # So many unknowns are few enough in any case.
 SMALL = 600
 # The last level has at most so many times the number of functions wanted, if a few tries can do it.
 CLOSE, TRIES = 1.05, 4
+# A level with more than this share of the unknowns of the one before is no progress.
+STUCK = 0.9
 # Values that differ by less, relatively, are equal, and the first in the order of vertices is taken.
 TIE = 1e-9
 
@@ -60,9 +64,13 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
         level = _without_rounding(level, level.diagonal())
         ratio = level.shape[0] / size
         steps = max(1, round(np.log(ratio) / np.log(LARGEST_AGGREGATE)))
-        part = _smoothed_aggregates(level, order, ratio ** (1 / steps), size if steps == 1 else None)
-        if part.shape[1] > 0.9 * level.shape[0]:
-            break
+        most = size if steps == 1 else None
+        for weak in (WEAK, 0.0):
+            part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most, weak)
+            if part.shape[1] <= STUCK * level.shape[0]:
+                break
+        else:  # hardly anything is coupled, as on a strip between two boundaries
+            part = _pieces(np.argsort(order, kind="stable") * size // len(order), size)
         transposed = csr_matrix(part.T)
         level = csr_matrix(transposed @ (level @ part))
         weighted = mass @ part if functions is not None else _with_scaled_rows(part, areas)
@@ -79,25 +87,38 @@ def _with_scaled_rows(matrix: csr_matrix, factors: FloatArray) -> csr_matrix:
     return csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
-def _smoothed_aggregates(level: csr_matrix, order: IntArray, size: float, most: int | None) -> csr_matrix:
-    """Return basis functions made of about `size` vertices each, `most` of them if that can be had."""
+def _pieces(labels: IntArray, number: int) -> csr_matrix:
+    """Return (n, number) the functions that are 1 on the unknowns of one label each."""
+    count = len(labels)
+    return csr_matrix((np.ones(count), (np.arange(count), labels)), shape=(count, number))
+
+
+def _smoothed_aggregates(
+    level: csr_matrix, order: IntArray, size: float, most: int | None, weak: float
+) -> csr_matrix:
+    """Return basis functions made of about `size` vertices each, `most` of them if that can be had.
+
+    Couplings below the share `weak` do not join vertices.
+    """
     from .aggregate_kernel import aggregate
 
     count = level.shape[0]
     diagonal = np.maximum(level.diagonal(), 1e-300)
     rows = level.indptr.astype(np.int64), level.indices.astype(np.int64), level.data, diagonal, order
-    labels, number = aggregate(*rows, size, WEAK)
+    labels, number = aggregate(*rows, size, weak)
     for _ in range(TRIES):
         if most is None or number <= most * CLOSE:
             break
         # Vertices left over make aggregates smaller than wished, and another level for that little makes all dense.
         size *= number / most
         before = number
-        labels, number = aggregate(*rows, size, WEAK)
+        labels, number = aggregate(*rows, size, weak)
         if number == before:
             break
-    pieces = csr_matrix((np.ones(count), (np.arange(count), labels)), shape=(count, number))
-    smoothed = csr_matrix(pieces - diags(DAMPING / diagonal) @ (level @ pieces))
+    pieces = _pieces(labels, number)
+    image = csr_matrix(level @ pieces)
+    damping = np.where(np.diff(image.indptr) > MEETING, 0.0, DAMPING / diagonal)
+    smoothed = csr_matrix(pieces - diags(damping) @ image)
     return _without_rounding(smoothed, np.ones(count))
 
 

@@ -31,6 +31,8 @@ COARSE_DOUBT = 1.35
 HOPE = 1.15
 # Where the best set of a size misses by less than this factor of E^2, others are tried.
 NARROW = 1.1
+# And where it misses by less than this one, so many times.
+NEARLY, SEEDS = 1.03, 4
 # Perturbations tried for each number of cones about the answer: one for so many vertices, within bounds, so that they
 # take a like share of the time on all meshes.
 VERTICES_PER_SHAKE, LEAST_SHAKES, MOST_SHAKES = 400, 12, 40
@@ -45,6 +47,12 @@ RUNNERS = 3
 
 def check_available(usable: BoolArray, required: IntArray, limits: Limits) -> None:
     """Raise CurvatureError if cones at the (n,) usable vertices and the required ones cannot carry the curvature."""
+    if limits.fewest > MOST_CONES:
+        raise CurvatureError(
+            f"a total curvature of {limits.total / np.pi:.4g} pi needs {limits.fewest:,} cones or more within these "
+            f"bounds, and the pursuit finds {MOST_CONES} at most: allow wider ones, or choose the greedy search "
+            "(--cones greedy), which has no bounds"
+        )
     available = np.count_nonzero(usable) + np.count_nonzero(~usable[required])
     if available < limits.fewest:
         raise CurvatureError(
@@ -151,21 +159,28 @@ class ConeSearch:
         self._survey(goal, most)
         known = sorted(self.coarse.best)
         count = next((c for c in known if self.coarse.best[c][0] <= goal), known[-1])
-        # The coarse model may be off by some cones: up in growing steps, and halving what lies between.
+        # The coarse model may be off by some cones: up as far as it takes by the factor that it is off, and down again.
         failed = -1
         while not self.polished(count, goal, rough=True) <= goal and count < most:
             failed = count
-            count = min(count + max(1, count // 8), most)
-            self.coarse.climb(0.0, count)
-            if count not in self.coarse.best:  # more cones bring nothing
-                count = max(self.coarse.best)
+            aim = goal / self._off(count)
+            self.coarse.climb(aim, most, count)
+            larger = sorted(c for c in self.coarse.best if c > count)
+            if not larger:
                 break
-        while failed >= 0 and count - failed > 1:
-            middle = (count + failed) // 2
+            count = next((c for c in larger if self.coarse.best[c][0] <= aim), larger[-1])
+            if count < most and self.coarse.best[count][0] > aim:  # more cones bring nothing
+                break
+        off = self._off(count)
+        while failed >= 0:
+            between = (c for c in range(failed + 1, count) if c in self.coarse.best)
+            middle = next((c for c in between if self.coarse.best[c][0] * off <= goal), None)
+            if middle is None:
+                break
             if self.polished(middle, goal, rough=True) <= goal:
                 count = middle
             else:
-                failed = middle
+                failed, off = middle, max(off, self._off(middle))
         # Then down one by one, with all means.
         if not self._best(count) <= goal and not self.polished(count, goal) <= goal and count < most:
             count = min(count + 1, most)
@@ -182,7 +197,7 @@ class ConeSearch:
     def of_count(self, count: int) -> tuple[float, IntArray]:
         """Return E and members (places in the pool) of the best set of at most so many cones."""
         count = min(count, self.most_cones)
-        self.coarse.climb(0.0, count + 1)
+        self._climb(0.0, count + 1)
         self._improve(max(1, count - 2), count + 1)
         for some in (count - 1, count):
             if some in self.coarse.best:
@@ -208,6 +223,12 @@ class ConeSearch:
                 found.append((energy, members))
         return found
 
+    def _off(self, count: int) -> float:
+        """Return the factor, 1 or more, by which E^2 with so many cones exceeds that of the coarse model."""
+        coarse = self.coarse.best[count][0] if count in self.coarse.best else 0.0
+        off = self._best(count) / coarse if coarse > 0 else math.inf
+        return max(off, 1.0) if math.isfinite(off) else COARSE_DOUBT
+
     def _best(self, count: int) -> float:
         """Return the least E^2 found on the mesh with so many cones."""
         return self.pool.model.best[count][0] if count in self.pool.model.best else math.inf
@@ -218,11 +239,20 @@ class ConeSearch:
 
     def _survey(self, goal: float, most: int) -> None:
         """Find good sets of all sizes up to the one that is needed, and a little on, on the coarse model."""
-        self.coarse.climb(goal / COARSE_DOUBT, most)
+        self._climb(goal / COARSE_DOUBT, most)
         known = sorted(self.coarse.best)
         reached = [c for c in known if self.coarse.best[c][0] <= goal]
         count = reached[0] if reached else known[-1]
         self._improve(max(known[0], count - 3), min(count + 1, known[-1]), goal)
+
+    def _climb(self, bound: float, most: int) -> None:
+        self.coarse.climb(bound, most)
+        if not self.coarse.best:
+            raise CurvatureError(
+                f"no {plural(most, 'cone')} were found that carry a total curvature of "
+                f"{self.limits.total / np.pi:.4g} pi within their bounds: allow more or wider ones, or choose the "
+                "greedy search (--cones greedy), which has no bounds"
+            )
 
     def _improve(self, least: int, most: int, goal: float = 0.0) -> None:
         model = self.coarse
@@ -297,15 +327,25 @@ class ConeSearch:
                 energy = min(energy, pool.polish(pool.insert(self.places[runner]))[0])
                 if energy <= goal:
                     break
-            if energy > goal and model.shaken(count, self._tries(count)):
-                energy = min(energy, pool.polish(model.best[count][1])[0])
+            for seed in range(SEEDS):
+                # Once in any case, and again where next to nothing is missing.
+                if energy <= goal or (seed and energy > goal * NEARLY):
+                    break
+                if model.shaken(count, self._tries(count), seed):
+                    energy = min(energy, pool.polish(model.best[count][1])[0])
         return energy
 
     def solution(self, members: IntArray) -> ConeSolution:
-        """Return the cones of a set, those of no curvature left out unless they are required."""
+        """Return the cones of a set, those of no curvature left out unless they are required.
+
+        After the required ones, they come in the order of vertices, not in that in which they were found.
+        """
+        fixed = len(self.coarse.fixed)
+        free = members[fixed:]
+        members = np.concatenate([members[:fixed], free[np.argsort(self.pool.unknowns[free])]])
         curvatures = self.pool.curvatures(members)
         keep = np.abs(curvatures) > 1e-9
-        keep[: len(self.coarse.fixed)] = True
+        keep[:fixed] = True
         kept = curvatures[keep]
         if self.limits.has_sum and len(kept):
             # What rounding and those left out have taken from the sum: no metric has another one.

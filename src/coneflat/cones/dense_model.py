@@ -189,13 +189,15 @@ class DenseModel:
 
     def grown(self, members: IntArray) -> IntArray | None:
         """Return the members and the best further one, if there is any."""
-        chosen, _ = self.best_addition(members, self.usable)
+        chosen = -1
+        if len(members) + 1 >= self.limits.fewest:
+            chosen, _ = self.best_addition(members, self.usable)
         if chosen < 0:
-            # No further one makes curvatures feasible yet, or lowers E: any will do.
+            # No further one makes curvatures feasible yet, or lowers E: the best if there were no bounds.
             left = np.setdiff1d(np.flatnonzero(self.usable), members)
             if not len(left):
                 return None
-            chosen = int(left[first_least(self.slope[left])])
+            chosen = int(left[first_least(self.additions(members, self.fit(members))[left])])
         return np.append(members, chosen)
 
     def shrunk(self, members: IntArray) -> IntArray | None:
@@ -255,7 +257,7 @@ class DenseModel:
         """Replace members, one at a time, as long as E^2 falls; return it and the members. The required ones stay."""
         members = members.copy()
         fitted = self.fit(members)
-        while len(members) > len(self.fixed):
+        while len(members) > len(self.fixed) and len(members) >= self.limits.fewest:
             better = self._swapped(members, fitted) if fitted.feasible else None
             if better is None:
                 better = self._swapped_one_by_one(members, fitted)
@@ -280,7 +282,12 @@ class DenseModel:
         return None
 
     def _swapped_one_by_one(self, members: IntArray, fitted: Fit) -> Fit | None:
-        """Swap, in place, what the table leaves out: members held at a bound, or any where none are feasible."""
+        """Swap, in place, what the table leaves out: members held at a bound, or any where none are feasible.
+
+        In large sets the former stay: each takes as long as the whole table.
+        """
+        if fitted.feasible and len(members) > MANY:
+            return None
         limit = fitted.energy * (1 - GAIN) if fitted.feasible else math.inf
         inside = self.are_inside(members, fitted.curvatures) & fitted.feasible
         for place in range(len(self.fixed), len(members)):

@@ -37,9 +37,9 @@ class DenseSearch(DenseModel):
             return True
         return False
 
-    def climb(self, bound: float, most: int) -> None:
-        """Add cones one at a time until E^2 <= bound, or there are `most`."""
-        members = self.fixed
+    def climb(self, bound: float, most: int, start: int | None = None) -> None:
+        """Add cones, to the best set of the size `start` if it is given, until E^2 <= bound, or there are `most`."""
+        members = self.best[start][1] if start in self.best else self.fixed
         energy = self.energy(members)
         if np.isfinite(energy):
             self.offer(energy, members)

@@ -1,4 +1,4 @@
-"""Curvatures of given cones by a convex quadratic program in a few variables: an exact active set method.
+"""Curvatures of given cones by a convex quadratic program in a few variables: exact active set methods.
 
 Plain loops, without slices and array expressions: those would take ten times as long to compile.
 """
@@ -14,6 +14,8 @@ from ..geometry.compiled import compiled
 SMALLEST_PIVOT = 1e-13
 # What a multiplier may be off by, relative to the largest gradient, before its bound is released.
 RELEASE = 1e-11
+# Steps after which changing bounds all at once is given up: then it goes round in circles.
+AT_ONCE = 20
 
 
 @compiled
@@ -68,12 +70,111 @@ def start_feasibly(least: FloatArray, most: FloatArray, total: float, curvatures
 
 
 @compiled
+def fit_free(
+    gram: FloatArray,
+    slope: FloatArray,
+    total: float,
+    state: IntArray,
+    curvatures: FloatArray,
+    free: IntArray,
+    best: FloatArray,
+    lower: FloatArray,
+) -> tuple[int, float]:
+    """Write the free ones, in state 0, and their best values, the others held; return their number and the multiplier.
+
+    lower: (s, s) room for a factor.
+    """
+    size, count = len(slope), 0
+    for i in range(size):
+        if state[i] == 0:
+            free[count] = i
+            count += 1
+    factor_lower(gram, free, count, lower)
+    left = total
+    for i in range(count):
+        best[i] = -slope[free[i]]
+    for j in range(size):
+        if state[j] != 0:
+            left -= curvatures[j]
+            for i in range(count):
+                best[i] -= gram[free[i], j] * curvatures[j]
+    solve_factored(lower, count, best)
+    if total != total or count == 0:
+        return count, 0.0
+    ones = np.ones(count)
+    solve_factored(lower, count, ones)
+    sum_best, sum_ones = 0.0, 0.0
+    for i in range(count):
+        sum_best += best[i]
+        sum_ones += ones[i]
+    multiplier = (sum_best - left) / sum_ones
+    for i in range(count):
+        best[i] -= multiplier * ones[i]
+    return count, multiplier
+
+
+@compiled
+def gradient_of(gram: FloatArray, slope: FloatArray, curvatures: FloatArray, gradient: FloatArray) -> float:
+    """Write gram k + slope; return the largest magnitude."""
+    largest = 1e-300
+    for i in range(len(slope)):
+        value = slope[i]
+        for j in range(len(slope)):
+            value += gram[i, j] * curvatures[j]
+        gradient[i] = value
+        largest = max(largest, abs(value))
+    return largest
+
+
+@compiled
+def fit_at_once(
+    gram: FloatArray,
+    slope: FloatArray,
+    least: FloatArray,
+    most: FloatArray,
+    total: float,
+    state: IntArray,
+    curvatures: FloatArray,
+    lower: FloatArray,
+) -> tuple[bool, float]:
+    """Find the optimum by changing all bounds that are in the way, or no longer, at once; tell if it ends, and where.
+
+    The primal-dual active set method (M. Hintermueller, K. Ito, K. Kunisch, "The primal-dual active set strategy as a
+    semismooth Newton method", 2003): a handful of steps where it works, which is nearly always.
+    """
+    size = len(slope)
+    free, best, gradient = np.empty(size, np.int64), np.empty(size), np.empty(size)
+    for _ in range(AT_ONCE):
+        count, multiplier = fit_free(gram, slope, total, state, curvatures, free, best, lower)
+        if count == 0:
+            break
+        for i in range(count):
+            curvatures[free[i]] = best[i]
+        release = RELEASE * gradient_of(gram, slope, curvatures, gradient)
+        changed = False
+        for j in range(size):
+            now = state[j]
+            if now == 0:
+                now = 1 if curvatures[j] > most[j] else (-1 if curvatures[j] < least[j] else 0)
+                if now != 0:
+                    curvatures[j] = most[j] if now == 1 else least[j]
+            elif now * (gradient[j] + multiplier) > release:
+                now = 0
+            changed = changed or now != state[j]
+            state[j] = now
+        if not changed:
+            return True, multiplier
+    return False, 0.0
+
+
+@compiled
 def fit_curvatures(
     gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float
 ) -> tuple[FloatArray, float, bool]:
     """Minimise k gram k / 2 + slope k over least <= k <= most (s,), and sum k = total unless that is NaN.
 
-    A primal active set method: it ends at the exact optimum, since the program is strictly convex.
+    It ends at the exact optimum, since the program is strictly convex: if changing many bounds at once does not get
+    there, a primal active set method does, one by one.
 
     Returns:
         The curvatures, the multiplier of the sum, and whether the bounds allow the sum. Where they do not, the
@@ -92,39 +193,16 @@ def fit_curvatures(
     feasible = not has_sum or low_sum - slack <= total <= high_sum + slack
     if not feasible:
         least, most = np.full(size, -np.inf), np.full(size, np.inf)
-    start_feasibly(least, most, total, curvatures)
     state = np.zeros(size, np.int64)  # -1 held at the least, 1 at the most, 0 free
-    free = np.empty(size, np.int64)
-    best, ones, gradient = np.empty(size), np.empty(size), np.empty(size)
     lower = np.empty((size, size))
-    multiplier = 0.0
+    done, multiplier = fit_at_once(gram, slope, least, most, total, state, curvatures, lower)
+    if done:
+        return curvatures, multiplier, feasible
+    state[:] = 0
+    start_feasibly(least, most, total, curvatures)
+    free, best, gradient = np.empty(size, np.int64), np.empty(size), np.empty(size)
     for _ in range(20 * size + 20):
-        count = 0
-        for i in range(size):
-            if state[i] == 0:
-                free[count] = i
-                count += 1
-        # The best values of the free ones, the others held.
-        factor_lower(gram, free, count, lower)
-        left = total
-        for i in range(count):
-            best[i], ones[i] = -slope[free[i]], 1.0
-        for j in range(size):
-            if state[j] != 0:
-                left -= curvatures[j]
-                for i in range(count):
-                    best[i] -= gram[free[i], j] * curvatures[j]
-        solve_factored(lower, count, best)
-        multiplier = 0.0
-        if has_sum and count > 0:
-            solve_factored(lower, count, ones)
-            sum_best, sum_ones = 0.0, 0.0
-            for i in range(count):
-                sum_best += best[i]
-                sum_ones += ones[i]
-            multiplier = (sum_best - left) / sum_ones
-            for i in range(count):
-                best[i] -= multiplier * ones[i]
+        count, multiplier = fit_free(gram, slope, total, state, curvatures, free, best, lower)
         # As far there as the bounds allow.
         step, blocking, side = 1.0, -1, 0
         for i in range(count):
@@ -142,17 +220,12 @@ def fit_curvatures(
             curvatures[blocking] = most[blocking] if side == 1 else least[blocking]
             continue
         # Whether one held at a bound would rather leave it.
-        largest = 1e-300
+        largest = gradient_of(gram, slope, curvatures, gradient)
         high, low = -1, -1
         for i in range(size):
-            value = slope[i]
-            for j in range(size):
-                value += gram[i, j] * curvatures[j]
-            gradient[i] = value
-            largest = max(largest, abs(value))
-            if state[i] == 1 and (high < 0 or value > gradient[high]):
+            if state[i] == 1 and (high < 0 or gradient[i] > gradient[high]):
                 high = i
-            if state[i] == -1 and (low < 0 or value < gradient[low]):
+            if state[i] == -1 and (low < 0 or gradient[i] < gradient[low]):
                 low = i
         if count == 0 and has_sum:
             # One alone cannot move under the sum: the two that pull most, one from each bound.
