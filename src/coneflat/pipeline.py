@@ -97,8 +97,9 @@ def flatten(
         cones: "pursuit" finds the fewest cones for the area distortion allowed, "greedy" is the paper's search,
             "none" uses none (bounded meshes and tori); vertices get the curvatures that minimise scale
             distortion; a map from vertex to curvature in radians is taken as it is. "auto" is "pursuit",
-            but "none" for components with a prescribed boundary, and the corners of polyhedra that have few, which
-            so unfold without distortion. Vertices are those of the input.
+            but "none" for components with a prescribed boundary, the corners of polyhedra that have few, which
+            so unfold without distortion, and "greedy" where handles alone need over a hundred cones. Vertices are
+            those of the input.
         distortion: of the pursuit: the area distortion E allowed in the linear model, the standard deviation of
             the log scale by area.
         cone_count: of the pursuit: a number of cones per component, to be placed for the least distortion, instead.

@@ -10,19 +10,37 @@ from typing import TypeVar
 
 Result = TypeVar("Result")
 
-# Triangles from which on memory is what matters.
-HUGE = 3_000_000
+# Triangles from which on memory is what matters, and up to which a thread takes longer to start than it saves.
+HUGE, TINY = 3_000_000, 1000
+
+
+class Later(Future[Result]):
+    """What is done when it is asked for."""
+
+    def __init__(self, call: Callable[[], Result]) -> None:
+        super().__init__()
+        self._call = call
+
+    def result(self, timeout: float | None = None) -> Result:
+        """Return what comes of it."""
+        if not self.done():
+            self.set_result(self._call())
+        return super().result(timeout)
 
 
 @contextmanager
 def meanwhile(call: Callable[[], Result], triangles: int) -> Iterator[Future[Result]]:
     """Have something done on another thread while what is inside runs, and yield its future.
 
-    Of a huge mesh it is done before, as what both hold in memory would be too much.
+    Of a huge mesh it is done before, as what both hold in memory would be too much; of a tiny one when its result is
+    asked for.
 
     Both are the same as one after the other: they share no data that either changes. Compiled loops, factorizations
     and most of numpy leave the interpreter to the other thread.
     """
+    if triangles <= TINY:
+        yield Later(call)
+        return
     with ThreadPoolExecutor(1, thread_name_prefix="coneflat") as executor:
         future = executor.submit(copy_context().run, call)
         if triangles > HUGE:

@@ -31,7 +31,8 @@ _BEFORE_SEARCH = (
         default="auto",
         show_default=True,
         help="How to find cones.  pursuit: the fewest for the distortion allowed.  greedy: the paper's.  none: for "
-        "bounded meshes and tori.  auto: pursuit, but none where the boundary is prescribed.",
+        "bounded meshes and tori.  auto: pursuit, but none where the boundary is prescribed, and greedy where handles "
+        "need over a hundred.",
     ),
 )
 _AFTER_SEARCH = (
