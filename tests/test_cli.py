@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -179,11 +180,14 @@ def test_interrupt_leaves_nothing_half_written(tmp_path, step):
     command = [sys.executable, "-m", "coneflat", "flatten", "-v", "big.obj", "-o", "out.obj"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
+        hanging = threading.Timer(60, process.kill)
+        hanging.start()
         for line in process.stderr:
-            if line.split()[-1] == step:
+            if line.split()[-1:] == [step]:
                 process.send_signal(signal.SIGINT)
                 break
         said = process.stderr.read()
+        hanging.cancel()
     assert process.returncode == 130
     assert said.splitlines()[-1] == "coneflat: error: interrupted; nothing was left half-written"
     assert [path.name for path in tmp_path.iterdir()] == ["big.obj"]

@@ -235,6 +235,10 @@ def test_surfaces_with_very_many_handles_come_through():
     assert result.distortion.flipped == 0
     assert result.distortion.seam_mismatch_max < 1e-11
     assert any("60 handles" in note for note in result.notes)
+    # What is said of angles counts for the search alone.
+    bounded = flatten(*SHAPES["sphere"], min_cone_angle=1.97 * np.pi)
+    assert len(bounded.cones) > 133
+    assert bounded.curvatures.max() <= 0.03 * np.pi + 1e-9
 
 
 def test_search_for_very_many_cones_ends():

@@ -6,9 +6,8 @@ import shapes
 from scipy.sparse import csr_matrix
 
 from coneflat import check_mesh, edge_lengths, read_mesh
-from coneflat.cones import pursuit
+from coneflat.cones import fit_kernel, pursuit
 from coneflat.cones.coarsen import coarse_basis
-from coneflat.cones.fit_kernel import fit_curvatures
 from coneflat.cones.pursuit import open_search
 from coneflat.errors import CurvatureError, OptionError
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, double_areas
@@ -203,7 +202,15 @@ def test_options_that_make_no_sense(options, error):
         pursue(*shapes.sphere(2), **options)
 
 
-def test_fit_agrees_with_the_optimality_conditions():
+def fit_one_by_one(gram, slope, least, most, total):
+    size = len(slope)
+    curvatures, state, room = np.zeros(size), np.zeros(size, dtype=np.int64), np.empty((size, size))
+    multiplier = fit_kernel.fit_one_by_one(gram, slope, least, most, total, state, curvatures, room)
+    return curvatures, multiplier, True
+
+
+@pytest.mark.parametrize("fit", [fit_kernel.fit_curvatures, fit_one_by_one], ids=["at once", "one by one"])
+def test_fit_agrees_with_the_optimality_conditions(fit):
     rng = np.random.default_rng(3)
     for trial in range(210):
         size = int(rng.integers(1, 9)) if trial < 200 else 60
@@ -211,9 +218,7 @@ def test_fit_agrees_with_the_optimality_conditions():
         gram, slope = root @ root.T, 3 * rng.normal(size=size)
         least, most = -rng.uniform(0, 2), rng.uniform(0, 2)
         total = rng.uniform(size * least, size * most) if rng.random() < 0.5 else np.nan
-        k, multiplier, feasible = fit_curvatures(
-            gram, slope, np.full(size, least), np.full(size, most), total
-        )
+        k, multiplier, feasible = fit(gram, slope, np.full(size, least), np.full(size, most), total)
         gradient = gram @ k + slope + (0 if np.isnan(total) else multiplier)
         assert feasible
         assert (k >= least - 1e-12).all()
@@ -293,3 +298,15 @@ def test_more_cones_than_are_searched_for_is_an_error():
         pursue(*SHAPES["sphere"], min_cone_angle=1.99 * np.pi)
     with pytest.raises(CurvatureError, match="cones were found"):
         pursue(*HANDLE, room=np.full(len(HANDLE[0]), 2 * np.pi))
+    with pytest.raises(CurvatureError, match="no 15 cones"):
+        pursue(*HANDLE, room=np.full(len(HANDLE[0]), 2.5 * np.pi), count=15)
+
+
+def test_the_few_vertices_with_room_are_found():
+    """Four saddles of 4 pi carry the curvature, and only six vertices have room for one."""
+    wide = np.random.default_rng(0).choice(len(HANDLE[0]), 6, replace=False)
+    room = np.full(len(HANDLE[0]), 2 * np.pi)
+    room[wide] = 4 * np.pi
+    found = pursue(*HANDLE, room=room, count=8).solution
+    assert np.isin(found.cones[found.curvatures < 0], wide).all()
+    assert found.curvatures.min() >= -2 * np.pi - 1e-9

@@ -84,14 +84,11 @@ def pursues(mesh: TriangleMesh, options: Options) -> bool:
 def is_riddled(mesh: TriangleMesh, options: Options) -> bool:
     """Whether a mesh has so many handles, and needs so many cones for them, that few of them are no aim."""
     from .cones.cone_search import MOST_CONES
-    from .cones.pursuit import curvature_limits
 
     if options.cone_choice != "auto" or options.wishes_cones or mesh.is_boundary_vertex.any():
         return False
-    limits = curvature_limits(
-        mesh.euler_characteristic, options.min_cone_angle, options.max_cone_angle, False
-    )
-    return limits.fewest > MOST_CONES // 2
+    # Each handle but one takes two cones of 4 pi.
+    return -mesh.euler_characteristic > MOST_CONES // 2
 
 
 def choose_cones(
@@ -103,7 +100,8 @@ def choose_cones(
         corners = corners_alone(surface, wishes, options)
         return _pursued(surface, wishes, options, stages, turned) if corners is None else corners
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
-    if options.cone_choice == "greedy" or is_riddled(mesh, options):
+    is_greedy = options.cone_choice == "greedy" or is_riddled(mesh, options)
+    if is_greedy:
         solution = greedy_cones(
             *given,
             epsilon=options.epsilon,
@@ -118,11 +116,7 @@ def choose_cones(
     if options.scale_at_cones and options.method == "exact":
         check_enough(len(solution.cones), mesh)
     else:
-        advice = (
-            "allow more of them (--max-cones)"
-            if options.cone_choice == "greedy"
-            else "add cones or move them"
-        )
+        advice = "allow more of them (--max-cones)" if is_greedy else "add cones or move them"
         check_feasible(solution.cones, solution.curvatures, wishes.names, advice)
     return solution
 

@@ -24,7 +24,10 @@ class Later(Future[Result]):
     def result(self, timeout: float | None = None) -> Result:
         """Return what comes of it."""
         if not self.done():
-            self.set_result(self._call())
+            try:
+                self.set_result(self._call())
+            except Exception as error:
+                self.set_exception(error)
         return super().result(timeout)
 
 

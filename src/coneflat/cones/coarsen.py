@@ -69,7 +69,7 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
             part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most, weak)
             if part.shape[1] <= STUCK * level.shape[0]:
                 break
-        else:  # hardly anything is coupled, as on a strip between two boundaries
+        else:  # hardly anything is coupled, as on a strip between two boundaries: whatever is next in order
             part = _pieces(np.argsort(order, kind="stable") * size // len(order), size)
         transposed = csr_matrix(part.T)
         level = csr_matrix(transposed @ (level @ part))

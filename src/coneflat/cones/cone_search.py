@@ -47,10 +47,10 @@ RUNNERS = 3
 
 def check_available(usable: BoolArray, required: IntArray, limits: Limits) -> None:
     """Raise CurvatureError if cones at the (n,) usable vertices and the required ones cannot carry the curvature."""
-    if limits.fewest > MOST_CONES:
+    if limits.fewest > MOST_CONES + len(required):
         raise CurvatureError(
             f"a total curvature of {limits.total / np.pi:.4g} pi needs {limits.fewest:,} cones or more within these "
-            f"bounds, and the pursuit finds {MOST_CONES} at most: allow wider ones, or choose the greedy search "
+            f"bounds, and the pursuit finds {MOST_CONES} at most: allow other angles, or choose the greedy search "
             "(--cones greedy), which has no bounds"
         )
     available = np.count_nonzero(usable) + np.count_nonzero(~usable[required])
@@ -197,7 +197,7 @@ class ConeSearch:
     def of_count(self, count: int) -> tuple[float, IntArray]:
         """Return E and members (places in the pool) of the best set of at most so many cones."""
         count = min(count, self.most_cones)
-        self._climb(0.0, count + 1)
+        self._climb(0.0, count + 1, count)
         self._improve(max(1, count - 2), count + 1)
         for some in (count - 1, count):
             if some in self.coarse.best:
@@ -224,7 +224,10 @@ class ConeSearch:
         return found
 
     def _off(self, count: int) -> float:
-        """Return the factor, 1 or more, by which E^2 with so many cones exceeds that of the coarse model."""
+        """Return the factor, 1 or more, by which E^2 with so many cones exceeds that of the coarse model.
+
+        Where one of them is not known, it is as much as the coarse model is trusted.
+        """
         coarse = self.coarse.best[count][0] if count in self.coarse.best else 0.0
         off = self._best(count) / coarse if coarse > 0 else math.inf
         return max(off, 1.0) if math.isfinite(off) else COARSE_DOUBT
@@ -239,19 +242,20 @@ class ConeSearch:
 
     def _survey(self, goal: float, most: int) -> None:
         """Find good sets of all sizes up to the one that is needed, and a little on, on the coarse model."""
-        self._climb(goal / COARSE_DOUBT, most)
+        self._climb(goal / COARSE_DOUBT, most, most)
         known = sorted(self.coarse.best)
         reached = [c for c in known if self.coarse.best[c][0] <= goal]
         count = reached[0] if reached else known[-1]
         self._improve(max(known[0], count - 3), min(count + 1, known[-1]), goal)
 
-    def _climb(self, bound: float, most: int) -> None:
+    def _climb(self, bound: float, most: int, count: int) -> None:
+        """Find sets on the coarse model, of at most `most` cones; it is an error if none has `count` or fewer."""
         self.coarse.climb(bound, most)
-        if not self.coarse.best:
+        if min(self.coarse.best, default=count + 1) > count:
             raise CurvatureError(
-                f"no {plural(most, 'cone')} were found that carry a total curvature of "
-                f"{self.limits.total / np.pi:.4g} pi within their bounds: allow more or wider ones, or choose the "
-                "greedy search (--cones greedy), which has no bounds"
+                f"no {count} cones were found that carry a total curvature of {self.limits.total / np.pi:.4g} pi "
+                "within their bounds: allow more of them or other angles, or choose the greedy search "
+                "(--cones greedy), which has no bounds"
             )
 
     def _improve(self, least: int, most: int, goal: float = 0.0) -> None:
@@ -338,7 +342,7 @@ class ConeSearch:
     def solution(self, members: IntArray) -> ConeSolution:
         """Return the cones of a set, those of no curvature left out unless they are required.
 
-        After the required ones, they come in the order of vertices, not in that in which they were found.
+        After the required ones, they come in the order of the search's vertices, not in that in which they were found.
         """
         fixed = len(self.coarse.fixed)
         free = members[fixed:]

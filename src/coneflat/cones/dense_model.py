@@ -193,10 +193,12 @@ class DenseModel:
         if len(members) + 1 >= self.limits.fewest:
             chosen, _ = self.best_addition(members, self.usable)
         if chosen < 0:
-            # No further one makes curvatures feasible yet, or lowers E: the best if there were no bounds.
+            # No further one makes curvatures feasible yet, or lowers E: the best of those that can carry some.
             left = np.setdiff1d(np.flatnonzero(self.usable), members)
             if not len(left):
                 return None
+            carrying = left[self.least[left] < 0] if self.limits.total < 0 else left
+            left = carrying if len(carrying) else left
             chosen = int(left[first_least(self.additions(members, self.fit(members))[left])])
         return np.append(members, chosen)
 

@@ -140,7 +140,7 @@ def fit_at_once(
     """Find the optimum by changing all bounds that are in the way, or no longer, at once; tell if it ends, and where.
 
     The primal-dual active set method (M. Hintermueller, K. Ito, K. Kunisch, "The primal-dual active set strategy as a
-    semismooth Newton method", 2003): a handful of steps where it works, which is nearly always.
+    semismooth Newton method", 2003): a handful of steps where it works, which on the models tried is nearly always.
     """
     size = len(slope)
     free, best, gradient = np.empty(size, np.int64), np.empty(size), np.empty(size)
@@ -168,36 +168,20 @@ def fit_at_once(
 
 
 @compiled
-def fit_curvatures(
-    gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float
-) -> tuple[FloatArray, float, bool]:
-    """Minimise k gram k / 2 + slope k over least <= k <= most (s,), and sum k = total unless that is NaN.
-
-    It ends at the exact optimum, since the program is strictly convex: if changing many bounds at once does not get
-    there, a primal active set method does, one by one.
-
-    Returns:
-        The curvatures, the multiplier of the sum, and whether the bounds allow the sum. Where they do not, the
-        bounds are left out.
-    """
+def fit_one_by_one(
+    gram: FloatArray,
+    slope: FloatArray,
+    least: FloatArray,
+    most: FloatArray,
+    total: float,
+    state: IntArray,
+    curvatures: FloatArray,
+    lower: FloatArray,
+) -> float:
+    """Find the optimum by a primal active set method, which always ends; return the multiplier of the sum."""
     size = len(slope)
     has_sum = total == total
-    curvatures = np.zeros(size)
-    if size == 0:
-        return curvatures, 0.0, not has_sum or abs(total) < 1e-9
-    low_sum, high_sum = 0.0, 0.0
-    for i in range(size):
-        low_sum += least[i]
-        high_sum += most[i]
-    slack = 1e-12 * (1.0 + abs(total))
-    feasible = not has_sum or low_sum - slack <= total <= high_sum + slack
-    if not feasible:
-        least, most = np.full(size, -np.inf), np.full(size, np.inf)
-    state = np.zeros(size, np.int64)  # -1 held at the least, 1 at the most, 0 free
-    lower = np.empty((size, size))
-    done, multiplier = fit_at_once(gram, slope, least, most, total, state, curvatures, lower)
-    if done:
-        return curvatures, multiplier, feasible
+    multiplier = 0.0
     state[:] = 0
     start_feasibly(least, most, total, curvatures)
     free, best, gradient = np.empty(size, np.int64), np.empty(size), np.empty(size)
@@ -246,6 +230,40 @@ def fit_curvatures(
             state[high] = 0
         else:
             state[low] = 0
+    return multiplier
+
+
+@compiled
+def fit_curvatures(
+    gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float
+) -> tuple[FloatArray, float, bool]:
+    """Minimise k gram k / 2 + slope k over least <= k <= most (s,), and sum k = total unless that is NaN.
+
+    It ends at the exact optimum, since the program is strictly convex: if changing many bounds at once does not get
+    there, changing them one by one does.
+
+    Returns:
+        The curvatures, the multiplier of the sum, and whether the bounds allow the sum. Where they do not, the
+        bounds are left out.
+    """
+    size = len(slope)
+    has_sum = total == total
+    curvatures = np.zeros(size)
+    if size == 0:
+        return curvatures, 0.0, not has_sum or abs(total) < 1e-9
+    low_sum, high_sum = 0.0, 0.0
+    for i in range(size):
+        low_sum += least[i]
+        high_sum += most[i]
+    slack = 1e-12 * (1.0 + abs(total))
+    feasible = not has_sum or low_sum - slack <= total <= high_sum + slack
+    if not feasible:
+        least, most = np.full(size, -np.inf), np.full(size, np.inf)
+    state = np.zeros(size, np.int64)  # -1 held at the least, 1 at the most, 0 free
+    lower = np.empty((size, size))
+    done, multiplier = fit_at_once(gram, slope, least, most, total, state, curvatures, lower)
+    if not done:
+        multiplier = fit_one_by_one(gram, slope, least, most, total, state, curvatures, lower)
     return curvatures, multiplier, feasible
 
 
