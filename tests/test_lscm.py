@@ -160,12 +160,15 @@ class TestPipeline:
     @pytest.mark.parametrize("method", ["lscm", "spectral", "bff"])
     @pytest.mark.parametrize("name", ["fandisk.obj", "rocker-arm.obj", "plane-holes.obj"])
     def test_real_models(self, shared, method, name):
-        """Measured: QC 1.033 to 1.063, but 1.110 for BFF on the plane with holes; two flipped triangles at most there,
-        one elsewhere."""
-        result = flatten(shared(name), method=method)
+        """Measured: QC below 1.063, but 1.115 for BFF on the plane with holes; one flipped triangle at most.
+
+        These methods promise nothing about flips: with the fewer cones of the default, two on the plane with holes.
+        """
+        distortion = 0.15 if name == "plane-holes.obj" else 0.2
+        result = flatten(shared(name), method=method, distortion=distortion)
         bound = 1.12 if (method, name) == ("bff", "plane-holes.obj") else 1.07
         assert result.distortion.qc_mean < bound
-        assert result.distortion.flipped <= (2 if name == "plane-holes.obj" else 1)
+        assert result.distortion.flipped <= 1
         assert result.distortion.mirrored_charts == 0
 
     @pytest.mark.parametrize("option", [{"refine": True}, {"best_effort": True}, {"boundary": "disk"}])

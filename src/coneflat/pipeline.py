@@ -124,7 +124,7 @@ def flatten(
         length_rule: of the linear metric: "integral" scales an edge by the mean of exp(phi) along it, "mean"
             by exp of the mean.
         at_cones: of the exact metric: "scale" prescribes phi = 0 at the cones and their curvatures come out,
-            "curvature" prescribes those of the search; "auto" is "scale" after a greedy search and at given
+            "curvature" prescribes those of the search; "auto" is "scale" for cones "greedy" and at given
             positions, unless the boundary is prescribed, and else "curvature".
         boundary: of the exact metric: "free" has the least area distortion (phi = 0 there), "lengths" is the
             same at the model's own scale, so that boundary lengths are kept, "disk" makes it round, "straight" has

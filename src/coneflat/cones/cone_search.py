@@ -31,7 +31,7 @@ COARSE_DOUBT = 1.35
 HOPE = 1.15
 # Where the best set of a size misses by less than this factor of E^2, others are tried.
 NARROW = 1.1
-# And where it misses by less than this one, so many times.
+# And where it misses by less than this one, shaken sets are tried so many times.
 NEARLY, SEEDS = 1.03, 4
 # Perturbations tried for each number of cones about the answer: one for so many vertices, within bounds, so that they
 # take a like share of the time on all meshes.
