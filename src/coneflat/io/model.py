@@ -28,6 +28,7 @@ class MeshFile:
         properties: what the file says of every vertex besides its position, by name, each (n,): `quality` or
             `red` of a PLY file, say. Colours are 0 to 1.
         texture: (c,) a number for the UV point that the file gives every corner, if it gives some.
+        uv: (u, 2) the UV points that `texture` numbers, v upwards; None where the reader has none.
     """
 
     path: Path
@@ -39,3 +40,4 @@ class MeshFile:
     obj: ObjText | None = None
     properties: Mapping[str, FloatArray] = field(default_factory=dict)
     texture: IntArray | None = None
+    uv: FloatArray | None = None

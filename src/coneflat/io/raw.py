@@ -24,7 +24,8 @@ COLOURS = ("red", "green", "blue")
 class RawMesh(NamedTuple):
     """The content of a mesh file: (n, 3) vertices, (c,) corners, (p + 1,) offsets, and what else it has.
 
-    That is an OBJ file's text, numbers that it gives each vertex, by name, and (c,) a number for each corner's UVs.
+    That is an OBJ file's text, numbers that it gives each vertex, by name, (c,) a number for each corner's UV
+    point, and (u, 2) these points.
     """
 
     vertices: FloatArray
@@ -33,6 +34,7 @@ class RawMesh(NamedTuple):
     obj: ObjText | None = None
     properties: Mapping[str, FloatArray] = MappingProxyType({})
     texture: IntArray | None = None
+    uv: FloatArray | None = None
 
 
 def read_bytes(path: Path) -> bytes:

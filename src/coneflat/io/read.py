@@ -75,6 +75,7 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
         obj=mesh.obj,
         properties=mesh.properties,
         texture=mesh.texture,
+        uv=mesh.uv,
     )
     return _welded(whole) if (ending in _WELDED_BY_DEFAULT if weld is None else weld) else whole
 
