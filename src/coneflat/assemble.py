@@ -13,6 +13,7 @@ from .atlas import part_touching
 from .atlas.arrange import arrange_charts
 from .distortion import curvature_errors, measure
 from .figures import SolveFigures
+from .layout.convex import Polygons, make_convex
 from .mesh import TriangleMesh
 from .numbering import result_numbering, turn_corners
 from .options import Options
@@ -61,6 +62,19 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         uv = np.empty_like(points)
         uv[corners] = packed.corner_uv
 
+    refined = any(one.figures.refined_triangles for one in laid_out)
+    lost: tuple[str, ...] = ()
+    if refined and given.source is not None:
+        lost = (
+            "The refinement has triangles of its own: polygons, groups and materials of the file are not kept.",
+        )
+    face_corners = (
+        None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
+    )
+    if face_corners is not None and given.source is not None:
+        with stages("polygons"):
+            uv = make_convex(uv, corners, Polygons(given.source.offsets, face_corners), positions[faces])
+
     def spread(values: Sequence[FloatArray]) -> FloatArray:
         every = np.full(len(positions), np.nan)
         for ids, value in zip(numbers, values, strict=True):
@@ -89,15 +103,6 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
                 measure_rotations(one.mesh, corner_uv, options.quantum)
                 for one, corner_uv in zip(laid_out, flat, strict=True)
             )
-    refined = any(one.figures.refined_triangles for one in laid_out)
-    lost: tuple[str, ...] = ()
-    if refined and given.source is not None:
-        lost = (
-            "The refinement has triangles of its own: polygons, groups and materials of the file are not kept.",
-        )
-    face_corners = (
-        None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
-    )
     result = Flattening(
         vertices=positions,
         faces=faces,

@@ -111,6 +111,19 @@ def measure(
     return replace(measured, overlap=overlaps.fraction, overlapping_pairs=len(overlaps.pairs))
 
 
+def measure_at_any_size(
+    mesh: TriangleMesh,
+    corner_uv: FloatArray,
+    curvature_error: tuple[float, float] = (np.nan, np.nan),
+    cones: IntArray | None = None,
+    prescribed: FloatArray | None = None,
+) -> Distortion:
+    """Measure a UV map as `measure` does, of a mesh so large or small that squares of its lengths may be no numbers."""
+    exponent = -int(np.frexp(np.abs(mesh.vertices[mesh.faces]).max())[1])
+    unit = TriangleMesh(np.ldexp(mesh.vertices, exponent), mesh.faces)
+    return measure(unit, corner_uv, curvature_error, cones, prescribed).rescaled(exponent * float(np.log(2)))
+
+
 def angle_sum_errors(
     mesh: TriangleMesh, corner_uv: FloatArray, prescribed: FloatArray
 ) -> tuple[FloatArray, FloatArray]:

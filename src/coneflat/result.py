@@ -100,6 +100,21 @@ class Flattening:
 
         return write_flattening(self, path, texture)
 
+    def as_written(self, ending: str) -> Flattening:
+        """Return the result as a file of a format holds it, with the measures and notes of that.
+
+        A .glb has numbers of 32 bits; the polygons of an .obj are measured as the fans of triangles that others read.
+
+        Args:
+            ending: ".obj", ".ply", ".glb" or ".npz".
+
+        Raises:
+            MeshFileError: the file cannot hold numbers so large.
+        """
+        from .io.written import as_written
+
+        return as_written(self, ending)
+
     def view(
         self,
         path: str | PathLike[str] | None = None,

@@ -12,6 +12,7 @@ from typing import Any
 from ..errors import OptionError
 from ..io import atomic_write, check_output, read_flattening, read_mesh
 from ..io.atomic import check_target
+from ..io.write import write_measured
 from ..pipeline import flatten
 from ..result import Flattening
 from .console import Console
@@ -78,9 +79,9 @@ def flatten_file(
 def save(
     result: Flattening, console: Console, output: Path, report: Path | None, texture: str | None = None
 ) -> Flattening:
-    """Write a result and its report, and return it with the time that everything took."""
+    """Write a result and its report, and return it as it was written, with the time that everything took."""
     with console.stage("write", FLATTENED):
-        result.save(output, texture=texture)
+        result = write_measured(result, output, texture)
     result = replace(result, seconds=dict(console.seconds))
     if report is not None:
         with atomic_write(report, "w") as file:

@@ -14,6 +14,7 @@ from .npz import write_npz
 from .obj_write import write_obj
 from .ply_write import write_ply
 from .texture import find_texture
+from .written import as_written
 
 if TYPE_CHECKING:
     from ..result import Flattening
@@ -64,14 +65,32 @@ def write_flattening(
         MeshFileError: the file cannot be written, or the texture cannot be read.
         OptionError: files of this ending carry no texture, or Pillow is not installed.
     """
+    return _write(result, path, texture)[0]
+
+
+def write_measured(
+    result: Flattening, path: str | PathLike[str], texture: str | PathLike[str] | None = None
+) -> Flattening:
+    """Write a flattened mesh as `write_flattening` does, and return it as the file holds it; see `as_written`."""
+    written, stored = _write(result, path, texture)
+    return as_written(stored, written.suffix.lower())
+
+
+def _write(
+    result: Flattening, path: str | PathLike[str], texture: str | PathLike[str] | None
+) -> tuple[Path, Flattening]:
+    """Write a flattened mesh, and return the path and the arrays that were written."""
     path = check_output(path, texture)
     image = None if texture is None else find_texture(texture, result)
+    ending = path.suffix.lower()
+    # A .glb holds fewer digits, at which triangles are to be upright and apart, too.
+    stored = as_written(result, ending) if ending == ".glb" else result
     writers: dict[str, Callable[[IO[bytes]], None]] = {
-        ".obj": lambda stream: write_obj(result, stream, path.parent),
-        ".ply": lambda stream: write_ply(result, stream),
-        ".glb": lambda stream: write_glb(result, stream, image),
-        ".npz": lambda stream: write_npz(result, stream),
+        ".obj": lambda stream: write_obj(stored, stream, path.parent),
+        ".ply": lambda stream: write_ply(stored, stream),
+        ".glb": lambda stream: write_glb(stored, stream, image),
+        ".npz": lambda stream: write_npz(stored, stream),
     }
     with atomic_write(path) as stream:
-        writers[path.suffix.lower()](stream)
-    return path
+        writers[ending](stream)
+    return path, stored
