@@ -62,7 +62,11 @@ def find_pieces(uv: FloatArray, uv_faces: IntArray, offsets: IntArray, face_corn
     points, sizes, loops = polygons.points(uv_faces), polygons.sizes, polygons.loops()
     triples, at = polygons.corner_triples(points)
     whole = polygons.are_whole(points)
-    split = np.unique(at[~(heights(uv, triples) > CONVEX)])
+    height = heights(uv, triples)
+    # What is upside down as a whole is so in fans, too, and no better in pieces.
+    not_left, not_right = (np.zeros(len(sizes), dtype=bool) for _ in range(2))
+    not_left[at[~(height > CONVEX)]] = not_right[at[~(height < -CONVEX)]] = True
+    split = np.flatnonzero(not_left & not_right)
     whole[split] = False
     if whole.all():
         return Pieces(loops, points[loops], sizes, np.arange(len(sizes)), split)
