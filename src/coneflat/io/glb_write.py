@@ -9,8 +9,8 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import FloatArray, IntArray
 from ..errors import MeshFileError
+from .normals import corner_normals, vertex_normals
 from .texture import Texture
 from .uv_split import split_at_seams
 
@@ -35,9 +35,9 @@ _MATERIAL: dict[str, Any] = {
 def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None = None) -> None:
     """Write a result as GLB, with a two-sided material that is plain or has a texture.
 
-    Every vertex has its UV as TEXCOORD_0 (whose v points down, as glTF has it), a normal of the uncut
-    surface, and as _SOURCE_VERTEX the vertex of the input that it came from. All are 32-bit floats, the only
-    type that glTF has for them: source vertices are exact up to 2^24.
+    Every vertex has its UV as TEXCOORD_0 (whose v points down, as glTF has it), the input's normal or else one of
+    the uncut surface, and as _SOURCE_VERTEX the vertex of the input that it came from. All are 32-bit floats, the
+    only type that glTF has for them: source vertices are exact up to 2^24.
 
     Args:
         result: what to write.
@@ -47,11 +47,14 @@ def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None = N
     Raises:
         MeshFileError: it is larger than GLB can be.
     """
-    split = split_at_seams(result)
+    split = split_at_seams(result, corner_normals(result))
+    normals = (
+        vertex_normals(result.vertices, result.faces)[split.own] if split.normals is None else split.normals
+    )
     arrays: list[NDArray[Any]] = [split.faces.reshape(-1).astype("<u4")]
     attributes = {
         "POSITION": split.vertices,
-        "NORMAL": _normals(result.vertices, result.faces)[split.own],
+        "NORMAL": normals,
         "TEXCOORD_0": split.uv * [1, -1] + [0, 1],
         "_SOURCE_VERTEX": split.origin,
     }
@@ -125,17 +128,3 @@ def _as_text(tree: dict[str, Any]) -> bytes:
     """Return JSON, filled up with blanks to a multiple of 4."""
     text = json.dumps(tree, separators=(",", ":")).encode("ascii")
     return text + b" " * (-len(text) % 4)
-
-
-def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (n, 3) unit normals, each the mean of its triangles' by area; (0, 0, 1) where there is none."""
-    a, b, c = (np.take(vertices, faces[:, k], axis=0) for k in range(3))
-    by_face = np.cross(b - a, c - a)
-    total = np.stack(
-        [np.bincount(faces.reshape(-1), np.repeat(by_face[:, k], 3), len(vertices)) for k in range(3)], axis=1
-    )
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    flat = length[:, 0] == 0
-    normals = total / np.where(length == 0, 1, length)
-    normals[flat] = (0, 0, 1)
-    return np.asarray(normals)

@@ -39,7 +39,8 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
     texture coordinates: the new ones are put before the first face, and each face line names them beside the
     file's own vertex and normal numbers. Polygons stay polygons, those whose orientation was repaired run the
     other way, and those that the repair dropped are left out; of a polygon that it dropped in part, the
-    remaining triangles are written. Paths of material libraries are made to fit `folder`.
+    remaining triangles are written. Of another file, what is written are its vertices, polygons and normals. Paths of
+    material libraries are made to fit `folder`.
 
     Args:
         result: what to write.
@@ -48,10 +49,15 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
     """
     source, text = result.source, ObjText({}, None, b"\n")
     vertices, faces, face_corners = result.vertices, result.faces, result.face_corners
+    normals = None
     if source is not None and face_corners is not None:
-        vertices, offsets = source.vertices, source.offsets
-        numbers = (source.corners if source.unwelded is None else source.unwelded) + 1
-        text = text if source.obj is None else _relocated(source.obj, source.path.parent, folder)
+        vertices, offsets, numbers = source.vertices, source.offsets, source.corners + 1
+        if source.obj is not None:
+            # Its own vertices stand in the text, those that were merged as well.
+            numbers = numbers if source.unwelded is None else source.unwelded + 1
+            text = _relocated(source.obj, source.path.parent, folder)
+        elif source.normals is not None and source.normal is not None:
+            normals, text = source.normals, replace(text, normals=source.normal + 1)
     else:
         source, numbers = None, faces.reshape(-1) + 1
         offsets = np.arange(0, len(numbers) + 1, 3)
@@ -63,6 +69,8 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
     newline, last = text.newline, len(offsets) - 1
     if source is None or source.obj is None:
         stream.writelines(lines_of(b"v", vertices, newline))
+    if normals is not None:
+        stream.writelines(lines_of(b"vn", normals, newline))
     before = sorted({0, last, *text.gaps})
     begins = np.searchsorted(to_write.polygons, before).tolist()
     starts = np.concatenate(([0], np.cumsum(to_write.sizes)))
