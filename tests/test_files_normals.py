@@ -64,7 +64,7 @@ def cube_glb(path):
     return path
 
 
-MAKERS = {".obj": cube_obj, ".ply": cube_ply, ".off": cube_off}
+MAKERS = {".obj": cube_obj, ".ply": cube_ply, ".off": cube_off, ".glb": cube_glb}
 
 
 def seen_normals(path):
