@@ -7,8 +7,8 @@ from .model import MeshFile
 from .npz import read_flattening
 from .polygons import is_polygon_side, triangulate
 from .raw import COLOURS
-from .read import INPUT_FORMATS, read_mesh
-from .write import OUTPUT_FORMATS, check_output, write_flattening
+from .read import INPUT_FORMATS, read_mesh, read_mesh_from
+from .write import OUTPUT_FORMATS, check_output, losses, write_flattening
 
 __all__ = [
     "COLOURS",
@@ -18,8 +18,10 @@ __all__ = [
     "atomic_write",
     "check_output",
     "is_polygon_side",
+    "losses",
     "read_flattening",
     "read_mesh",
+    "read_mesh_from",
     "triangulate",
     "write_flattening",
 ]

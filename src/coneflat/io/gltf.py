@@ -10,6 +10,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..errors import EmptyMeshError
 from .gltf_data import GltfData
+from .gltf_names import check_names
 from .gltf_scene import DRACO, GltfScene, ScenePart, shown_nodes, triangle_corners
 from .raw import RawMesh, triangle_offsets
 from .weld import weld
@@ -35,6 +36,7 @@ def parse_gltf(path: Path, content: bytes) -> RawMesh:
         mesh = reading.data.item("nodes", node).get("mesh")
         if mesh is not None:
             reading.add_mesh(node, mesh, matrix)
+    check_names(reading.data)
     return reading.done()
 
 
@@ -81,14 +83,15 @@ class _Reading:
                 self._vertices.append(points @ linear.T + matrix[:3, 3])
                 self._count += len(points)
             first, count = placed[position]
+            self._check_copied(primitive, count)
             self._take(0, len(corners))
             if is_mirrored:
                 # The specification turns the winding under a mirroring node (Section 3.7.4).
                 corners = corners.reshape(-1, 3)[:, ::-1].reshape(-1)
             self._parts.append(ScenePart(node, mesh, index, corners, is_mirrored))
             self._corners.append(corners + first)
-            self._uvs.append(self._attribute(attributes, "TEXCOORD_0", 2, count, corners))
-            normals = self._attribute(attributes, "NORMAL", 3, count, corners)
+            self._uvs.append(self._attribute(attributes, "TEXCOORD_0", 2, corners))
+            normals = self._attribute(attributes, "NORMAL", 3, corners)
             self._normals.append(None if normals is None else normals @ _cofactors(linear).T)
         if self._count > self._blocks[-1]:
             self._blocks.append(self._count)
@@ -118,15 +121,20 @@ class _Reading:
         )
 
     def _attribute(
-        self, attributes: dict[str, Any], name: str, columns: int, count: int, corners: IntArray
+        self, attributes: dict[str, Any], name: str, columns: int, corners: IntArray
     ) -> FloatArray | None:
         """Return (c, columns) an attribute at some corners."""
         if name not in attributes:
             return None
-        values = self.data.values(attributes[name], columns)
-        if len(values) < count:
-            self.data.fail(f"a primitive has {name} for {len(values)} of its {count} vertices")
-        return values[corners]
+        return self.data.values(attributes[name], columns)[corners]
+
+    def _check_copied(self, primitive: dict[str, Any], count: int) -> None:
+        """Refuse arrays that are there for some of the vertices only, or not at all."""
+        data = self.data
+        for each in (primitive["attributes"], *data.entry(primitive, "targets", list, [])):
+            for name, index in each.items():
+                if len(data.raw(index)) < count:
+                    data.fail(f"a primitive has {name} for {len(data.raw(index))} of its {count} vertices")
 
     def _take(self, vertices: int, corners: int) -> None:
         """Count what a part adds, before it is added."""

@@ -139,22 +139,26 @@ def _relocated(text: ObjText, old: Path, new: Path) -> ObjText:
     if here == there:
         return text
 
-    def moved(name: bytes) -> bytes:
-        if os.path.isabs(name):
-            return name
-        full = os.path.join(os.fsencode(here), name)
-        try:
-            relative = os.path.relpath(full, os.fsencode(there))
-        except ValueError:
-            # On another drive nothing but the full path leads there.
-            relative = full
-        return relative.replace(os.fsencode(os.sep), b"/")
-
     def line(match: re.Match[bytes]) -> bytes:
         names = match[2]
         # Several names may stand on a line, and so may one name with blanks; the folder tells.
         is_one = os.path.exists(os.path.join(os.fsencode(here), names))
-        return match[1] + b" ".join(map(moved, [names] if is_one else names.split()))
+        return match[1] + b" ".join(
+            moved_path(name, here, there) for name in ([names] if is_one else names.split())
+        )
 
     gaps = {i: _MATERIALS.sub(line, gap) if b"mtllib" in gap else gap for i, gap in text.gaps.items()}
     return replace(text, gaps=gaps)
+
+
+def moved_path(name: bytes, here: str, there: str) -> bytes:
+    """Return a path relative to another folder that leads where one relative to the first did; slashes part it."""
+    if os.path.isabs(name):
+        return name
+    full = os.path.join(os.fsencode(here), name)
+    try:
+        relative = os.path.relpath(full, os.fsencode(there))
+    except ValueError:
+        # On another drive nothing but the full path leads there.
+        relative = full
+    return relative.replace(os.fsencode(os.sep), b"/")

@@ -10,6 +10,7 @@ from typing import IO, TYPE_CHECKING
 from ..errors import OptionError
 from .atomic import atomic_write, check_target, known_ending
 from .glb_write import write_glb
+from .gltf_write import scene_losses
 from .npz import write_npz
 from .obj_write import write_obj
 from .ply_write import write_ply
@@ -50,8 +51,9 @@ def write_flattening(
     """Write a flattened mesh, in full or not at all, and return the path.
 
     The format follows the path's ending, in any case. An .obj keeps the polygons, groups, materials and
-    comments of the OBJ the mesh was read from. A .ply and a .glb hold the triangles, with a vertex for every
-    pair of vertex and UV point and the input's vertex as an attribute. An .npz holds all arrays of the result
+    comments of the OBJ the mesh was read from. A .glb keeps the scene of the glTF or GLB that the mesh was read from.
+    Of other meshes, a .ply and a .glb hold the triangles, with a vertex for every pair of vertex and UV point, the
+    input's normals, and the input's vertex as an attribute. An .npz holds all arrays of the result
     and its report as JSON.
 
     Args:
@@ -69,9 +71,17 @@ def write_flattening(
     writers: dict[str, Callable[[IO[bytes]], None]] = {
         ".obj": lambda stream: write_obj(result, stream, path.parent),
         ".ply": lambda stream: write_ply(result, stream),
-        ".glb": lambda stream: write_glb(result, stream, image),
+        ".glb": lambda stream: write_glb(result, stream, image, path.parent),
         ".npz": lambda stream: write_npz(result, stream),
     }
     with atomic_write(path) as stream:
         writers[path.suffix.lower()](stream)
     return path
+
+
+def losses(result: Flattening, ending: str) -> tuple[str, ...]:
+    """Return what a file of an ending does not keep of the one that the mesh was read from, one sentence each.
+
+    That is what one would expect it to keep, as a .glb does the scene of a .glb.
+    """
+    return scene_losses(result) if ending.lower() == ".glb" else ()
