@@ -186,16 +186,18 @@ class TestSplitFormats:
         result = replace(result, uv=uv, vertex_origin=np.arange(7) + 10)
         out = write_flattening(result, tmp_path / "out.ply")
         mesh = read_mesh(out)
-        # Vertex 6 has no face, vertices 1 and 4 lie on the seam.
-        assert len(mesh.vertices) == 8
+        # Vertex 6 has no face, vertices 1 and 4 lie on the seam, and at 2 and 5 one face has a normal, the other none.
+        assert len(mesh.vertices) == 10
         triangles = mesh.corners.reshape(-1, 3)
         assert mesh.vertices[triangles].tobytes() == result.vertices[result.faces].tobytes()
         header, _, body = out.read_bytes().partition(b"end_header\n")
         properties = [line.split()[-1] for line in header.splitlines() if line.startswith(b"property")]
-        assert properties == [b"x", b"y", b"z", b"s", b"t", b"source_vertex", b"vertex_indices"]
-        rows = np.frombuffer(body, [("xyz", "<f8", 3), ("uv", "<f8", 2), ("source", "<i4")], 8)
+        assert properties == b"x y z nx ny nz s t source_vertex vertex_indices".split()
+        kind = [("xyz", "<f8", 3), ("normal", "<f8", 3), ("uv", "<f8", 2), ("source", "<i4")]
+        rows = np.frombuffer(body, kind, len(mesh.vertices))
         assert rows["uv"][triangles].tobytes() == result.uv[result.uv_faces].tobytes()
         np.testing.assert_array_equal(rows["source"][triangles], result.faces + 10)
+        np.testing.assert_array_equal(rows["normal"][triangles][:3], np.tile([0.0, 0, 1], (3, 3, 1)))
 
     def test_glb_by_the_specification(self, bar, tmp_path):
         result = cut_bar(bar)

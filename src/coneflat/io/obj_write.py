@@ -31,8 +31,9 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
     If the mesh was read from an OBJ file, every line of that file stands in its place, but for its old
     texture coordinates: the new ones are put before the first face, and each face line names them beside the
     file's own vertex and normal numbers. Polygons stay polygons, those whose orientation was repaired run the
-    other way, and those that the repair dropped are left out; of a polygon that it dropped in part, the
-    remaining triangles are written. Paths of material libraries are made to fit `folder`.
+    other way, and those that the repair dropped are left out. A polygon that is not convex in the plane, is cut
+    by a seam, or was dropped in part, is written in convex pieces. Of another file, what is written are its
+    vertices, polygons and normals. Paths of material libraries are made to fit `folder`.
 
     Args:
         result: what to write.
@@ -41,10 +42,15 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
     """
     source, text = result.source, ObjText({}, None, b"\n")
     vertices, faces, face_corners = result.vertices, result.faces, result.face_corners
+    normals = None
     if source is not None and face_corners is not None:
-        vertices, offsets = source.vertices, source.offsets
-        numbers = (source.corners if source.unwelded is None else source.unwelded) + 1
-        text = text if source.obj is None else _relocated(source.obj, source.path.parent, folder)
+        vertices, offsets, numbers = source.vertices, source.offsets, source.corners + 1
+        if source.obj is not None:
+            # Its own vertices stand in the text, those that were merged as well.
+            numbers = numbers if source.unwelded is None else source.unwelded + 1
+            text = _relocated(source.obj, source.path.parent, folder)
+        elif source.normals is not None and source.normal is not None:
+            normals, text = source.normals, replace(text, normals=source.normal + 1)
     else:
         source, numbers = None, faces.reshape(-1) + 1
         offsets = np.arange(0, len(numbers) + 1, 3)
@@ -56,6 +62,8 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
     newline, last = text.newline, len(offsets) - 1
     if source is None or source.obj is None:
         stream.writelines(lines_of(b"v", vertices, newline))
+    if normals is not None:
+        stream.writelines(lines_of(b"vn", normals, newline))
     before = sorted({0, last, *text.gaps})
     begins = np.searchsorted(to_write.polygons, before).tolist()
     starts = np.concatenate(([0], np.cumsum(to_write.sizes)))
@@ -89,22 +97,26 @@ def _relocated(text: ObjText, old: Path, new: Path) -> ObjText:
     if here == there:
         return text
 
-    def moved(name: bytes) -> bytes:
-        if os.path.isabs(name):
-            return name
-        full = os.path.join(os.fsencode(here), name)
-        try:
-            relative = os.path.relpath(full, os.fsencode(there))
-        except ValueError:
-            # On another drive nothing but the full path leads there.
-            relative = full
-        return relative.replace(os.fsencode(os.sep), b"/")
-
     def line(match: re.Match[bytes]) -> bytes:
         names = match[2]
         # Several names may stand on a line, and so may one name with blanks; the folder tells.
         is_one = os.path.exists(os.path.join(os.fsencode(here), names))
-        return match[1] + b" ".join(map(moved, [names] if is_one else names.split()))
+        return match[1] + b" ".join(
+            moved_path(name, here, there) for name in ([names] if is_one else names.split())
+        )
 
     gaps = {i: _MATERIALS.sub(line, gap) if b"mtllib" in gap else gap for i, gap in text.gaps.items()}
     return replace(text, gaps=gaps)
+
+
+def moved_path(name: bytes, here: str, there: str) -> bytes:
+    """Return a path relative to another folder that leads where one relative to the first did; slashes part it."""
+    if os.path.isabs(name):
+        return name
+    full = os.path.join(os.fsencode(here), name)
+    try:
+        relative = os.path.relpath(full, os.fsencode(there))
+    except ValueError:
+        # On another drive nothing but the full path leads there.
+        relative = full
+    return relative.replace(os.fsencode(os.sep), b"/")

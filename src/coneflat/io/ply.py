@@ -28,6 +28,7 @@ _STRUCT = {
     "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
     "f4": "f", "f8": "d",
 }  # fmt: skip
+_NORMAL = ("nx", "ny", "nz")
 _CORNERS = ("vertex_indices", "vertex_index")
 
 
@@ -85,7 +86,17 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
         raise EmptyMeshError(f"{path} has no vertices")
     if polygons is None or not len(polygons[0]):
         raise EmptyMeshError(f"{path} has no faces")
-    return RawMesh(vertices, polygons[1], offsets_of(polygons[0]), None, properties)
+    normals = None
+    if all(name in properties for name in _NORMAL):
+        normals = np.stack([properties[name] for name in _NORMAL], axis=1)
+    return RawMesh(
+        vertices,
+        polygons[1],
+        offsets_of(polygons[0]),
+        properties=properties,
+        normals=normals,
+        normal=None if normals is None else polygons[1],
+    )
 
 
 def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:

@@ -51,8 +51,9 @@ def write_flattening(
     """Write a flattened mesh, in full or not at all, and return the path.
 
     The format follows the path's ending, in any case. An .obj keeps the polygons, groups, materials and
-    comments of the OBJ the mesh was read from. A .ply and a .glb hold the triangles, with a vertex for every
-    pair of vertex and UV point and the input's vertex as an attribute. An .npz holds all arrays of the result
+    comments of the OBJ the mesh was read from. A .glb keeps the scene of the glTF or GLB that the mesh was read from.
+    Of other meshes, a .ply and a .glb hold the triangles, with a vertex for every pair of vertex and UV point, the
+    input's normals, and the input's vertex as an attribute. An .npz holds all arrays of the result
     and its report as JSON.
 
     Args:
@@ -88,7 +89,7 @@ def _write(
     writers: dict[str, Callable[[IO[bytes]], None]] = {
         ".obj": lambda stream: write_obj(stored, stream, path.parent),
         ".ply": lambda stream: write_ply(stored, stream),
-        ".glb": lambda stream: write_glb(stored, stream, image),
+        ".glb": lambda stream: write_glb(stored, stream, image, path.parent),
         ".npz": lambda stream: write_npz(stored, stream),
     }
     with atomic_write(path) as stream:

@@ -15,6 +15,7 @@ from ..mesh import TriangleMesh
 from ..promises import DOUBLE, SINGLE, broken_promises
 from ..rotations import Rotations, seam_rotations
 from ..text import plural
+from .gltf_write import scene_losses
 from .pieces import find_pieces
 
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 # Binary digits of 32-bit numbers.
 DIGITS = 24
+# Sizes of models whose coordinates are 32-bit numbers with all their digits, and so are those of their details.
+SMALLEST, LARGEST = 1e-30, 3e38
 
 
 def as_written(result: Flattening, ending: str) -> Flattening:
@@ -39,7 +42,9 @@ def as_written(result: Flattening, ending: str) -> Flattening:
         MeshFileError: the file cannot hold numbers so large.
     """
     if ending == ".glb":
-        return _in_single_precision(result)
+        stored = _in_single_precision(result)
+        lost = [note for note in scene_losses(stored) if note not in stored.notes]
+        return replace(stored, notes=(*stored.notes, *lost)) if lost else stored
     if ending == ".obj" and result.source is not None and result.face_corners is not None:
         return _in_fans(result, result.source.offsets, result.face_corners)
     return result
@@ -48,16 +53,28 @@ def as_written(result: Flattening, ending: str) -> Flattening:
 def _in_single_precision(result: Flattening) -> Flattening:
     """Return the result with 32-bit positions and UVs."""
     uv = snap_apart(result.uv, result.uv_faces, stored_in_glb)
-    with np.errstate(over="ignore"):
-        vertices = result.vertices.astype(np.float32).astype(np.float64)
-    if not np.isfinite(vertices).all():
-        most = np.abs(result.vertices).max()
-        raise MeshFileError(
-            f"positions of up to {most:.3g} are beyond the 32-bit numbers of .glb: scale the mesh, or write .ply"
-        )
+    keeps_scene = result.source is not None and result.source.scene is not None
+    vertices = result.vertices if keeps_scene else _positions_in_glb(result.vertices)
     if np.array_equal(uv, result.uv) and np.array_equal(vertices, result.vertices):
         return result
     return _measured(result, replace(result, vertices=vertices, uv=uv), SINGLE)
+
+
+def _positions_in_glb(vertices: FloatArray) -> FloatArray:
+    """Return (n, 3) positions as 32-bit numbers.
+
+    Raises:
+        MeshFileError: the largest is beyond them, or so small that they have hardly a digit for it.
+    """
+    with np.errstate(over="ignore"):
+        stored = vertices.astype(np.float32).astype(np.float64)
+    largest = float(np.abs(vertices).max())
+    if not SMALLEST < largest < LARGEST:
+        raise MeshFileError(
+            f"positions of up to {largest:.3g} are beyond the 32-bit numbers of .glb, which are good for sizes from "
+            f"{SMALLEST:.0e} to {LARGEST:.0e}: scale the mesh, or write .ply"
+        )
+    return stored
 
 
 def stored_in_glb(uv: FloatArray) -> FloatArray:
