@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import tempfile
 import time
 import warnings
@@ -219,12 +220,28 @@ def _run(outcome: Outcome, line: list[str]) -> None:
     outcome.refuse(errors[-1] if errors else "usage", expects_nan=True)
 
 
-#: The kinds of cases, and how many of twenty are of each.
+def _crash(rng: Random, outcome: Outcome) -> None:
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def _hang(rng: Random, outcome: Outcome) -> None:
+    while True:
+        pass
+
+
+def _swell(rng: Random, outcome: Outcome) -> None:
+    np.ones(200_000_000)
+
+
+#: The kinds of cases, and how many of twenty are of each. The last three put the workers to the test.
 KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "mesh": _mesh,
     "file": _file,
     "argument": _argument,
     "command": _command,
+    "crash": _crash,
+    "hang": _hang,
+    "swell": _swell,
 }
 SHARES = {"mesh": 12, "file": 4, "argument": 2, "command": 2}
 

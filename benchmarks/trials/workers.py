@@ -27,8 +27,13 @@ MEMORY, ADDRESSES = 1500.0, 6 << 30
 CASES = 500
 
 
-def run_all(cases: Iterable[Case], jobs: int, say: Callable[[Outcome, int], None]) -> None:
-    """Run cases on so many workers and tell the outcome of each as it comes, with how many were done."""
+def run_all(
+    cases: Iterable[Case], jobs: int, say: Callable[[Outcome, int], None], most_work: float = WORK
+) -> None:
+    """Run cases on so many workers and tell the outcome of each as it comes, with how many were done.
+
+    most_work: seconds of a process's own work that a case may take.
+    """
     waiting = list(cases)[::-1]
     tried_again: set[Case] = set()
     home = Path(tempfile.mkdtemp(prefix="hostile"))
@@ -37,7 +42,7 @@ def run_all(cases: Iterable[Case], jobs: int, say: Callable[[Outcome, int], None
     try:
         while waiting or workers:
             while waiting and len(workers) < jobs:
-                workers.append(Worker(home))
+                workers.append(Worker(home, most_work))
             for worker in workers:
                 if worker.case is None and worker.is_ready and waiting:
                     worker.start(waiting.pop())
@@ -74,7 +79,8 @@ class Worker:
         is_done: whether it is to be replaced.
     """
 
-    def __init__(self, home: Path) -> None:
+    def __init__(self, home: Path, most_work: float = WORK) -> None:
+        self.most_work = most_work
         context = get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self.log = Path(tempfile.mkstemp(dir=home, suffix=".log")[1])
@@ -112,7 +118,7 @@ class Worker:
         if self.case is None:
             return
         wall, work = time.perf_counter() - self.began, _work_of(self.process.pid) - self.work
-        if wall > WALL or work > WORK:
+        if wall > WALL or work > self.most_work:
             if hasattr(signal, "SIGUSR1") and self.process.pid:
                 os.kill(self.process.pid, signal.SIGUSR1)  # writes where it is
                 time.sleep(0.5)
