@@ -91,7 +91,9 @@ def _flatten(
     mesh: tuple[np.ndarray, np.ndarray],
 ) -> None:
     result = None
-    with outcome.guarded(expects_nan=not np.isfinite(mesh[0]).all() or "nan" in in_short(options)):
+    with outcome.guarded(
+        expects_nan=not np.isfinite(mesh[0]).all() or bool(re.search(r"\b(nan|inf)\b", in_short(options)))
+    ):
         result = flatten()
     if result is None:
         return
