@@ -207,6 +207,11 @@ class Options:
         """Whether there may be edges that are cut in any case."""
         return self.seams is not None or self.sharp_angle is not None
 
+    @property
+    def prescribes_boundary(self) -> bool:
+        """Whether vertices on the boundary have a curvature to keep."""
+        return self.boundary_kind not in ("free", "lengths")
+
     def _check_pursuit(self) -> None:
         """Check the options that only a pursuit takes, and those of whole quanta."""
         if self.wishes_cones and not self.searches_cones:

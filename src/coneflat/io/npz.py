@@ -32,6 +32,7 @@ def write_npz(result: Flattening, stream: IO[bytes]) -> None:
         "cones": result.cones,
         "curvatures": result.curvatures,
         "log_scale": result.log_scale,
+        "prescribed": result.prescribed,
         "curvature_residual": result.curvature_residual,
         "seams": result.seams,
         "vertex_origin": np.arange(len(result.vertices)) if origin is None else origin,
@@ -75,6 +76,8 @@ def _flattening(path: Path, arrays: dict[str, Any]) -> Flattening:
                 f"{path} holds no {what}: {name!r} is missing; write it by `coneflat flatten`"
             )
     report = json.loads(str(arrays["report"]))
+    # Archives of version 0.1.0 have none.
+    arrays.setdefault("prescribed", np.full(len(arrays["vertices"]), np.nan))
     vertices, uv = _floats(path, arrays, "vertices", 3), _floats(path, arrays, "uv", 2)
     faces = _indices(path, arrays, "faces", 3, len(vertices))
     uv_faces = _indices(path, arrays, "uv_faces", 3, len(uv))
@@ -93,6 +96,7 @@ def _flattening(path: Path, arrays: dict[str, Any]) -> Flattening:
         cones=cones,
         curvatures=_floats(path, arrays, "curvatures", 0),
         log_scale=_floats(path, arrays, "log_scale", 0),
+        prescribed=_floats(path, arrays, "prescribed", 0),
         curvature_residual=_floats(path, arrays, "curvature_residual", 0),
         seams=_indices(path, arrays, "seams", 2, len(vertices)),
         packing_efficiency=report["packing_efficiency"],
@@ -129,7 +133,9 @@ def _distortion(arrays: dict[str, Any], report: dict[str, Any]) -> Distortion:
     from ..report import MEASURES
 
     # JSON has no NaN: the report has None for it.
-    numbers: dict[str, Any] = {name: np.nan if report[name] is None else report[name] for name in MEASURES}
+    numbers: dict[str, Any] = {
+        name: np.nan if report.get(name) is None else report[name] for name in MEASURES
+    }
     return Distortion(qc=arrays["qc"], log_area_scale=arrays["log_area_scale"], **numbers)
 
 
