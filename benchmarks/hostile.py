@@ -13,7 +13,8 @@ angles around inner vertices and cones, equal sides of seams, prescribed boundar
 that says what was measured. What is not kept and not named by a note is a breach; so are errors that are not the
 package's own, messages of several lines, crashes, hangs, and too much memory. The exit code is 1 if there is any.
 
-Options: --cases 10000, --jobs 2, --seed 0 (the first), --kinds mesh,file,argument,command, --out FILE.json.
+Options: --cases 10000, --jobs 2, --seed 0 (the first), --kinds mesh,file,argument,command, --out FILE.json (all
+outcomes), --again FILE.json (only the breaches in such a file).
 """
 
 from __future__ import annotations
@@ -129,6 +130,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kinds", default=",".join(SHARES))
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--again", type=Path, help="only the breaches of a file that --out wrote")
     parser.add_argument("--case", metavar="KIND:SEED")
     chosen = parser.parse_args()
     if chosen.case:
@@ -143,8 +145,11 @@ def main() -> int:
         if done % 500 == 0:
             print(f"{done:,} cases, {time.perf_counter() - began:.0f} s", flush=True)
 
+    todo = cases(chosen.cases, chosen.seed, tuple(chosen.kinds.split(",")))
+    if chosen.again:
+        todo = [(one["kind"], one["seed"]) for one in json.loads(chosen.again.read_text()) if one["breaches"]]
     try:
-        run_all(cases(chosen.cases, chosen.seed, tuple(chosen.kinds.split(","))), chosen.jobs, say)
+        run_all(todo, chosen.jobs, say)
     except KeyboardInterrupt:
         print("interrupted")
     text = summary(outcomes)
