@@ -10,6 +10,8 @@ from scipy.sparse.csgraph import connected_components
 NO_AREA = 1e-12
 #: Depth, over the layout's extent, by which triangles must lie over each other to count here.
 DEEP = 1e-9
+#: Length of a side, over that extent, from which on its normal is known a thousand times better than that.
+SHORT = 1e-4
 
 
 def double_areas(corners: np.ndarray) -> np.ndarray:

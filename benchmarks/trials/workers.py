@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import faulthandler
 import os
 import re
@@ -171,6 +172,7 @@ def serve(pipe: Connection, home: Path, log: Path, path: list[str]) -> None:
     """Take cases from a pipe until it is closed, and answer with outcomes."""
     sys.path[:] = path
     stream = log.open("w")
+    atexit.register(stream.close)
     faulthandler.enable(stream)
     if hasattr(signal, "SIGUSR1"):
         faulthandler.register(signal.SIGUSR1, stream)
