@@ -13,6 +13,7 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..errors import ConeflatError, MeshFileError
+from .atomic import as_path
 from .raw import read_bytes
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def read_flattening(path: str | PathLike[str]) -> Flattening:
     Raises:
         MeshFileError: the file is not there, may not be read, or is not such a result.
     """
-    path = Path(path)
+    path = as_path(path)
     content = read_bytes(path)
     try:
         with np.load(BytesIO(content), allow_pickle=False) as archive:

@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from ..errors import ConeflatError, MeshFileError
-from .atomic import known_ending
+from .atomic import as_path, known_ending
 from .gltf import parse_gltf
 from .model import MeshFile
 from .obj import parse_obj
@@ -53,7 +53,7 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
         EmptyMeshError: it has no vertex or no face.
         FaceIndexError: a face names a vertex that does not exist.
     """
-    path = Path(path)
+    path = as_path(path)
     ending = known_ending(path, INPUT_FORMATS, "meshes are read from")
     content = read_bytes(path)
     try:
