@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
+import ctypes
 import faulthandler
 import os
 import re
@@ -184,6 +186,7 @@ def serve(pipe: Connection, home: Path, log: Path, path: list[str]) -> None:
 
     warm_up()
     _limit_memory()
+    printed = _standard_output(log.with_suffix(".out"))
     pipe.send(None)
     while True:
         try:
@@ -191,9 +194,29 @@ def serve(pipe: Connection, home: Path, log: Path, path: list[str]) -> None:
         except EOFError:
             return
         outcome = run_case(*case)
+        text = printed()
+        if text:
+            outcome.breach(f"prints: {text[:80]}", text)
         if outcome.memory > MEMORY:
             outcome.breach("out of memory", f"{outcome.memory:.0f} MB")
         pipe.send(outcome)
+
+
+def _standard_output(path: Path) -> Callable[[], str]:
+    """Send standard output, that of compiled libraries, too, to a file; return what tells what has come since."""
+    file = path.open("w+", errors="replace")
+    os.dup2(file.fileno(), 1)
+
+    def printed() -> str:
+        sys.stdout.flush()
+        with contextlib.suppress(TypeError, OSError):  # where libraries are not found without a name
+            ctypes.CDLL(None).fflush(None)
+        text = path.read_text(errors="replace")
+        os.ftruncate(1, 0)
+        os.lseek(1, 0, os.SEEK_SET)
+        return text
+
+    return printed
 
 
 def _limit_memory() -> None:
