@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
 from ..errors import ConeflatError, MeshFileError
+from .atomic import as_path
 from .raw import read_bytes
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def read_flattening(path: str | PathLike[str]) -> Flattening:
     Raises:
         MeshFileError: the file is not there, may not be read, or is not such a result.
     """
-    path = Path(path)
+    path = as_path(path)
     content = read_bytes(path)
     try:
         return _flattening(path, _arrays(path, content))
