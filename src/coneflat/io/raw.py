@@ -20,12 +20,15 @@ if TYPE_CHECKING:
 #: Names of the properties that are a vertex's colour.
 COLOURS = ("red", "green", "blue")
 
+#: Instead of the number of a UV point: the corner has none.
+NO_UV = -1
+
 
 class RawMesh(NamedTuple):
     """The content of a mesh file: (n, 3) vertices, (c,) corners, (p + 1,) offsets, and what else it has.
 
     That is an OBJ file's text, numbers that it gives each vertex, by name, (c,) a number for each corner's UV
-    point, and (u, 2) these points.
+    point, NO_UV where there is none, and (u, 2) these points.
     """
 
     vertices: FloatArray
