@@ -98,18 +98,18 @@ def measure(
         curvature_error: what `curvature_errors` returns for the metric.
     """
     with meanwhile(partial(find_overlaps, corner_uv), len(corner_uv)) as finding:
-        measured = _measure(mesh, corner_uv, curvature_error, cones)
+        measured = measure_map(mesh, corner_uv, curvature_error, cones)
         overlaps = finding.result()
     return replace(measured, overlap=overlaps.fraction, overlapping_pairs=len(overlaps.pairs))
 
 
-def _measure(
+def measure_map(
     mesh: TriangleMesh,
     corner_uv: FloatArray,
-    curvature_error: tuple[float, float],
-    cones: IntArray | None,
+    curvature_error: tuple[float, float] = (np.nan, np.nan),
+    cones: IntArray | None = None,
 ) -> Distortion:
-    """Return all measures but those of overlaps."""
+    """Return all measures but those of overlaps; arguments are those of `measure`."""
     from .distortion_kernel import measure_triangles
 
     corner_uv = np.ascontiguousarray(corner_uv, dtype=np.float64)

@@ -15,7 +15,6 @@ from rich.console import Console as RichConsole
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from ..report import as_rows
 from ..result import Flattening
 from ..stages import Progress as Listener
 from ..stages import Stages
@@ -24,6 +23,8 @@ from .talk import QUIET, VERBOSE
 PATIENCE = 1.0  # seconds between the plain lines that say what is going on
 QUICK = 2.0  # seconds before the first patience begins: what is done soon, or fails, says nothing before
 PLAIN_WIDTH = 110
+#: What an artist asks first, in this order; the other rows are printed if verbose.
+FIRST_ROWS = ("charts", "overlap", "flipped", "texel density", "seam length", "QC distortion", "cones")
 EXTREME_QC = 2.0  # far from conformal, on average
 
 
@@ -102,16 +103,17 @@ class Console:
             self._bar.start()
 
     def finish(self, written: Sequence[Path], result: Flattening | None = None) -> None:
-        """Print notes and measures of a result if there is one, where the time went, and what was written."""
+        """Print the notes on a result if there is one, what was written, its measures, and where the time went."""
         if self._bar:
             self._bar.stop()
             self._bar = None
         if result is not None:
             self.say(f"note: {note}" for note in result.notes)
-            self._print_table(result)
-        if self.seconds:
-            self.say([f"time             {self._spent(() if result is None else result.solvers)}"])
         self.say(f"wrote {path}" for path in written)
+        if result is not None:
+            self.table(self._result_rows(result))
+        if self.seconds:
+            self.say([f"time           {self._spent(() if result is None else result.solvers)}"])
         if result is not None:
             self.say((f"warning: {each}" for each in _warnings(result)), "yellow")
 
@@ -120,13 +122,28 @@ class Console:
         by = f" (solved by {', '.join(solvers)})" if solvers else ""
         return f"{sum(self.seconds.values()):.2f} s: {each}{by}"
 
-    def _print_table(self, result: Flattening) -> None:
+    def _result_rows(self, result: Flattening) -> list[tuple[str, str, str]]:
+        """Return what an artist wants to know; if verbose, all measures and how the result was found."""
+        from ..view.own import shown_rows
+
+        rows = {row[0]: row for row in shown_rows(result)}
+        first = [rows.pop(name) for name in FIRST_ROWS if name in rows]
+        if not self.verbose:
+            return first
+        found = asdict(result.solve)
+        return [
+            *first,
+            *rows.values(),
+            *((name.replace("_", " "), f"{value:.3g}", "") for name, value in found.items()),
+        ]
+
+    def table(self, rows: Iterable[tuple[str, str, str]]) -> None:
+        """Print a table of (measure, value, meaning)."""
         if self.quiet:
             return
-        rows = as_rows(result)
-        if self.verbose:
-            found = asdict(result.solve)
-            rows += [(name.replace("_", " "), f"{value:.3g}", "") for name, value in found.items()]
+        if self._bar:
+            self._bar.stop()
+            self._bar = None
         table = Table(box=None, show_header=False, pad_edge=False)
         table.add_column(style="bold")
         table.add_column()

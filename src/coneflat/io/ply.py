@@ -92,9 +92,9 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
     mesh = RawMesh(vertices, polygons[1], offsets_of(polygons[0]), None, properties)
     if corner_uv is not None and len(corner_uv[1]):
         return mesh._replace(texture=corner_uv[0], uv=corner_uv[1])
-    for names in _VERTEX_UV:
-        if all(name in properties for name in names):
-            return mesh._replace(texture=mesh.corners, uv=np.stack([properties[n] for n in names], axis=1))
+    for pair in _VERTEX_UV:
+        if all(name in properties for name in pair):
+            return mesh._replace(texture=mesh.corners, uv=np.stack([properties[n] for n in pair], axis=1))
     return mesh
 
 
