@@ -141,7 +141,7 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
     distortion = measure_map(scaled.mesh, unit).rescaled((scaled.exponent + exponent) * np.log(2))
     every = mapped.corner_uv[known]
     cover = _cover(every)
-    tiles = len(_tiles(checked.mesh, corner_uv))
+    tiles = len(_tiles(checked.mesh, unit, exponent))
     counts = {
         "vertices": len(np.unique(mapped.faces)),
         "polygons": mapped.polygons,
@@ -219,14 +219,17 @@ def angle_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
     return float(np.abs(sums[inside] - 2 * np.pi).max(initial=0.0))
 
 
-def _tiles(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
-    """Return (k, 2) the unit squares in which the middles of charts lie, one of UDIM tiles each."""
-    pairs = joined_pairs(mesh, corner_uv) // 3
+def _tiles(mesh: TriangleMesh, unit: FloatArray, exponent: int) -> FloatArray:
+    """Return (k, 2) the unit squares in which the middles of charts lie, one of UDIM tiles each.
+
+    unit: (m, 3, 2) UVs over two to the power of the exponent.
+    """
+    pairs = joined_pairs(mesh, unit) // 3
     charts, chart = label_components(len(mesh.faces), pairs[:, 0], pairs[:, 1])
-    weights = np.abs(signed_double_areas(corner_uv)) + np.finfo(np.float64).tiny
+    weights = np.abs(signed_double_areas(unit)) + np.finfo(np.float64).tiny
     total = np.bincount(chart, weights, charts)
-    middles = [np.bincount(chart, weights * corner_uv[..., k].mean(axis=1), charts) / total for k in (0, 1)]
-    return np.unique(np.floor(np.stack(middles, axis=1)), axis=0)
+    middles = [np.bincount(chart, weights * unit[..., k].mean(axis=1), charts) / total for k in (0, 1)]
+    return np.unique(np.floor(np.ldexp(np.stack(middles, axis=1), exponent)), axis=0)
 
 
 class _Cover(NamedTuple):

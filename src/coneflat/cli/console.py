@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
@@ -20,8 +21,7 @@ from ..stages import Progress as Listener
 from ..stages import Stages
 from .talk import QUIET, VERBOSE
 
-PATIENCE = 1.0  # seconds between the plain lines that say what is going on
-QUICK = 2.0  # seconds before the first patience begins: what is done soon, or fails, says nothing before
+PATIENCE = 1.0  # seconds between the plain lines that say what is going on, and before the first of them
 PLAIN_WIDTH = 110
 #: What an artist asks first, in this order; the other rows are printed if verbose.
 FIRST_ROWS = ("charts", "overlap", "flipped", "texel density", "seam length", "QC distortion", "cones")
@@ -31,7 +31,8 @@ EXTREME_QC = 2.0  # far from conformal, on average
 class Console:
     """Progress while a command runs, what came out when it is done; nothing if quiet.
 
-    Progress is a bar in a terminal, else a line about every second if it takes long; if verbose, a line for every step.
+    Progress is a bar in a terminal, else a line about every second, also within long steps; what is done, or fails,
+    within the first second says nothing of it. If verbose, it is a line for every step.
 
     Attributes:
         seconds: wall time of each stage.
@@ -42,7 +43,10 @@ class Console:
         self._stages = Stages(self.progress)
         self.seconds = self._stages.seconds
         self._start = time.perf_counter()
-        self._last_line = QUICK
+        self._last_line = 0.0
+        self._now = ("", 0.0)
+        self._lock = threading.Lock()
+        self._over = threading.Event()
         self._bar: Progress | None = None
         if talk is None and sys.stderr.isatty():
             self._bar = Progress(
@@ -58,11 +62,15 @@ class Console:
     def __enter__(self) -> Console:
         if self._bar:
             self._bar.start()
+        elif not self.quiet and not self.verbose:
+            threading.Thread(target=self._remind, daemon=True).start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        with self._lock:
+            self._over.set()
         if self._bar:
             self._bar.stop()
 
@@ -75,9 +83,24 @@ class Console:
         """Show what is being done, and the fraction of the whole that is done."""
         if self._bar:
             self._bar.update(self._task, description=stage, completed=fraction)
-        elif not self.quiet and (self.verbose or self.elapsed - self._last_line > PATIENCE):
-            self._last_line = self.elapsed
-            click.echo(f"{self.elapsed:6.1f} s  {fraction:4.0%}  {stage}", err=True)
+            return
+        with self._lock:
+            self._now = (stage, fraction)
+            if not self.quiet and (self.verbose or self.elapsed - self._last_line > PATIENCE):
+                self._tell()
+
+    def _tell(self) -> None:
+        stage, fraction = self._now
+        self._last_line = self.elapsed
+        click.echo(f"{self.elapsed:6.1f} s  {fraction:4.0%}  {stage}", err=True)
+
+    def _remind(self) -> None:
+        """Say again what is being done, where nothing has been said for a while."""
+        while not self._over.wait(PATIENCE / 4):
+            with self._lock, suppress(OSError, ValueError):  # Whoever was to read it may be gone.
+                late = self.elapsed - self._last_line > (2 * PATIENCE if self._last_line else PATIENCE)
+                if late and self._now[0] and not self._over.is_set():
+                    self._tell()
 
     def part(self, begin: float, end: float) -> Listener:
         """Return a listener to a part of the work, which makes up these fractions of the whole."""
@@ -104,6 +127,8 @@ class Console:
 
     def finish(self, written: Sequence[Path], result: Flattening | None = None) -> None:
         """Print the notes on a result if there is one, what was written, its measures, and where the time went."""
+        with self._lock:
+            self._over.set()
         if self._bar:
             self._bar.stop()
             self._bar = None
