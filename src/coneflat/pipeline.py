@@ -247,8 +247,16 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
 def _missed_distortion(laid_out: LaidOut, part: Component, options: Options) -> tuple[str, ...]:
     """Return that the distortion asked for was not reached, if so."""
     reached = laid_out.figures.area_distortion_linear
-    if not pursues(part.mesh, options) or options.cone_count is not None:
+    if not pursues(part.mesh, options):
         return ()
+    if options.cone_count is not None:
+        found = len(laid_out.cones)
+        if found == options.cone_count:
+            return ()
+        return (
+            f"{plural(found, 'cone')} instead of the {options.cone_count:,} asked for: more of them, within the bounds "
+            "given, would gain nothing or have no vertex inside to be at.",
+        )
     if reached <= options.distortion * (1 + NARROWLY):
         return ()
     why = "no better was found within the bounds given"
