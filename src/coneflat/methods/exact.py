@@ -18,7 +18,7 @@ from ..layout.unfold import unfold
 from ..layout.untangle import untangle
 from ..mesh import TriangleMesh
 from ..seams import cut_open
-from .base import LaidOut, all_faces, failure_notes
+from .base import LaidOut, all_faces, failure_notes, off_by
 
 # The curvature of a round boundary is found from the metric it leads to, over and over: rounds at most, and the
 # largest relative change at a vertex at which to stop. What is solved for in the end is exact in any case.
@@ -171,10 +171,14 @@ def exact_flattening(
     if not solved.converged:
         worst = solved.worst_vertex if choices.names is None else choices.names[solved.worst_vertex]
         failure = (
-            f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is off "
-            f"by {solved.residual:.2g} rad"
+            f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is "
+            f"{off_by(solved.residual)}"
         )
-    notes = failure_notes(failure, choices.best_effort, "--method linear needs no convergence")
+    notes = failure_notes(
+        failure,
+        choices.best_effort and bool(np.isfinite(solved.residual)),
+        "--method linear needs no convergence",
+    )
     shrink = area_factor(lengths, solved) if choices.keep_area else 1.0
     target = np.where(fixed, solved.curvature, target)
     return ExactFlatMetric(mesh, solution.cones, target, solved, shrink, choices.refine, notes)
