@@ -17,6 +17,8 @@ from .preconditioner import Inverse
 
 # How far, in radians, prescribed curvatures may miss Gauss-Bonnet; decimals typed by hand are good to more.
 SUM_TOLERANCE = 1e-8
+# A first guess of phi with a wider range than this makes lengths whose squares overflow.
+WIDEST_RANGE = 1000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +111,9 @@ def exact_metric(
     log_scale = np.zeros(n) if start is None else np.array(start, dtype=np.float64)
     log_scale[fixed] = np.broadcast_to(np.asarray(fixed_log_scale, dtype=np.float64), (n,))[fixed]
 
+    plain = np.where(fixed, log_scale, 0.0)
+    if not np.ptp(log_scale) <= WIDEST_RANGE:
+        log_scale = plain
     flat_turn = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
     copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
     doubled, steps = False, 0
@@ -136,10 +141,10 @@ def exact_metric(
         doubled = True
         problem, state, original, euclidean = solved_from(log_scale)
         steps += problem.steps
-    if not _is_solved(state, tolerance) and (log_scale != 0).any():
+    if not _is_solved(state, tolerance) and (log_scale != plain).any():
         # A first guess may lie so far off, on a field of spikes say, that nothing is left of the triangles there. The
         # input's own scale is finite.
-        again = solved_from(np.where(fixed, log_scale, 0.0))
+        again = solved_from(plain)
         steps += again[0].steps
         if again[1].largest < state.largest:
             problem, state, original, euclidean = again

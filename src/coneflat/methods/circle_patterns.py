@@ -100,7 +100,7 @@ def _solved(
     areas = [vertex_areas(faces, sides, len(border)) for sides in (before, after)]
     triangulation.length = pattern.lengths
     return ExactMetric(
-        log_scale=np.log(areas[1] / areas[0]) / 2,
+        log_scale=np.log(np.maximum(areas[1] / areas[0], np.finfo(float).tiny)) / 2,
         curvature=curvature,
         triangulation=triangulation,
         flips=flips,

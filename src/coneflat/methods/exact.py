@@ -26,6 +26,11 @@ ROUNDS, ROUND_CHANGE = 40, 1e-3
 # How much of the change is made in each round on holes. The m-th harmonic of the change answers with -1/m there, so
 # that the first would go back and forth for ever; on the outer loop the answer is 1/m.
 HOLE_STEP = 0.5
+# Curvature, radians, at a vertex of a round boundary that is no part of a circle any more but a corner too sharp to be
+# one: the sides beside it are nearly all of the boundary. Then the round before has to do.
+TOO_SHARP = 0.99 * np.pi
+# Radians by which the curvature of a round boundary may be off a circle's before it is said.
+NOT_ROUND = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,6 +184,7 @@ def exact_flattening(
         choices.best_effort and bool(np.isfinite(solved.residual)),
         "--method linear needs no convergence",
     )
+    notes += _missed_roundness(lengths, solved, choices, target)
     shrink = area_factor(lengths, solved) if choices.keep_area else 1.0
     target = np.where(fixed, solved.curvature, target)
     return ExactFlatMetric(mesh, solution.cones, target, solved, shrink, choices.refine, notes)
@@ -236,12 +242,44 @@ def _solve(
     if boundary is None:
         return solve(inside, solution.log_scale), inside
     wanted = boundary.target(lengths, solution.log_scale)
+    if _is_too_sharp(boundary, wanted):
+        # By the linear scale one side of the boundary is nearly all of it, as on a field of spikes.
+        wanted = boundary.target(lengths, np.zeros_like(solution.log_scale))
     solved = solve(inside + wanted, solution.log_scale)
     step = np.where(wanted < 0, HOLE_STEP, 1.0)
     for _ in range(ROUNDS if boundary.has_round_loops else 0):
         change = boundary.target(lengths, solved.log_scale) - wanted
         if not solved.converged or not (np.abs(change) > ROUND_CHANGE * np.abs(wanted)).any():
             break
-        wanted = wanted + step * change
-        solved = solve(inside + wanted, solved.log_scale)
+        rounder = wanted + step * change
+        if _is_too_sharp(boundary, rounder):
+            break
+        again = solve(inside + rounder, solved.log_scale)
+        if not again.converged:
+            break
+        wanted, solved = rounder, again
     return solved, inside + wanted
+
+
+def _is_too_sharp(boundary: BoundaryCurvature, wanted: FloatArray) -> bool:
+    """Whether a round boundary would have a corner; those that the user gives do not count."""
+    return boundary.has_round_loops and bool((wanted[boundary.corners == 0] >= TOO_SHARP).any())
+
+
+def _missed_roundness(
+    lengths: FloatArray, solved: ExactMetric, choices: ExactChoices, target: FloatArray
+) -> tuple[str, ...]:
+    """Return that a round boundary is none, if so."""
+    if choices.boundary is None or not choices.boundary.has_round_loops:
+        return ()
+    even = choices.boundary.target(lengths, solved.log_scale)
+    on_round = choices.boundary.mesh.is_boundary_vertex & (choices.boundary.corners == 0)
+    off = np.where(on_round, np.abs(even - target), 0.0)
+    worst = int(np.argmax(off))
+    if not off[worst] > NOT_ROUND:
+        return ()
+    name = worst if choices.names is None else choices.names[worst]
+    return (
+        f"The boundary is not quite round: at vertex {name} it turns by {target[worst]:.3g} rad, a circle "
+        f"by {even[worst]:.3g}.",
+    )
