@@ -90,6 +90,13 @@ def all_faces(mesh: TriangleMesh) -> IntArray:
     return np.arange(len(mesh.faces))
 
 
+def off_by(residual: float, unit: str = " rad") -> str:
+    """Return the part of a message that says by how much something is missed."""
+    if not np.isfinite(residual):
+        return "off by more than double precision can hold"
+    return f"off by {residual:.2g}{unit}"
+
+
 def failure_notes(
     failure: str | None, accepted: bool, instead: str = "--method exact is surer"
 ) -> tuple[str, ...]:

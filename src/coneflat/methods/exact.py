@@ -18,7 +18,7 @@ from ..layout.untangle import untangle
 from ..mesh import TriangleMesh
 from ..seams import cut_open
 from ..text import plural
-from .base import LaidOut, all_faces, failure_notes, laid_out_curvature
+from .base import LaidOut, all_faces, failure_notes, laid_out_curvature, off_by
 
 # The curvature of a round boundary is found from the metric it leads to, over and over: rounds at most, and the
 # largest relative change at a vertex at which to stop. What is solved for in the end is exact in any case.
@@ -28,6 +28,11 @@ ROUNDS, ROUND_CHANGE = 40, 1e-3
 HOLE_STEP = 0.5
 # Relative errors of lengths that rounding cannot make.
 LENGTH_TOLERANCE = 1e-9
+# Curvature, radians, at a vertex of a round boundary that is no part of a circle any more but a corner too sharp to be
+# one: the sides beside it are nearly all of the boundary. Then the round before has to do.
+TOO_SHARP = 0.99 * np.pi
+# Radians by which the curvature of a round boundary may be off a circle's before it is said.
+NOT_ROUND = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,10 +197,15 @@ def exact_flattening(
     if not solved.converged:
         worst = solved.worst_vertex if choices.names is None else choices.names[solved.worst_vertex]
         failure = (
-            f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is off "
-            f"by {solved.residual:.2g} rad"
+            f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is "
+            f"{off_by(solved.residual)}"
         )
-    notes = failure_notes(failure, choices.best_effort, "--method linear needs no convergence")
+    notes = failure_notes(
+        failure,
+        choices.best_effort and bool(np.isfinite(solved.residual)),
+        "--method linear needs no convergence",
+    )
+    notes += _missed_roundness(lengths, solved, choices, target)
     notes += _lengths_missed(mesh, lengths, solved, choices)
     shrink = area_factor(lengths, solved) if choices.keep_area else 1.0
     target = np.where(fixed, solved.curvature, target)
@@ -277,12 +287,44 @@ def _solve(
     if boundary is None:
         return solve(inside, solution.log_scale), inside
     wanted = boundary.target(lengths, solution.log_scale)
+    if _is_too_sharp(boundary, wanted):
+        # By the linear scale one side of the boundary is nearly all of it, as on a field of spikes.
+        wanted = boundary.target(lengths, np.zeros_like(solution.log_scale))
     solved = solve(inside + wanted, solution.log_scale)
     step = np.where(wanted < 0, HOLE_STEP, 1.0)
     for _ in range(ROUNDS if boundary.has_round_loops else 0):
         change = boundary.target(lengths, solved.log_scale) - wanted
         if not solved.converged or not (np.abs(change) > ROUND_CHANGE * np.abs(wanted)).any():
             break
-        wanted = wanted + step * change
-        solved = solve(inside + wanted, solved.log_scale)
+        rounder = wanted + step * change
+        if _is_too_sharp(boundary, rounder):
+            break
+        again = solve(inside + rounder, solved.log_scale)
+        if not again.converged:
+            break
+        wanted, solved = rounder, again
     return solved, inside + wanted
+
+
+def _is_too_sharp(boundary: BoundaryCurvature, wanted: FloatArray) -> bool:
+    """Whether a round boundary would have a corner; those that the user gives do not count."""
+    return boundary.has_round_loops and bool((wanted[boundary.corners == 0] >= TOO_SHARP).any())
+
+
+def _missed_roundness(
+    lengths: FloatArray, solved: ExactMetric, choices: ExactChoices, target: FloatArray
+) -> tuple[str, ...]:
+    """Return that a round boundary is none, if so."""
+    if choices.boundary is None or not choices.boundary.has_round_loops:
+        return ()
+    even = choices.boundary.target(lengths, solved.log_scale)
+    on_round = choices.boundary.mesh.is_boundary_vertex & (choices.boundary.corners == 0)
+    off = np.where(on_round, np.abs(even - target), 0.0)
+    worst = int(np.argmax(off))
+    if not off[worst] > NOT_ROUND:
+        return ()
+    name = worst if choices.names is None else choices.names[worst]
+    return (
+        f"The boundary is not quite round: at vertex {name} it turns by {target[worst]:.3g} rad, a circle "
+        f"by {even[worst]:.3g}.",
+    )
