@@ -81,6 +81,7 @@ def find_cones(
     forbidden_cones: Iterable[int] = (),
     allowed_cones: Iterable[int] | None = None,
     repair: bool = False,
+    strict: bool = False,
     progress: Progress | None = None,
 ) -> FoundCones:
     """Find the cones of the largest component of a mesh, without flattening it.
@@ -101,6 +102,7 @@ def find_cones(
         forbidden_cones=forbidden_cones,
         allowed_cones=allowed_cones,
         repair=repair,
+        strict=strict,
     )
     stages = Stages(progress)
     with one_blas_thread():
@@ -126,6 +128,7 @@ def cone_curve(
     forbidden_cones: Iterable[int] = (),
     allowed_cones: Iterable[int] | None = None,
     repair: bool = False,
+    strict: bool = False,
     progress: Progress | None = None,
 ) -> ConeCurve:
     """Search for the best cones of every number up to `most`, on the largest component of a mesh.
@@ -143,6 +146,7 @@ def cone_curve(
         forbidden_cones=forbidden_cones,
         allowed_cones=allowed_cones,
         repair=repair,
+        strict=strict,
     )
     stages = Stages(progress)
     with one_blas_thread():

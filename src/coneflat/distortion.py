@@ -103,7 +103,7 @@ def measure(
         prescribed: (n,) curvature that vertices are to have in the plane, radians; NaN where it is free.
     """
     with meanwhile(partial(find_overlaps, corner_uv), len(corner_uv)) as finding:
-        measured = _measure(mesh, corner_uv, curvature_error, cones)
+        measured = measure_map(mesh, corner_uv, curvature_error, cones)
         if prescribed is not None:
             error = angle_sum_errors(mesh, corner_uv, prescribed)[0]
             measured = replace(measured, angle_sum_error=float(np.nanmax(np.abs(error), initial=0.0)))
@@ -142,13 +142,13 @@ def angle_sum_errors(
     return sums - full + prescribed, change
 
 
-def _measure(
+def measure_map(
     mesh: TriangleMesh,
     corner_uv: FloatArray,
-    curvature_error: tuple[float, float],
-    cones: IntArray | None,
+    curvature_error: tuple[float, float] = (np.nan, np.nan),
+    cones: IntArray | None = None,
 ) -> Distortion:
-    """Return all measures but those of overlaps."""
+    """Return all measures but those of overlaps; arguments are those of `measure`."""
     from .distortion_kernel import measure_triangles
 
     corner_uv = np.ascontiguousarray(corner_uv, dtype=np.float64)

@@ -22,8 +22,9 @@ class Job:
     Attributes:
         mesh, output: absolute paths.
         options: keyword arguments of `coneflat.flatten`, as JSON has them.
-        weld: merge vertices at the same position; None for the format's default.
+        weld: merge vertices at the same position; None for the default, see `coneflat.io.join.read_joined`.
         mark: what changes when the mesh file, the options or the version do.
+        required: what measures must be, such as "flipped=0"; a mesh that does not meet it has failed.
     """
 
     mesh: str
@@ -31,6 +32,7 @@ class Job:
     options: Mapping[str, Any]
     weld: bool | None
     mark: str
+    required: tuple[str, ...] = ()
 
     def as_json(self) -> str:
         """Return the job as one line."""
@@ -38,7 +40,12 @@ class Job:
 
 
 def find_jobs(
-    patterns: Iterable[str], folder: Path, ending: str, options: Mapping[str, Any], weld: bool | None
+    patterns: Iterable[str],
+    folder: Path,
+    ending: str,
+    options: Mapping[str, Any],
+    weld: bool | None,
+    required: tuple[str, ...] = (),
 ) -> list[Job]:
     """Return a job for each mesh that the patterns name, in the order of their paths.
 
@@ -46,7 +53,7 @@ def find_jobs(
         patterns: files, folders (every mesh in them), or patterns with *, ? and ** for any depth.
         folder: where results go, under the meshes' own names.
         ending: of the results, such as ".obj".
-        options, weld: see `Job`.
+        options, weld, required: see `Job`.
 
     Raises:
         OptionError: a pattern matches nothing, or a result would overwrite a mesh.
@@ -58,7 +65,7 @@ def find_jobs(
             found[os.path.realpath(path)] = None
     meshes = sorted(found)
     jobs = [
-        Job(mesh, str(folder / name), options, weld, _mark(mesh, options, weld))
+        Job(mesh, str(folder / name), options, weld, _mark(mesh, options, weld, required), required)
         for mesh, name in zip(meshes, _names(meshes, ending), strict=True)
     ]
     for job in jobs:
@@ -88,9 +95,11 @@ def _longer(path: Path, depth: int) -> str:
     return "_".join([*path.parent.parts[len(path.parent.parts) - depth :], kind]) if depth else kind
 
 
-def _mark(mesh: str, options: Mapping[str, Any], weld: bool | None) -> str:
+def _mark(mesh: str, options: Mapping[str, Any], weld: bool | None, required: tuple[str, ...]) -> str:
     from .. import __version__
 
     about = os.stat(mesh)
-    text = json.dumps([about.st_size, about.st_mtime_ns, dict(options), weld, __version__], sort_keys=True)
+    text = json.dumps(
+        [about.st_size, about.st_mtime_ns, dict(options), weld, required, __version__], sort_keys=True
+    )
     return hashlib.sha256(text.encode()).hexdigest()[:16]

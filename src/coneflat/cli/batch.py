@@ -11,6 +11,7 @@ import click
 
 from ..text import plural
 from .method import check_combinations, method_keywords, method_options
+from .shared import require_option
 from .talk import talk_options
 
 FAILED = 1
@@ -49,6 +50,7 @@ LONGEST = 3  # meshes that are named
 )
 @click.option("--redo", is_flag=True, help="Flatten again what is done.")
 @method_options
+@require_option
 @talk_options
 @click.pass_context
 def batch(
@@ -63,6 +65,7 @@ def batch(
     dask: str | None,
     redo: bool,
     weld: bool | None,
+    required: tuple[str, ...],
     talk: str | None,
     **method: Any,
 ) -> None:
@@ -79,6 +82,7 @@ def batch(
     from ..batch import find_jobs, run_batch
     from ..io.atomic import make_folder
     from ..options import Options
+    from ..requirements import REPORTED, parse_requirements
     from .console import Console
 
     check_combinations(context)
@@ -87,8 +91,9 @@ def batch(
     options = method_keywords(method, f".{ending}")
     if options.get("weights") is not None and not isinstance(options["weights"], str):
         raise click.UsageError("a file of --weights fits one mesh: name a property, or color", context)
+    parse_requirements(required, REPORTED)
     Options(**options)  # Says what makes no sense before the work.
-    todo = find_jobs(patterns, out.absolute(), f".{ending}", options, weld)
+    todo = find_jobs(patterns, out.absolute(), f".{ending}", options, weld, required)
     make_folder(out)
     rows = []
     with Console(talk) as console:

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..errors import OptionError
-from ..io import atomic_write, check_output, read_flattening, read_mesh
+from ..io import atomic_write, check_output, read_flattening
 from ..io.atomic import check_target
+from ..io.join import Joined, read_joined
 from ..io.write import write_measured
 from ..pipeline import flatten
+from ..requirements import Requirement
 from ..result import Flattening
 from .console import Console
+from .shared import check_required, checking
 
 READ, FLATTENED = 0.03, 0.92
 """Fractions of the whole that are done when the mesh is read, and when it is flattened, about."""
+
+AGAIN = "--again flattens the mesh anew"
 
 
 def run(
@@ -30,6 +35,7 @@ def run(
     report: Path | None = None,
     texture: str | None = None,
     talk: str | None = None,
+    requirements: Sequence[Requirement] = (),
 ) -> None:
     """Flatten a mesh file, write the result and its report, and print what came out.
 
@@ -37,29 +43,44 @@ def run(
         mesh: file to read.
         output: file to write; None for one beside the current folder's others, named after the input.
         options: keyword arguments of `coneflat.flatten`.
-        weld: merge vertices at the same position; None for the format's default.
+        weld: merge vertices at the same position; None for the default, see `read_joined`.
         report: JSON file for the measures.
         texture: of a .glb: "checker", or an image file.
         talk: how much to print, see `talk_options`.
+        requirements: what measures must be; the files are written in any case.
     """
     output = Path(f"{mesh.stem}_uv.obj") if output is None else output
     # What can fail at the end is looked at before the work.
     check_output(output, texture)
     if report is not None:
         check_target(report)
-    _require_distinct({"input": mesh, "output": output, "report": report})
+    require_distinct({"input": mesh, "output": output, "report": report})
 
     with Console(talk) as console:
         result = save(flatten_file(mesh, console, options, weld), console, output, report, texture)
         console.finish([path for path in (output, report) if path is not None], result)
+    check_required(requirements, result.report(), str(output))
 
 
-def open_result(file: Path, console: Console, **options: Any) -> Flattening:
-    """Return the result that a .npz file holds, or that of a mesh, flattened without overlaps."""
-    if file.suffix.lower() != ".npz":
-        return flatten_file(file, console, {"charts": "atlas", **options})
+def open_result(
+    file: Path, console: Console, *, again: bool = False, repair: bool = True, weld: bool | None = None
+) -> Flattening:
+    """Return the result that a .npz file holds, the UVs of a mesh, or the mesh flattened without overlaps.
+
+    again: flatten a mesh that has UVs, too.
+    """
     with console.stage("read", 0.0):
-        return read_flattening(file)
+        if file.suffix.lower() == ".npz":
+            return read_flattening(file)
+        source = read_joined(file, weld)
+    if not again:
+        from ..view.own import own_flattening
+
+        with console.stage("measure", READ):
+            own = own_flattening(source, strict=not repair)
+        if own is not None:
+            return replace(own, notes=(f"Shown are the UVs that {file.name} has; {AGAIN}.", *own.notes))
+    return flatten_joined(source, console, {"charts": "atlas", **checking(repair)})
 
 
 def flatten_file(
@@ -67,13 +88,15 @@ def flatten_file(
 ) -> Flattening:
     """Return the result of a mesh file, and show how it is made."""
     with console.stage("read", 0.0):
-        source = read_mesh(mesh, weld)
-    result = flatten(source, progress=console.part(READ, FLATTENED), **options)
+        source = read_joined(mesh, weld)
+    return flatten_joined(source, console, options)
+
+
+def flatten_joined(source: Joined, console: Console, options: Mapping[str, Any]) -> Flattening:
+    """Return the result of a mesh that was read, and show how it is made."""
+    result = flatten(source.mesh, progress=console.part(READ, FLATTENED), **source.renamed(options))
     console.seconds.update(result.seconds)
-    if source.welded:
-        note = f"Merged {source.welded:,} vertices at the same positions."
-        result = replace(result, notes=(note, *result.notes))
-    return result
+    return replace(result, notes=source.notes_of(result.notes))
 
 
 def save(
@@ -90,7 +113,7 @@ def save(
     return result
 
 
-def _require_distinct(files: Mapping[str, Path | None]) -> None:
+def require_distinct(files: Mapping[str, Path | None]) -> None:
     """Raise OptionError if two names mean one file, of which one would overwrite the other."""
     seen: dict[str, str] = {}
     for role, path in files.items():

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 #: Names of the properties that are a vertex's colour.
 COLOURS = ("red", "green", "blue")
 
+#: Instead of the number of a UV point: the corner has none.
+NO_UV = -1
+
 
 class RawMesh(NamedTuple):
     """The content of a mesh file: (n, 3) vertices, (c,) corners, (p + 1,) offsets, and what else `MeshFile` has of it.
