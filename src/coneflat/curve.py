@@ -135,8 +135,11 @@ def cone_curve(
 
     Arguments are those of `coneflat.flatten`, and so are the errors.
     """
-    if isinstance(most, bool) or most != int(most) or most < 1:
-        raise OptionError(f"the largest number of cones must be a whole number from 1, not {most!r}")
+    is_number = isinstance(most, (int, float, np.integer, np.floating)) and not isinstance(most, bool)
+    if not is_number or not float(most).is_integer() or most < 1:
+        raise OptionError(
+            f"the largest number of cones must be a whole number from 1, not {' '.join(repr(most).split())[:80]}"
+        )
     options = Options(
         min_cone_angle=min_cone_angle,
         max_cone_angle=max_cone_angle,

@@ -69,7 +69,7 @@ class AngleMetric:
             )
         figures = SolveFigures(newton_steps=found.steps, residual=found.residual, broken=broken)
         points = fit_shapes(disk, shapes, self.lengths)
-        return laid_out_at(points, self.mesh, disk, seams, self.solution, figures, notes)
+        return laid_out_at(points, self.mesh, disk, seams, self.lengths, self.solution, figures, notes)
 
 
 def angle_based(

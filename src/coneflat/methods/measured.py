@@ -6,10 +6,12 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..cones import ConeSolution
+from ..errors import MetricError
 from ..figures import SolveFigures
-from ..geometry import double_areas, edge_lengths
+from ..geometry import double_areas
 from ..geometry.planar import signed_double_areas
 from ..mesh import TriangleMesh
+from ..text import plural
 from .base import LaidOut, all_faces, laid_out_curvature
 
 # Areas below so much of the mean are taken as so much, where a logarithm is wanted.
@@ -21,6 +23,7 @@ def laid_out_at(
     mesh: TriangleMesh,
     disk: TriangleMesh,
     seams: IntArray,
+    lengths: FloatArray,
     solution: ConeSolution,
     figures: SolveFigures | None = None,
     notes: tuple[str, ...] = (),
@@ -32,12 +35,20 @@ def laid_out_at(
         mesh: connected.
         disk: the mesh cut open.
         seams: (k,) the edges along which it was cut.
+        lengths: (m, 3) side lengths, with which every triangle has area.
         solution: the cones and what was asked of them.
         figures, notes: how it was found, and what falls short.
+
+    Raises:
+        MetricError: the layout has no area.
     """
     corners = points[disk.faces]
     doubles = np.abs(signed_double_areas(corners))
-    before = double_areas(edge_lengths(mesh.vertices, mesh.faces))
+    if not doubles.sum() > 0:
+        raise MetricError(
+            f"all {plural(len(corners), 'triangle')} of the layout lie on a line: use method 'exact'"
+        )
+    before = double_areas(lengths)
     factor = float(np.sqrt(before.sum() / doubles.sum()))
     curvature = laid_out_curvature(mesh, corners)
     return LaidOut(
