@@ -18,7 +18,7 @@ COLUMNS = (
 def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     """Flatten a mesh file to a file and return the row of the summary; errors become rows, too."""
     from ..errors import ConeflatError
-    from ..io import read_mesh
+    from ..io import losses, read_mesh
     from ..pipeline import flatten
 
     start = time.perf_counter()
@@ -28,7 +28,7 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
         result.save(job["output"])
         report = result.report()
         row |= {"status": "done", "error": ""} | {name: report[name] for name in COLUMNS}
-        row["notes"] = " ".join(report["notes"])
+        row["notes"] = " ".join((*report["notes"], *losses(result, os.path.splitext(job["output"])[1])))
     except ConeflatError as error:
         row |= {"status": "failed", "error": str(error)}
     except MemoryError:

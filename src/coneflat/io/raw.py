@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
 
 #: Names of the properties that are a vertex's colour.
 COLOURS = ("red", "green", "blue")
+
+
+#: Stands for standard input, and for standard output.
+PIPE = Path("-")
 
 
 class RawMesh(NamedTuple):
@@ -71,6 +76,22 @@ def read_bytes(path: Path) -> bytes:
     if not content or content.isspace():
         raise EmptyMeshError(f"{path} is empty")
     return content
+
+
+def read_input() -> bytes:
+    """Return what comes in on standard input.
+
+    Raises:
+        MeshFileError: that is a terminal, or cannot be read.
+    """
+    if sys.stdin is None or sys.stdin.isatty():
+        raise MeshFileError(
+            "- stands for a mesh on standard input, and there is none: pipe a file into the command"
+        )
+    try:
+        return sys.stdin.buffer.read()
+    except OSError as error:
+        raise MeshFileError(f"standard input cannot be read: {error.strerror or error}") from error
 
 
 def check_corners(path: Path, mesh: RawMesh) -> None:

@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from ..errors import OptionError
+from ..errors import OptionError, UnknownFormatError
 from .atomic import atomic_write, check_target, known_ending
 from .glb_write import write_glb
 from .gltf_write import scene_losses
@@ -38,9 +38,8 @@ def check_output(path: str | PathLike[str], texture: str | PathLike[str] | None 
     path = Path(path)
     ending = known_ending(path, OUTPUT_FORMATS, "results are written as")
     check_target(path)
+    _check_texture(path, ending, texture)
     if texture is not None:
-        if ending != ".glb":
-            raise OptionError(f"only .glb files carry a texture, and {path} is none")
         find_texture(texture)
     return path
 
@@ -67,16 +66,47 @@ def write_flattening(
         OptionError: files of this ending carry no texture, or Pillow is not installed.
     """
     path = check_output(path, texture)
-    image = None if texture is None else find_texture(texture, result)
-    writers: dict[str, Callable[[IO[bytes]], None]] = {
-        ".obj": lambda stream: write_obj(result, stream, path.parent),
-        ".ply": lambda stream: write_ply(result, stream),
-        ".glb": lambda stream: write_glb(result, stream, image, path.parent),
-        ".npz": lambda stream: write_npz(result, stream),
-    }
     with atomic_write(path) as stream:
-        writers[path.suffix.lower()](stream)
+        write_stream(result, stream, path.suffix, texture, path.parent)
     return path
+
+
+def write_stream(
+    result: Flattening,
+    stream: IO[bytes],
+    ending: str,
+    texture: str | PathLike[str] | None = None,
+    folder: Path | None = None,
+) -> None:
+    """Write a flattened mesh to a binary stream; see `write_flattening`.
+
+    Args:
+        result: what to write.
+        stream: where to; it need not know its position.
+        ending: one of `OUTPUT_FORMATS`.
+        texture: as of `write_flattening`.
+        folder: where the file will be, for paths in it; by default the current one.
+
+    Raises:
+        UnknownFormatError, MeshFileError, OptionError: as of `write_flattening`.
+    """
+    ending, folder = ending.lower(), Path() if folder is None else folder
+    writers: dict[str, Callable[[], None]] = {
+        ".obj": lambda: write_obj(result, stream, folder),
+        ".ply": lambda: write_ply(result, stream),
+        ".glb": lambda: write_glb(result, stream, image, folder),
+        ".npz": lambda: write_npz(result, stream),
+    }
+    if ending not in writers:
+        raise UnknownFormatError(f"{ending!r} is no format that results are written as: {', '.join(writers)}")
+    _check_texture(f"a {ending}", ending, texture)
+    image = None if texture is None else find_texture(texture, result)
+    writers[ending]()
+
+
+def _check_texture(name: object, ending: str, texture: str | PathLike[str] | None) -> None:
+    if texture is not None and ending != ".glb":
+        raise OptionError(f"only .glb files carry a texture, and {name} is none")
 
 
 def losses(result: Flattening, ending: str) -> tuple[str, ...]:
