@@ -11,7 +11,7 @@ from scenes import PNG, SceneMaker, corners_of, opened, rich_scene
 from shapes import join, sphere
 
 import coneflat
-from coneflat.io import losses, read_mesh, read_mesh_from
+from coneflat.io import read_mesh, read_mesh_from
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -103,7 +103,7 @@ class TestScene:
                     found.append(values(one["attributes"]["TEXCOORD_0"])[corners].reshape(-1, 3, 2))
         # Nodes in depth-first order: the ball, the mirrored ribbon, whose corners run the other way, the other one.
         found[2] = found[2][:, ::-1]
-        expected = (result.corner_uv * [1, -1] + [0, 1]).astype("f4")
+        expected = result.as_written(".glb").corner_uv * [1, -1] + [0, 1]
         np.testing.assert_array_equal(np.concatenate(found), expected)
 
     def test_nothing_of_the_old_arrays_stays_behind(self, rich, tmp_path):
@@ -196,7 +196,9 @@ class TestLosses:
         make.tree |= {"meshes": [{"primitives": [one, lost]}, {"primitives": [lost]}]}
         make.tree |= {"nodes": [{"mesh": 0}, {"mesh": 1}], "scenes": [{"nodes": [0, 1]}]}
         result = coneflat.flatten(read_mesh_from(make.glb(), "a.glb"), repair=True)
-        assert losses(result, ".glb") == ("Triangles that the repair dropped are not in the file: 3.",)
+        assert (
+            result.as_written(".glb").notes[-1] == "Triangles that the repair dropped are not in the file: 3."
+        )
         tree, values, _ = opened(result.save(tmp_path / "out.glb").read_bytes())
         assert [len(mesh["primitives"]) for mesh in tree["meshes"]] == [1, 1]
         assert ["mesh" in node for node in tree["nodes"]] == [True, False]
@@ -204,10 +206,10 @@ class TestLosses:
         assert len(read_mesh(tmp_path / "out.glb").corners) == 6
 
     def test_copies_and_painted_textures_are_named(self, rich):
-        copies, painted = losses(rich[1], ".glb")
+        *_, copies, painted = rich[1].as_written(".glb").notes
         assert copies == "Meshes that several nodes show have UVs of their own for each: 1 more of them."
         assert painted == "Textures are kept, but were made for the old UVs: those of 1 material."
-        assert losses(rich[1], ".ply") == ()
+        assert rich[1].as_written(".ply") is rich[1]
 
 
 class TestFilesBeside:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ._arrays import BoolArray, FloatArray, IntArray
 from .errors import OptionError
+from .geometry.areas import at_unit_scale
 from .inputs import InputMesh
 from .io import COLOURS
 from .options import Options
@@ -90,7 +91,7 @@ class Wishes:
 
 def _weights_within(weights: FloatArray | None, component: IntArray) -> FloatArray | None:
     """Return the weights of a component; None where all are 0, which there says no more than that they are equal."""
-    return None if weights is None or not weights[component].any() else weights[component]
+    return None if weights is None or not weights[component].any() else at_unit_scale(weights[component])
 
 
 def locate_wishes(checked: CheckedMesh, options: Options, given: InputMesh) -> Wishes:
@@ -163,9 +164,12 @@ def _weights(noun: str, weights: object, given: InputMesh) -> FloatArray:
     if isinstance(weights, str):
         weights = _property(weights, given)
     try:
-        values = np.asarray(weights, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        numbers = np.asarray(weights)
+    except (TypeError, ValueError, OverflowError) as error:
         raise OptionError(f"{noun} must be numbers, one for each vertex: {error}") from error
+    if numbers.dtype.kind not in "fiub" and numbers.size:
+        raise OptionError(f"{noun} must be numbers, one for each vertex, not of type {numbers.dtype}")
+    values = numbers.astype(np.float64)
     if values.shape != (count,):
         raise OptionError(
             f"{noun} must be {count:,} numbers, one for each vertex, not of shape {values.shape}"

@@ -18,17 +18,18 @@ COLUMNS = (
 def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     """Flatten a mesh file to a file and return the row of the summary; errors become rows, too."""
     from ..errors import ConeflatError
-    from ..io import losses, read_mesh
+    from ..io import read_mesh
+    from ..io.write import write_measured
     from ..pipeline import flatten
 
     start = time.perf_counter()
     row: dict[str, Any] = {"mesh": job["mesh"], "output": job["output"]}
     try:
         result = flatten(read_mesh(job["mesh"], job["weld"]), **job["options"])
-        result.save(job["output"])
+        result = write_measured(result, job["output"])
         report = result.report()
         row |= {"status": "done", "error": ""} | {name: report[name] for name in COLUMNS}
-        row["notes"] = " ".join((*report["notes"], *losses(result, os.path.splitext(job["output"])[1])))
+        row["notes"] = " ".join(report["notes"])
     except ConeflatError as error:
         row |= {"status": "failed", "error": str(error)}
     except MemoryError:

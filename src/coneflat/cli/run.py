@@ -13,8 +13,10 @@ from pathlib import Path
 from typing import IO, Any
 
 from ..errors import OptionError
-from ..io import PIPE, atomic_write, check_output, losses, read_flattening, read_mesh, write_stream
+from ..io import PIPE, atomic_write, check_output, read_flattening, read_mesh, write_stream
 from ..io.atomic import check_target
+from ..io.write import write_measured
+from ..io.written import as_written
 from ..pipeline import flatten
 from ..result import Flattening
 from .console import Console
@@ -107,19 +109,17 @@ def save(
     stdout: IO[bytes] | None = None,
     ending: str = ".obj",
 ) -> Flattening:
-    """Write a result and its report, and return it with the time that everything took.
+    """Write a result and its report, and return it as it was written, with the time that everything took.
 
     stdout: where the result goes, as of an ending, instead of to the output.
     """
     with console.stage("write", FLATTENED):
-        lost = losses(result, output.suffix if stdout is None else ending)
-        result = replace(result, notes=(*result.notes, *lost))
         if stdout is None:
-            result.save(output, texture=texture)
+            result = write_measured(result, output, texture)
         else:
             # Whole or not at all, as files are.
             content = BytesIO()
-            write_stream(result, content, ending, texture)
+            result = as_written(write_stream(result, content, ending, texture), ending)
             stdout.write(content.getbuffer())
             stdout.flush()
     result = replace(result, seconds=dict(console.seconds))

@@ -8,7 +8,7 @@ from .npz import read_flattening
 from .polygons import is_polygon_side, triangulate
 from .raw import COLOURS, PIPE
 from .read import INPUT_FORMATS, read_mesh, read_mesh_from
-from .write import OUTPUT_FORMATS, check_output, losses, write_flattening, write_stream
+from .write import OUTPUT_FORMATS, check_output, write_flattening, write_stream
 
 __all__ = [
     "COLOURS",
@@ -19,7 +19,6 @@ __all__ = [
     "atomic_write",
     "check_output",
     "is_polygon_side",
-    "losses",
     "read_flattening",
     "read_mesh",
     "read_mesh_from",

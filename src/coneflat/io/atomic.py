@@ -14,6 +14,18 @@ from typing import IO, Any
 from ..errors import ConeflatError, MeshFileError, UnknownFormatError
 
 
+def as_path(path: object) -> Path:
+    """Return the path that text, bytes or a path object names.
+
+    Raises:
+        MeshFileError: it is something else.
+    """
+    try:
+        return Path(os.fsdecode(path))  # type: ignore[arg-type]
+    except TypeError as error:
+        raise MeshFileError(f"a file is named by text or a path, not by {type(path).__name__}") from error
+
+
 def known_ending(path: Path, endings: Collection[str], what: str) -> str:
     """Return the ending of a path in lower case if it is known.
 
@@ -36,7 +48,7 @@ def check_target(path: str | PathLike[str]) -> Path:
         MeshFileError: the folder is missing, or the path is something other than a file, or writing is not
             permitted.
     """
-    path = Path(path)
+    path = as_path(path)
     try:
         target = Path(os.path.realpath(path))
         folder = target.parent
@@ -99,7 +111,7 @@ def atomic_write(path: str | PathLike[str], mode: str = "wb") -> Iterator[IO[Any
     except ConeflatError:
         raise
     except OSError as error:
-        raise _failure(Path(path), error) from error
+        raise _failure(as_path(path), error) from error
     finally:
         temporary.unlink(missing_ok=True)
 

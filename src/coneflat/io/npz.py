@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
 from ..errors import ConeflatError, MeshFileError
+from .atomic import as_path
 from .raw import read_bytes
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ _NAMES = (
     "uv", "uv_faces", "vertices", "faces", "cones", "curvatures", "log_scale", "curvature_residual", "seams",
     "vertex_origin", "face_origin", "qc", "log_area_scale", "uv_scale", "report",
 )  # fmt: skip
+#: Archives of version 0.1.0 do not have these.
+_NEWER = ("prescribed",)
 #: Results are not packed; programs that pack them gain a factor of a few.
 _MOST_UNPACKED = 30
 
@@ -44,6 +47,7 @@ def write_npz(result: Flattening, stream: IO[bytes]) -> None:
         "cones": result.cones,
         "curvatures": result.curvatures,
         "log_scale": result.log_scale,
+        "prescribed": result.prescribed,
         "curvature_residual": result.curvature_residual,
         "seams": result.seams,
         "vertex_origin": np.arange(len(result.vertices)) if origin is None else origin,
@@ -62,7 +66,7 @@ def read_flattening(path: str | PathLike[str]) -> Flattening:
     Raises:
         MeshFileError: the file is not there, may not be read, or is not such a result.
     """
-    path = Path(path)
+    path = as_path(path)
     content = read_bytes(path)
     try:
         return _flattening(path, _arrays(path, content))
@@ -82,7 +86,7 @@ def _arrays(path: Path, content: bytes) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {}
     left = _MOST_UNPACKED * len(content)
     with zipfile.ZipFile(BytesIO(content)) as archive:
-        for name in _NAMES:
+        for name in (*_NAMES, *_NEWER):
             try:
                 member = archive.getinfo(f"{name}.npy")
             except KeyError:
@@ -123,6 +127,7 @@ def _flattening(path: Path, arrays: dict[str, NDArray[Any]]) -> Flattening:
                 f"{path} holds no {what}: {name!r} is missing; write it by `coneflat flatten`"
             )
     report = json.loads(str(arrays["report"]))
+    arrays.setdefault("prescribed", np.full(len(arrays["vertices"]), np.nan))
     _check_report(report)
     reading = _Checked(path, arrays)
     vertices, uv = reading.floats("vertices", (None, 3)), reading.floats("uv", (None, 2))
@@ -147,6 +152,7 @@ def _flattening(path: Path, arrays: dict[str, NDArray[Any]]) -> Flattening:
         cones=cones,
         curvatures=reading.floats("curvatures", (len(cones),)),
         log_scale=reading.floats("log_scale", (n,)),
+        prescribed=reading.floats("prescribed", (n,)),
         curvature_residual=reading.floats("curvature_residual", (n,)),
         seams=reading.indices("seams", (None, 2), n),
         packing_efficiency=_number(report["packing_efficiency"]),
@@ -232,7 +238,7 @@ def _distortion(reading: _Checked, report: dict[str, Any], count: int) -> Distor
     from ..distortion import Distortion
     from ..report import MEASURES
 
-    numbers: dict[str, Any] = {name: _number(report[name]) for name in MEASURES}
+    numbers: dict[str, Any] = {name: _number(report.get(name)) for name in MEASURES}
     return Distortion(
         qc=reading.floats("qc", (count,)),
         log_area_scale=reading.floats("log_area_scale", (count,)),

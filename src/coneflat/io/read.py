@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import ConeflatError, EmptyMeshError, MeshFileError, UnknownFormatError
-from .atomic import known_ending
+from .atomic import as_path, known_ending
 from .gltf import parse_gltf
 from .model import MeshFile
 from .normals import usable_normals
@@ -59,7 +59,7 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
         EmptyMeshError: it has no vertex or no face.
         FaceIndexError: a face names a vertex that does not exist.
     """
-    path = Path(path)
+    path = as_path(path)
     if path == PIPE:
         return read_mesh_from(read_input(), path, weld)
     ending = known_ending(path, INPUT_FORMATS, "meshes are read from")

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from ..errors import OptionError, UnknownFormatError
-from .atomic import atomic_write, check_target, known_ending
+from .atomic import as_path, atomic_write, check_target, known_ending
 from .glb_write import write_glb
-from .gltf_write import scene_losses
 from .npz import write_npz
 from .obj_write import write_obj
 from .ply_write import write_ply
 from .texture import find_texture
+from .written import as_written
 
 if TYPE_CHECKING:
     from ..result import Flattening
@@ -35,7 +35,7 @@ def check_output(path: str | PathLike[str], texture: str | PathLike[str] | None 
             image that can be read.
         OptionError: files of this ending carry no texture, or Pillow is not installed.
     """
-    path = Path(path)
+    path = as_path(path)
     ending = known_ending(path, OUTPUT_FORMATS, "results are written as")
     check_target(path)
     _check_texture(path, ending, texture)
@@ -65,10 +65,25 @@ def write_flattening(
         MeshFileError: the file cannot be written, or the texture cannot be read.
         OptionError: files of this ending carry no texture, or Pillow is not installed.
     """
+    return _write(result, path, texture)[0]
+
+
+def write_measured(
+    result: Flattening, path: str | PathLike[str], texture: str | PathLike[str] | None = None
+) -> Flattening:
+    """Write a flattened mesh as `write_flattening` does, and return it as the file holds it; see `as_written`."""
+    written, stored = _write(result, path, texture)
+    return as_written(stored, written.suffix.lower())
+
+
+def _write(
+    result: Flattening, path: str | PathLike[str], texture: str | PathLike[str] | None
+) -> tuple[Path, Flattening]:
+    """Write a flattened mesh, and return the path and the arrays that were written."""
     path = check_output(path, texture)
     with atomic_write(path) as stream:
-        write_stream(result, stream, path.suffix, texture, path.parent)
-    return path
+        stored = write_stream(result, stream, path.suffix, texture, path.parent)
+    return path, stored
 
 
 def write_stream(
@@ -77,8 +92,8 @@ def write_stream(
     ending: str,
     texture: str | PathLike[str] | None = None,
     folder: Path | None = None,
-) -> None:
-    """Write a flattened mesh to a binary stream; see `write_flattening`.
+) -> Flattening:
+    """Write a flattened mesh to a binary stream, and return the arrays that were written; see `write_flattening`.
 
     Args:
         result: what to write.
@@ -91,27 +106,24 @@ def write_stream(
         UnknownFormatError, MeshFileError, OptionError: as of `write_flattening`.
     """
     ending, folder = ending.lower(), Path() if folder is None else folder
-    writers: dict[str, Callable[[], None]] = {
-        ".obj": lambda: write_obj(result, stream, folder),
-        ".ply": lambda: write_ply(result, stream),
-        ".glb": lambda: write_glb(result, stream, image, folder),
-        ".npz": lambda: write_npz(result, stream),
-    }
-    if ending not in writers:
-        raise UnknownFormatError(f"{ending!r} is no format that results are written as: {', '.join(writers)}")
+    if ending not in OUTPUT_FORMATS:
+        raise UnknownFormatError(
+            f"{ending!r} is no format that results are written as: {', '.join(OUTPUT_FORMATS)}"
+        )
     _check_texture(f"a {ending}", ending, texture)
     image = None if texture is None else find_texture(texture, result)
+    # A .glb holds fewer digits, at which triangles are to be upright and apart, too.
+    stored = as_written(result, ending) if ending == ".glb" else result
+    writers: dict[str, Callable[[], None]] = {
+        ".obj": lambda: write_obj(stored, stream, folder),
+        ".ply": lambda: write_ply(stored, stream),
+        ".glb": lambda: write_glb(stored, stream, image, folder),
+        ".npz": lambda: write_npz(stored, stream),
+    }
     writers[ending]()
+    return stored
 
 
 def _check_texture(name: object, ending: str, texture: str | PathLike[str] | None) -> None:
     if texture is not None and ending != ".glb":
         raise OptionError(f"only .glb files carry a texture, and {name} is none")
-
-
-def losses(result: Flattening, ending: str) -> tuple[str, ...]:
-    """Return what a file of an ending does not keep of the one that the mesh was read from, one sentence each.
-
-    That is what one would expect it to keep, as a .glb does the scene of a .glb.
-    """
-    return scene_losses(result) if ending.lower() == ".glb" else ()

@@ -12,7 +12,6 @@ from ..errors import ConvergenceError
 from ..figures import SolveFigures
 from ..geometry import double_areas, edge_lengths
 from ..mesh import TriangleMesh
-from ..rotations import Rotations
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +32,6 @@ class LaidOut:
         target, curvature: (n,) curvature wanted and reached, radians.
         figures: how it was found.
         notes: what falls short, one sentence each.
-        rotations: those of its seams, where they matter.
     """
 
     mesh: TriangleMesh
@@ -48,7 +46,6 @@ class LaidOut:
     figures: SolveFigures
     chart: IntArray | None = None
     notes: tuple[str, ...] = ()
-    rotations: Rotations | None = None
 
     @property
     def area(self) -> float:
