@@ -214,11 +214,12 @@ class TestGltf:
         assert 0 < read < 400
 
 
-class TestNpz:
-    @pytest.fixture(scope="class")
-    def saved(self, tmp_path_factory):
-        return coneflat.flatten(*shapes.grid(3, 3)).save(tmp_path_factory.mktemp("npz") / "a.npz")
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    return coneflat.flatten(*shapes.grid(3, 3)).save(tmp_path_factory.mktemp("npz") / "a.npz")
 
+
+class TestNpz:
     def written(self, saved, tmp_path, **new):
         with np.load(saved) as archive:
             arrays = dict(archive) | new

@@ -23,7 +23,14 @@ from .talk import talk_options
     "-o",
     "--output",
     type=click.Path(path_type=Path),
-    help="File to write: .obj, .ply, .glb or .npz.  [default: MESH's name with _uv, as .obj]",
+    help="File to write: .obj, .ply, .glb or .npz; - for standard output.  [default: MESH's name with _uv, as .obj; of "
+    "standard input -]",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["obj", "ply", "glb", "npz"]),
+    help="Of standard output, and without -o: what to write.  [default: obj]",
 )
 @method_options
 @click.option(
@@ -76,6 +83,7 @@ def flatten(
     /,
     mesh: Path,
     output: Path | None,
+    form: str | None,
     required: tuple[str, ...],
     cone: tuple[str, ...],
     cones_file: Path | None,
@@ -88,7 +96,7 @@ def flatten(
     talk: str | None,
     **method: Any,
 ) -> None:
-    """Flatten MESH (.obj, .ply, .stl, .off, .gltf, .glb) and write it with UV coordinates.
+    """Flatten MESH (.obj, .ply, .stl, .off, .gltf, .glb; - for standard input) and write it with UV coordinates.
 
     \b
     Examples:
@@ -97,6 +105,7 @@ def flatten(
       coneflat flatten part.stl --cone 12 --cone 507 --cone 1044
       coneflat flatten bracket.stl -o bracket.obj --sharp-angle 40deg
       coneflat flatten sheet.obj -o flat.obj --corner 10 --corner 95 --corner 230 --corner 310
+      curl -s https://example.org/part.stl | coneflat flatten - -o - --format glb > part.glb
     """
     if context.args:
         raise click.UsageError(
@@ -110,11 +119,15 @@ def flatten(
 
     from ..requirements import REPORTED, parse_requirements
     from .given import parse_vertices, read_pairs
-    from .run import run
+    from .run import named_output, run
 
     requirements = parse_requirements(texts, REPORTED)
     check_combinations(context)
-    options = method_keywords(method, ".obj" if output is None else output.suffix.lower())
+    ending = f".{form or 'obj'}"
+    output = named_output(mesh, ending) if output is None else output
+    if form is not None and output.suffix.lower() not in ("", ending):
+        raise click.UsageError(f"{output} is no {ending} file: leave out --format", context)
+    options = method_keywords(method, output.suffix.lower() or ending)
     given = parse_vertices("cone", cone, cones_file)
     corners = parse_vertices("corner", corner)
     if given:
@@ -137,5 +150,6 @@ def flatten(
         report=report,
         texture=texture,
         talk=talk,
+        ending=ending,
         requirements=requirements,
     )

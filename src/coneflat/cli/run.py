@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from ..errors import OptionError
-from ..io import atomic_write, check_output, read_flattening
+from ..io import PIPE, atomic_write, check_output, read_flattening, write_stream
 from ..io.atomic import check_target
 from ..io.join import Joined, read_joined
 from ..io.write import write_measured
+from ..io.written import as_written
 from ..pipeline import flatten
 from ..requirements import Requirement
 from ..result import Flattening
@@ -35,31 +39,51 @@ def run(
     report: Path | None = None,
     texture: str | None = None,
     talk: str | None = None,
+    ending: str = ".obj",
     requirements: Sequence[Requirement] = (),
 ) -> None:
     """Flatten a mesh file, write the result and its report, and print what came out.
 
     Args:
         mesh: file to read.
-        output: file to write; None for one beside the current folder's others, named after the input.
+        output: file to write, "-" for standard output; None for a file in the current folder that is named after the
+            input, or standard output for what comes from standard input.
         options: keyword arguments of `coneflat.flatten`.
         weld: merge vertices at the same position; None for the default, see `read_joined`.
         report: JSON file for the measures.
         texture: of a .glb: "checker", or an image file.
         talk: how much to print, see `talk_options`.
+        ending: format of what goes to standard output, or of a file without a name.
         requirements: what measures must be; the files are written in any case.
     """
-    output = Path(f"{mesh.stem}_uv.obj") if output is None else output
+    output = named_output(mesh, ending) if output is None else output
     # What can fail at the end is looked at before the work.
-    check_output(output, texture)
+    check_output(Path(f"stdout{ending}") if output == PIPE else output, texture)
     if report is not None:
         check_target(report)
     require_distinct({"input": mesh, "output": output, "report": report})
 
-    with Console(talk) as console:
-        result = save(flatten_file(mesh, console, options, weld), console, output, report, texture)
-        console.finish([path for path in (output, report) if path is not None], result)
+    with _kept_apart(output) as stdout, Console(talk) as console:
+        result = flatten_file(mesh, console, options, weld)
+        result = save(result, console, output, report, texture, stdout, ending)
+        console.finish([path for path in (output, report) if path not in (None, PIPE)], result)
     check_required(requirements, result.report(), str(output))
+
+
+def named_output(mesh: Path, ending: str) -> Path:
+    """Return the file that the result of a mesh is written to if none is named."""
+    return PIPE if mesh == PIPE else Path(f"{mesh.stem}_uv{ending}")
+
+
+@contextmanager
+def _kept_apart(output: Path) -> Iterator[IO[bytes] | None]:
+    """Yield standard output if the result goes there, and let everything else that is printed go to stderr."""
+    if output != PIPE:
+        yield None
+        return
+    stdout = sys.stdout.buffer
+    with redirect_stdout(sys.stderr):
+        yield stdout
 
 
 def open_result(
@@ -100,11 +124,27 @@ def flatten_joined(source: Joined, console: Console, options: Mapping[str, Any])
 
 
 def save(
-    result: Flattening, console: Console, output: Path, report: Path | None, texture: str | None = None
+    result: Flattening,
+    console: Console,
+    output: Path,
+    report: Path | None,
+    texture: str | None = None,
+    stdout: IO[bytes] | None = None,
+    ending: str = ".obj",
 ) -> Flattening:
-    """Write a result and its report, and return it as it was written, with the time that everything took."""
+    """Write a result and its report, and return it as it was written, with the time that everything took.
+
+    stdout: where the result goes, as of an ending, instead of to the output.
+    """
     with console.stage("write", FLATTENED):
-        result = write_measured(result, output, texture)
+        if stdout is None:
+            result = write_measured(result, output, texture)
+        else:
+            # Whole or not at all, as files are.
+            content = BytesIO()
+            result = as_written(write_stream(result, content, ending, texture), ending)
+            stdout.write(content.getbuffer())
+            stdout.flush()
     result = replace(result, seconds=dict(console.seconds))
     if report is not None:
         with atomic_write(report, "w") as file:
@@ -117,7 +157,7 @@ def require_distinct(files: Mapping[str, Path | None]) -> None:
     """Raise OptionError if two names mean one file, of which one would overwrite the other."""
     seen: dict[str, str] = {}
     for role, path in files.items():
-        if path is None:
+        if path is None or path == PIPE:
             continue
         where = os.path.normcase(os.path.realpath(path))
         if where in seen:

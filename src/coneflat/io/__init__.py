@@ -6,14 +6,15 @@ from .atomic import atomic_write
 from .model import MeshFile
 from .npz import read_flattening
 from .polygons import is_polygon_side, triangulate
-from .raw import COLOURS
+from .raw import COLOURS, PIPE
 from .read import INPUT_FORMATS, read_mesh, read_mesh_from
-from .write import OUTPUT_FORMATS, check_output, write_flattening
+from .write import OUTPUT_FORMATS, check_output, write_flattening, write_stream
 
 __all__ = [
     "COLOURS",
     "INPUT_FORMATS",
     "OUTPUT_FORMATS",
+    "PIPE",
     "MeshFile",
     "atomic_write",
     "check_output",
@@ -23,4 +24,5 @@ __all__ = [
     "read_mesh_from",
     "triangulate",
     "write_flattening",
+    "write_stream",
 ]

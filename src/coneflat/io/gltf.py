@@ -32,12 +32,14 @@ def parse_gltf(path: Path, content: bytes) -> RawMesh:
         MeshFileError: the file is broken, or its data are compressed in a way that cannot be decoded.
     """
     reading = _Reading(GltfData(path, content))
-    for node, matrix in shown_nodes(reading.data):
-        mesh = reading.data.item("nodes", node).get("mesh")
-        if mesh is not None:
-            reading.add_mesh(node, mesh, matrix)
-    check_names(reading.data)
-    return reading.done()
+    # What is no number, or becomes none under a transform, is passed on.
+    with np.errstate(all="ignore"):
+        for node, matrix in shown_nodes(reading.data):
+            mesh = reading.data.item("nodes", node).get("mesh")
+            if mesh is not None:
+                reading.add_mesh(node, mesh, matrix)
+        check_names(reading.data)
+        return reading.done()
 
 
 class _Reading:

@@ -300,7 +300,7 @@ class _Writing:
         used = set(keys_of(self.tree))
         for name in ("extensionsUsed", "extensionsRequired"):
             if name in self.tree:
-                left = [one for one in self.tree[name] if one in used or one not in (DRACO, *COMPRESSED)]
+                left = [one for one in self.tree[name] if one not in (DRACO, *COMPRESSED) or one in used]
                 self.tree[name] = left
                 if not left:
                     del self.tree[name]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -24,6 +25,10 @@ COLOURS = ("red", "green", "blue")
 
 #: Instead of the number of a UV point: the corner has none.
 NO_UV = -1
+
+
+#: Stands for standard input, and for standard output.
+PIPE = Path("-")
 
 
 class RawMesh(NamedTuple):
@@ -74,6 +79,22 @@ def read_bytes(path: Path) -> bytes:
     if not content or content.isspace():
         raise EmptyMeshError(f"{path} is empty")
     return content
+
+
+def read_input() -> bytes:
+    """Return what comes in on standard input.
+
+    Raises:
+        MeshFileError: that is a terminal, or cannot be read.
+    """
+    if sys.stdin is None or sys.stdin.isatty():
+        raise MeshFileError(
+            "- stands for a mesh on standard input, and there is none: pipe a file into the command"
+        )
+    try:
+        return sys.stdin.buffer.read()
+    except OSError as error:
+        raise MeshFileError(f"standard input cannot be read: {error.strerror or error}") from error
 
 
 def check_corners(path: Path, mesh: RawMesh) -> None:

@@ -18,7 +18,7 @@ from .normals import usable_normals
 from .obj import parse_obj
 from .off import is_off, parse_off
 from .ply import parse_ply
-from .raw import RawMesh, check_corners, read_bytes
+from .raw import PIPE, RawMesh, check_corners, read_bytes, read_input
 from .stl import is_stl, parse_stl
 from .weld import weld as weld_vertices
 
@@ -46,8 +46,10 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
     OBJ, OFF, PLY and STL have parsers of their own: libraries renumber vertices, split polygons, or drop the
     groups, materials and comments that an OBJ is to keep.
 
+    Of glTF, vertices of one node alone are merged. What the file says of normals, or of smoothing, is kept.
+
     Args:
-        path: the file.
+        path: the file; "-" for standard input, whose content tells the format.
         weld: whether to merge vertices at exactly the same position; by default only where the format
             cannot share vertices, which is STL and glTF.
 
@@ -58,6 +60,8 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
         FaceIndexError: a face names a vertex that does not exist.
     """
     path = as_path(path)
+    if path == PIPE:
+        return read_mesh_from(read_input(), path, weld)
     ending = known_ending(path, INPUT_FORMATS, "meshes are read from")
     return read_mesh_from(read_bytes(path), path, weld, ending)
 

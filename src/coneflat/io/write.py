@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from ..errors import OptionError
+from ..errors import OptionError, UnknownFormatError
 from .atomic import as_path, atomic_write, check_target, known_ending
 from .glb_write import write_glb
 from .npz import write_npz
@@ -38,9 +38,8 @@ def check_output(path: str | PathLike[str], texture: str | PathLike[str] | None 
     path = as_path(path)
     ending = known_ending(path, OUTPUT_FORMATS, "results are written as")
     check_target(path)
+    _check_texture(path, ending, texture)
     if texture is not None:
-        if ending != ".glb":
-            raise OptionError(f"only .glb files carry a texture, and {path} is none")
         find_texture(texture)
     return path
 
@@ -82,16 +81,49 @@ def _write(
 ) -> tuple[Path, Flattening]:
     """Write a flattened mesh, and return the path and the arrays that were written."""
     path = check_output(path, texture)
+    with atomic_write(path) as stream:
+        stored = write_stream(result, stream, path.suffix, texture, path.parent)
+    return path, stored
+
+
+def write_stream(
+    result: Flattening,
+    stream: IO[bytes],
+    ending: str,
+    texture: str | PathLike[str] | None = None,
+    folder: Path | None = None,
+) -> Flattening:
+    """Write a flattened mesh to a binary stream, and return the arrays that were written; see `write_flattening`.
+
+    Args:
+        result: what to write.
+        stream: where to; it need not know its position.
+        ending: one of `OUTPUT_FORMATS`.
+        texture: as of `write_flattening`.
+        folder: where the file will be, for paths in it; by default the current one.
+
+    Raises:
+        UnknownFormatError, MeshFileError, OptionError: as of `write_flattening`.
+    """
+    ending, folder = ending.lower(), Path() if folder is None else folder
+    if ending not in OUTPUT_FORMATS:
+        raise UnknownFormatError(
+            f"{ending!r} is no format that results are written as: {', '.join(OUTPUT_FORMATS)}"
+        )
+    _check_texture(f"a {ending}", ending, texture)
     image = None if texture is None else find_texture(texture, result)
-    ending = path.suffix.lower()
     # A .glb holds fewer digits, at which triangles are to be upright and apart, too.
     stored = as_written(result, ending) if ending == ".glb" else result
-    writers: dict[str, Callable[[IO[bytes]], None]] = {
-        ".obj": lambda stream: write_obj(stored, stream, path.parent),
-        ".ply": lambda stream: write_ply(stored, stream),
-        ".glb": lambda stream: write_glb(stored, stream, image, path.parent),
-        ".npz": lambda stream: write_npz(stored, stream),
+    writers: dict[str, Callable[[], None]] = {
+        ".obj": lambda: write_obj(stored, stream, folder),
+        ".ply": lambda: write_ply(stored, stream),
+        ".glb": lambda: write_glb(stored, stream, image, folder),
+        ".npz": lambda: write_npz(stored, stream),
     }
-    with atomic_write(path) as stream:
-        writers[ending](stream)
-    return path, stored
+    writers[ending]()
+    return stored
+
+
+def _check_texture(name: object, ending: str, texture: str | PathLike[str] | None) -> None:
+    if texture is not None and ending != ".glb":
+        raise OptionError(f"only .glb files carry a texture, and {name} is none")
