@@ -13,6 +13,7 @@ from ..errors import OptionError
 from ..io import atomic_write, check_output, read_flattening
 from ..io.atomic import check_target
 from ..io.join import Joined, read_joined
+from ..mapped import has_uv
 from ..pipeline import flatten
 from ..requirements import Requirement
 from ..result import Flattening
@@ -72,7 +73,7 @@ def open_result(
         if file.suffix.lower() == ".npz":
             return read_flattening(file)
         source = read_joined(file, weld)
-    if not again:
+    if not again and has_uv(source.mesh):
         from ..view.own import own_flattening
 
         with console.stage("measure", READ):

@@ -73,7 +73,7 @@ def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
 
 def is_own(result: Flattening) -> bool:
     """Return whether a flattening is what a file had."""
-    return result.settings.get("method") == OWN
+    return getattr(result, "settings", {}).get("method") == OWN
 
 
 def shown_rows(result: Flattening) -> list[tuple[str, str, str]]:
