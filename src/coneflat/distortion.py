@@ -219,7 +219,8 @@ def _seam_motion_mismatch(
 
 
 def _mean(values: FloatArray, weights: FloatArray) -> float:
-    return float((values * weights).sum() / weights.sum()) if len(values) else float("nan")
+    total = weights.sum()
+    return float((values * weights).sum() / total) if total > 0 else float("nan")
 
 
 def _spread(log_scale: FloatArray, weights: FloatArray) -> float:
