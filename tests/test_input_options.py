@@ -311,3 +311,15 @@ def test_what_is_joined_on_reading_is_written_whole(tmp_path, monkeypatch, endin
         assert found[name] == report[name]
     for name in ("qc_mean", "seam_length", "seam_mismatch_max", "packing_efficiency"):
         assert found[name] == pytest.approx(report[name], rel=1e-9, abs=1e-12)
+
+
+def test_seams_of_a_ply_are_kept(tmp_path, monkeypatch):
+    """Its vertices are apart there, are joined on reading, and are cut again."""
+    monkeypatch.chdir(tmp_path)
+    first = coneflat.flatten(*shapes.sphere(2), charts="atlas")
+    first.save("first.ply")
+    done = run("flatten", "first.ply", "-q", "-o", "again.npz", "--charts", "atlas", "--keep-seams")
+    assert done.exit_code == 0
+    again = coneflat.read_flattening("again.npz")
+    middles = [np.sort(each.vertices[each.seams].mean(axis=1), axis=0) for each in (first, again)]
+    np.testing.assert_allclose(*middles, atol=1e-12)
