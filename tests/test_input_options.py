@@ -283,3 +283,43 @@ def test_several_meshes_hint_at_batch():
     done = run("flatten", "a.obj", "b.obj", "c.obj")
     assert done.exit_code == 2
     assert "flatten takes one mesh, and there are 3: `coneflat batch a.obj b.obj ..." in done.output
+
+
+@pytest.mark.parametrize("ending", ["obj", "ply"])
+@pytest.mark.parametrize("out", ["obj", "ply", "npz"])
+def test_what_is_joined_on_reading_is_written_whole(tmp_path, monkeypatch, ending, out):
+    monkeypatch.chdir(tmp_path)
+    vertices, faces = soup(*shapes.sphere(1))
+    if ending == "obj":
+        write_obj(tmp_path / "soup.obj", vertices, faces)
+    else:
+        rows = [" ".join(map(repr, row)) for row in vertices.tolist()]
+        rows += [f"3 {a} {b} {c}" for a, b, c in faces.tolist()]
+        head = [
+            "ply",
+            "format ascii 1.0",
+            f"element vertex {len(vertices)}",
+            *(f"property double {x}" for x in "xyz"),
+        ]
+        head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+        (tmp_path / "soup.ply").write_text("\n".join(head + rows) + "\n")
+    words = ("--charts", "atlas", "--report", "r.json", "--require", "flipped=0,overlap=0")
+    assert run("flatten", f"soup.{ending}", "-q", "-o", f"a.{out}", *words).exit_code == 0
+    report = json.loads((tmp_path / "r.json").read_text())
+    found = coneflat.measure_uv(f"a.{out}").report()
+    for name in ("triangles", "charts", "flipped", "overlapping_pairs"):
+        assert found[name] == report[name]
+    for name in ("qc_mean", "seam_length", "seam_mismatch_max", "packing_efficiency"):
+        assert found[name] == pytest.approx(report[name], rel=1e-9, abs=1e-12)
+
+
+def test_seams_of_a_ply_are_kept(tmp_path, monkeypatch):
+    """Its vertices are apart there, are joined on reading, and are cut again."""
+    monkeypatch.chdir(tmp_path)
+    first = coneflat.flatten(*shapes.sphere(2), charts="atlas")
+    first.save("first.ply")
+    done = run("flatten", "first.ply", "-q", "-o", "again.npz", "--charts", "atlas", "--keep-seams")
+    assert done.exit_code == 0
+    again = coneflat.read_flattening("again.npz")
+    middles = [np.sort(each.vertices[each.seams].mean(axis=1), axis=0) for each in (first, again)]
+    np.testing.assert_allclose(*middles, atol=1e-12)

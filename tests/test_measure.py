@@ -277,3 +277,33 @@ def test_mesh_files_and_arrays_agree(tmp_path):
         uv=uv,
     )
     assert {**measure_uv(mesh).report(), "input": None} == arrays
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_damaged_files_are_measured_or_refused_in_one_line(tmp_path, seed):
+    """Words and lines replaced, left out and repeated; no warning of numpy's, either."""
+    random = np.random.default_rng(seed)
+    path = coneflat.flatten(*shapes.sphere(1), charts="atlas").save(tmp_path / "a.obj")
+    lines = path.read_text().split("\n")
+    words = ["nan", "inf", "-1", "0", "1e308", "1e-320", "-5", "999", "", "1/2", "1//2", "x", "1e400", "/"]
+    outcomes, messages = set(), []
+    for _ in range(60):
+        damaged = list(lines)
+        for row in random.integers(len(lines), size=random.choice([1, 2, 30])):
+            parts = damaged[row].split()
+            if len(parts) > 1 and random.random() < 0.6:
+                parts[random.integers(1, len(parts))] = str(random.choice(words))
+            elif random.random() < 0.5:
+                parts = lines[random.integers(len(lines))].split()
+            damaged[row] = " ".join(parts)
+        path.write_text("\n".join(damaged))
+        try:
+            found = measure_uv(path).report()
+        except errors.ConeflatError as error:
+            messages.append(str(error))
+            outcomes.add("refused")
+        else:
+            json.dumps(found, allow_nan=False)
+            outcomes.add("measured")
+    assert outcomes == {"refused", "measured"}
+    assert not any("\n" in message for message in messages)

@@ -28,6 +28,9 @@ from .validation import CheckedMesh, check_mesh, left_out
 #: triangle may lie on every other one.
 MOST_PAIRS, FEW_PAIRS = 8, 10_000
 
+#: A power of two beyond which there are no numbers.
+MOST_EXPONENT = 1100
+
 #: Of the measures of a flattening, those of a map alone.
 MAP_MEASURES = tuple(name for name in MEASURES if not name.startswith("curvature"))
 
@@ -140,7 +143,7 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
     scaled = at_unit_size(checked)
     distortion = measure_map(scaled.mesh, unit).rescaled((scaled.exponent + exponent) * np.log(2))
     every = mapped.corner_uv[known]
-    cover = _cover(every)
+    cover = _cover(np.ldexp(every, -exponent))
     tiles = len(_tiles(checked.mesh, unit, exponent))
     counts = {
         "vertices": len(np.unique(mapped.faces)),
@@ -151,7 +154,7 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
         "corners_not_finite": mapped.not_finite,
         "outside": int(((every < 0) | (every > 1)).any(axis=(1, 2)).sum()),
         "tiles": tiles,
-        "packing_efficiency": cover.once / tiles,
+        "packing_efficiency": float(np.ldexp(cover.once, min(2 * exponent, MOST_EXPONENT))) / tiles,
         "box_efficiency": cover.box_efficiency,
         "angle_error": angle_error(checked.mesh, unit),
     }
@@ -211,9 +214,10 @@ def angle_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
         inside[fan.reshape(-1)[end]] = False
     ways = (corner_uv - np.roll(corner_uv, 1, axis=1)) @ np.array([1, 1j])
     # From the side that leaves a corner to the one that arrives, on the other side of the angle.
-    with np.errstate(divide="ignore", invalid="ignore"):
-        angles = np.abs(np.angle(np.roll(ways, -1, axis=1) / -ways))
-    flat = (ways == 0) | (np.roll(ways, -1, axis=1) == 0)
+    lengths = np.abs(ways)
+    flat = (lengths == 0) | (np.roll(lengths, -1, axis=1) == 0)
+    ways /= np.maximum(lengths, np.finfo(np.float64).tiny)
+    angles = np.abs(np.angle(np.roll(ways, -1, axis=1) * -np.conj(ways)))
     sums = np.bincount(fan.reshape(-1), np.where(flat, 0.0, angles).reshape(-1), minlength=len(points))
     inside[fan[flat]] = False
     return float(np.abs(sums[inside] - 2 * np.pi).max(initial=0.0))

@@ -31,9 +31,10 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
         result = write_measured(result, job["output"])
         report = result.report()
         unmet = breaches(parse_requirements(job["required"], REPORTED), report)
-        row |= {"status": "failed" if unmet else "done", "error": "; ".join(unmet)} | {
-            name: report[name] for name in COLUMNS
-        }
+        row |= {
+            "status": "failed" if unmet else "done",
+            "error": f"not met: {'; '.join(unmet)}" if unmet else "",
+        } | {name: report[name] for name in COLUMNS}
         row["notes"] = " ".join(source.notes_of(report["notes"]))
     except ConeflatError as error:
         row |= {"status": "failed", "error": str(error)}

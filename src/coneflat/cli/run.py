@@ -18,6 +18,7 @@ from ..io.atomic import check_target
 from ..io.join import Joined, read_joined
 from ..io.write import write_measured
 from ..io.written import as_written
+from ..mapped import has_uv
 from ..pipeline import flatten
 from ..requirements import Requirement
 from ..result import Flattening
@@ -97,7 +98,7 @@ def open_result(
         if file.suffix.lower() == ".npz":
             return read_flattening(file)
         source = read_joined(file, weld)
-    if not again:
+    if not again and has_uv(source.mesh):
         from ..view.own import own_flattening
 
         with console.stage("measure", READ):

@@ -142,7 +142,7 @@ def layout_tiles(result: Flattening) -> IntArray:
     chart = label[corners[:, 0]]
     size = np.maximum(np.bincount(chart, minlength=count), 1)
     middles = [
-        np.bincount(chart, result.corner_uv[..., k].mean(axis=1), minlength=count) / size for k in (0, 1)
+        np.bincount(chart, result.uv[corners][..., k].mean(axis=1), minlength=count) / size for k in (0, 1)
     ]
     return np.unique(np.floor(np.stack(middles, axis=1)[chart]).astype(np.int64), axis=0)
 

@@ -49,13 +49,15 @@ def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
     measured = measure_mapped(mapped, strict=strict)
     mesh = measured.mesh
     uv, uv_faces = uv_points(mesh, measured.corner_uv)
-    area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
+    exponent = int(np.frexp(np.abs(mesh.vertices).max())[1])
+    area = float(double_areas(edge_lengths(np.ldexp(mesh.vertices, -exponent), mesh.faces)).sum()) / 2
+    scale = cell_side(uv, uv_faces, 1.0) / np.sqrt(area) if area > 0 else float("nan")
     return Flattening(
         vertices=mesh.vertices,
         faces=mesh.faces,
         uv=uv,
         uv_faces=uv_faces,
-        uv_scale=cell_side(uv, uv_faces, 1.0) / float(np.sqrt(area)) if area > 0 else float("nan"),
+        uv_scale=float(np.ldexp(scale, -exponent)),
         packing_efficiency=measured.counts["packing_efficiency"],
         cones=np.empty(0, dtype=np.int64),
         curvatures=np.empty(0),
@@ -74,7 +76,7 @@ def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
 
 def is_own(result: Flattening) -> bool:
     """Return whether a flattening is what a file had."""
-    return result.settings.get("method") == OWN
+    return getattr(result, "settings", {}).get("method") == OWN
 
 
 def shown_rows(result: Flattening) -> list[tuple[str, str, str]]:
@@ -84,7 +86,8 @@ def shown_rows(result: Flattening) -> list[tuple[str, str, str]]:
 
 def _flat_curvature(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
     """Return (n,) what the angles in the plane around each vertex miss of a full turn, across seams, too, radians."""
-    flat = np.concatenate([corner_uv, np.zeros((*corner_uv.shape[:2], 1))], axis=2).reshape(-1, 3)
+    unit = np.ldexp(corner_uv, -int(np.frexp(np.abs(corner_uv).max())[1]))
+    flat = np.concatenate([unit, np.zeros((*unit.shape[:2], 1))], axis=2).reshape(-1, 3)
     angles = corner_angles(edge_lengths(flat, np.arange(len(flat)).reshape(-1, 3)))
     sums = np.bincount(mesh.faces.reshape(-1), np.nan_to_num(angles).reshape(-1), len(mesh.vertices))
     curvature: FloatArray = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - sums
