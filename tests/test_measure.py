@@ -141,7 +141,7 @@ class TestKnownAnswers:
         faces = np.array([[0, 1 + k, 1 + (k + 1) % 12] for k in range(12)])
         uv = np.r_[[[0, 0]], np.stack([np.cos(turns * rim), np.sin(turns * rim)], 1)]
         found = measure_uv(vertices, faces, uv[faces]).report()
-        assert found["angle_error"] == pytest.approx(2 * np.pi * (turns - 1), abs=1e-12)
+        assert found["angle_sum_error"] == pytest.approx(2 * np.pi * (turns - 1), abs=1e-12)
         assert found["flipped"] == 0
         assert (found["overlapping_pairs"] > 0) == (turns == 2)
 
@@ -173,7 +173,7 @@ class TestFormats:
         for name in ("qc_mean", "seam_length", "charts", "flipped", "overlap", "seam_mismatch_max"):
             assert found[name] == pytest.approx(getattr(result.distortion, name), rel=1e-9, abs=1e-12)
         assert found["packing_efficiency"] == pytest.approx(result.packing_efficiency)
-        assert found["angle_error"] < 1e-9
+        assert found["angle_sum_error"] < 1e-9
 
     def test_no_manifold_is_measured_all_the_same(self, tmp_path):
         """Three faces at an edge, one of them given twice: overlaps are those of all."""

@@ -32,7 +32,7 @@ MOST_PAIRS, FEW_PAIRS = 8, 10_000
 MOST_EXPONENT = 1100
 
 #: Of the measures of a flattening, those of a map alone.
-MAP_MEASURES = tuple(name for name in MEASURES if not name.startswith("curvature"))
+MAP_MEASURES = tuple(name for name in MEASURES if not name.startswith(("curvature", "angle_sum")))
 
 #: What is measured besides.
 COUNTS = (
@@ -46,7 +46,7 @@ COUNTS = (
     "tiles",
     "packing_efficiency",
     "box_efficiency",
-    "angle_error",
+    "angle_sum_error",
 )
 #: Names of all measures, as in the report.
 MEASURED = COUNTS + MAP_MEASURES
@@ -79,7 +79,7 @@ class UVMeasures:
         polygons `corners_without_uv` and `corners_not_finite`; `outside`, triangles that reach out of the unit
         square; `tiles`, unit squares that hold triangles; `packing_efficiency`, what is covered of them;
         `box_efficiency`, the area of all triangles over that of the smallest upright square around them;
-        `angle_error`, the most by which the angles around a point inside a chart miss a full turn, radians.
+        `angle_sum_error`, the most by which the angles around a point inside a chart miss a full turn, radians.
         """
         return {
             # A name that is no text in any encoding must not spoil the file.
@@ -156,7 +156,7 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
         "tiles": tiles,
         "packing_efficiency": float(np.ldexp(cover.once, min(2 * exponent, MOST_EXPONENT))) / tiles,
         "box_efficiency": cover.box_efficiency,
-        "angle_error": angle_error(checked.mesh, unit),
+        "angle_sum_error": angle_sum_error(checked.mesh, unit),
     }
     return UVMeasures(
         mesh=checked.mesh,
@@ -201,7 +201,7 @@ def uv_points(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[FloatArray, In
     return points, fan
 
 
-def angle_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
+def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
     """Return the most by which the angles around a point inside a chart miss 2 pi, radians; 0 if there is none inside.
 
     A triangle that is turned over, or folds that wind around a point twice, make it large.

@@ -113,7 +113,7 @@ def rows_of_measures(found: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         ),
         (
             "angle error",
-            number("angle_error", ".1e"),
+            number("angle_sum_error", ".1e"),
             "radians missing around points inside charts, the most",
         ),
     ]
