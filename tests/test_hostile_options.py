@@ -11,6 +11,7 @@ import shapes
 
 import coneflat
 from coneflat import errors, find_seams
+from coneflat.inputs import as_input
 from coneflat.options import LEAST_QUANTUM
 
 # What no option is.
@@ -137,3 +138,17 @@ def test_the_length_of_up_means_nothing():
     for length in (1e-300, 1e300):
         again = coneflat.flatten(vertices, faces, charts="atlas", up=(0, 0, length), hide_seams=1)
         assert np.array_equal(again.uv, plain.uv)
+
+
+@pytest.mark.parametrize("name", ["face.obj", "stanford-bunny.obj"])
+@pytest.mark.parametrize("size", [51, 701])
+def test_a_number_of_cones_on_a_piece_of_a_scan(name, size):
+    path = shapes.SHARED / name
+    if not path.exists():
+        pytest.skip("the shared meshes are not here")
+    vertices, faces = as_input(path).vertices, np.asarray(as_input(path).faces)[:size]
+    for count in (0, 1, 4):
+        result = coneflat.flatten(vertices, faces, cone_count=count, repair=True)
+        assert np.isfinite(result.uv).all()
+    curve = coneflat.cone_curve(vertices, faces, most=5, repair=True)
+    assert (np.diff(curve.distortions) < 0).all()

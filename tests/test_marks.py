@@ -87,7 +87,7 @@ def test_dihedral_angles():
         ({"seams": [[0.5, 1.0]]}, "pairs of vertices"),
         ({"seams": [[0, 1], [2]]}, "seams: setting an array"),
         ({"creases": np.ones(2)}, "creases must be a number"),
-        ({"hide_seams": np.nan}, "hide_seams must be a number from 0 up"),
+        ({"hide_seams": np.nan}, "hide_seams must be a number from 0 to 10"),
         ({"up": [[1], [1, 2]]}, "up: setting an array"),
         ({"seams": "uv"}, "unknown seams"),
         ({"seams": "input"}, "no UV coordinates"),

@@ -145,9 +145,9 @@ def flatten(
         sharp_angle: edges whose faces' normals differ by more than this are cut, too, radians.
         forbidden_seams: (k, 2) pairs of vertices between which the first cut must not run, not for sharp edges or
             seams of the file either; what is cut later so that nothing overlaps avoids them where it can.
-        creases: how much seams prefer sharp edges, 0 and up: at 1, one of 60 degrees and more costs a tenth of its
+        creases: how much seams prefer sharp edges, 0 to 10: at 1, one of 60 degrees and more costs a tenth of its
             length.
-        hide_seams: how much they prefer what can hardly be seen, 0 and up: at 1, it costs a tenth of its length.
+        hide_seams: how much they prefer what can hardly be seen, 0 to 10: at 1, it costs a tenth of its length.
         seam_weights: (n,) by which seams are dearer at each vertex, or the name of a property, as for `weights`.
         resolution: texels along a side of the texture, for which there are
         padding: texels between charts, and between them and the border, at least.

@@ -38,9 +38,9 @@ def edge_costs(
     Args:
         mesh: the mesh.
         lengths: (e,) of its edges, positive.
-        creases: how much seams prefer sharp edges, 0 and up: at 1, one that bends by 60 degrees and more costs a tenth
+        creases: how much seams prefer sharp edges, 0 to 10: at 1, one that bends by 60 degrees and more costs a tenth
             of its length, at 2 a hundredth.
-        hiding: how much they prefer what is hidden, 0 and up: at 1, what can hardly be seen costs a tenth.
+        hiding: how much they prefer what is hidden, 0 to 10: at 1, what can hardly be seen costs a tenth.
         visibility: (n,) what can be seen of each vertex, 0 to 1; by default what `visible_share` finds.
         vertex_weights: (n,) of the user, 0 and up; an edge gets the mean of its ends.
         edge_weights: (e,) likewise.
