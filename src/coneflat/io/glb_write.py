@@ -10,7 +10,7 @@ from typing import IO, TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from ..errors import MeshFileError
-from .gltf_write import scene_with_uvs
+from .gltf_write import MOST_BYTES, scene_with_uvs
 from .normals import corner_normals, vertex_normals
 from .texture import Texture
 from .uv_split import split_at_seams
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 # Names and numbers of the glTF 2.0 specification.
 _COMPONENTS = {"f4": 5126, "u4": 5125}
 _SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
-_MOST_BYTES = 2**32 - 1
 _MATERIAL: dict[str, Any] = {
     "name": "coneflat",
     "doubleSided": True,
@@ -61,7 +60,7 @@ def write_glb(
     header = _as_text(tree)
     size = sum(map(len, pieces))
     total = 12 + 8 + len(header) + 8 + size
-    if total > _MOST_BYTES:
+    if total > MOST_BYTES:
         raise MeshFileError(
             f"the result takes {total:,} bytes as GLB, which holds 4 GB at most: choose .ply or .npz"
         )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
-from ..errors import ConeflatError
+from ..errors import ConeflatError, MeshFileError
 from ..text import plural
 from .gltf_data import COMPRESSED, GltfData
 from .gltf_names import accessors_named, keys_of, view_owners, views_named
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ..result import Flattening
 
 UV = "TEXCOORD_0"
+MOST_BYTES = 2**32 - 1
 #: What an array of some elements has of the whole one.
 _KEPT = ("componentType", "type", "normalized", "name", "extras")
 #: How files of images that glTF knows begin, and what they are called.
@@ -239,6 +240,10 @@ class _Writing:
     def _append(self, content: bytes) -> int:
         """Return where in the buffer some bytes are now."""
         start = self._length
+        if start + len(content) > MOST_BYTES:
+            raise MeshFileError(
+                f"the scene of {self._data.path} takes more than the 4 GB that a GLB can have: choose .ply or .npz"
+            )
         self.pieces.append(content + bytes(-len(content) % 4))
         self._length += len(self.pieces[-1])
         return start

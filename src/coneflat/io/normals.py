@@ -76,15 +76,17 @@ def _smoothing_groups(source: MeshFile) -> IntArray | None:
     if source.obj is None:
         return None
     known: dict[bytes, int] = {}
-    groups = np.zeros(len(source.offsets) - 1, dtype=np.int64)
-    found = False
+    starts, groups = [0], [0]
     for polygon in sorted(source.obj.gaps):
         names = _SMOOTHING.findall(source.obj.gaps[polygon])
         if names:
             name = names[-1].lower()
-            found = True
-            groups[polygon:] = 0 if name in _FLAT else known.setdefault(name, len(known) + 1)
-    return groups if found and (np.any(groups != groups[0]) or groups[0] == 0) else None
+            starts.append(polygon)
+            groups.append(0 if name in _FLAT else known.setdefault(name, len(known) + 1))
+    of_polygon = np.repeat(groups, np.diff([*starts, len(source.offsets) - 1]))
+    if len(starts) == 1 or (of_polygon[0] > 0 and np.all(of_polygon == of_polygon[0])):
+        return None
+    return of_polygon
 
 
 def _smoothed(result: Flattening, source: MeshFile, groups: IntArray) -> tuple[FloatArray, IntArray]:
