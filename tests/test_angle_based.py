@@ -294,3 +294,27 @@ def test_free_cones_are_an_option():
     assert free.distortion.seam_mismatch > 1e-3 > 1e-9 > held.distortion.seam_mismatch
     with pytest.raises(errors.OptionError, match="unknown method 'lscm/free'"):
         flatten(*mesh, method="lscm/free")
+
+
+def test_angles_that_round_to_nothing_are_wanted_a_little_wider():
+    """A needle whose two sides are equal to the last bit: its angle is 0 as far as numbers go."""
+    vertices, faces = shapes.hill(6, 5)
+    mesh = TriangleMesh(vertices, faces)
+    angles = corner_angles(edge_lengths(vertices, faces))
+    angles[20] = [0.0, np.pi / 2, np.pi / 2]
+    around = np.flatnonzero(~mesh.is_boundary_vertex[faces[20]])
+    assert len(around)
+    wanted = wanted_angles(mesh, angles, np.zeros(len(vertices)))
+    assert (wanted > 0).all()
+    assert wanted[60] < 2e-8
+    conditions = angle_conditions(mesh, np.zeros(len(vertices)))
+    assert np.isfinite(conditions.residual(wanted))
+    assert np.isfinite(linear_angles(conditions, wanted).angles).all()
+
+
+def test_a_cone_of_a_whole_turn_is_refused():
+    vertices, faces = shapes.sphere(1)
+    curvature = np.zeros(len(vertices))
+    curvature[[0, 3]] = 2 * np.pi
+    with pytest.raises(errors.CurvatureError, match="2 cones without an angle: .* one of 0 pi"):
+        wanted_angles(TriangleMesh(vertices, faces), corner_angles(edge_lengths(vertices, faces)), curvature)

@@ -165,10 +165,11 @@ def test_cones_named_twice():
 def test_nonmanifold_is_refused_and_repaired(tmp_path):
     vertices, faces = shapes.sphere(1)
     write_obj(tmp_path / "fin.obj", np.r_[vertices, [[2, 2, 2]]], np.r_[faces, [[0, 12, len(vertices)]]])
-    done = run("flatten", "fin.obj", cwd=tmp_path)
+    done = run("flatten", "fin.obj", "--strict", cwd=tmp_path)
     assert done.returncode == 2
-    assert "1 edge with more than two faces (vertex pairs 0-12); run with --repair" in done.stderr
-    done = run("flatten", "fin.obj", "--repair", cwd=tmp_path)
+    assert "1 edge with more than two faces (vertex pairs 0-12); pass repair=True" in done.stderr
+    assert "leave out --strict" in done.stderr
+    done = run("flatten", "fin.obj", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "Separated the faces at 1 edge" in done.stdout
 

@@ -39,9 +39,9 @@ def test_found_cones_are_those_of_flatten():
     assert found.distortion <= 0.1
 
 
-@pytest.mark.parametrize("most", [0, -3, 2.5, True])
+@pytest.mark.parametrize("most", [0, -3, 2.5, True, "5", np.arange(3), float("nan"), float("inf"), None])
 def test_numbers_that_make_no_sense(most):
-    with pytest.raises(OptionError):
+    with pytest.raises(OptionError, match="a whole number from 1, not"):
         coneflat.cone_curve(*shapes.sphere(2), most=most)
 
 

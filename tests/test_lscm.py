@@ -181,3 +181,13 @@ def test_no_finite_solution_is_refused():
     disk = TriangleMesh(*shapes.grid(2, 2))
     with pytest.raises(errors.MetricError, match="8 triangles"):
         least_squares_conformal(disk, np.full((8, 3), np.nan), np.array([0, 8]))
+
+
+@pytest.mark.parametrize("method", ["lscm", "spectral", "bff", "abf++/free"])
+def test_a_component_without_area_keeps_its_size(method):
+    """A triangle on a line, opened by a hair, beside one that is not: both are there, as long as they were."""
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 5, 0], [1, 5, 0], [0, 6, 0.0]])
+    result = flatten(vertices, [[0, 1, 2], [3, 4, 5]], method=method)
+    lengths = np.linalg.norm(np.diff(result.corner_uv / result.uv_scale, axis=1), axis=2)
+    assert lengths == pytest.approx(np.array([[1, 1], [1, np.sqrt(2)]]), rel=1e-3)
+    assert np.isfinite(result.solve.area_distortion)

@@ -100,4 +100,4 @@ def test_lines_come_a_second_apart_if_it_takes_long(capsys, monkeypatch):
         console.say(["said"])
         for now[0] in (5.0, 5.5):
             console.progress(f"step {now[0]}", now[0] / 6)
-    assert re.findall(r"step (\S+)", capsys.readouterr().err) == ["3.1", "4.3", "5.5"]
+    assert re.findall(r"step (\S+)", capsys.readouterr().err) == ["1.9", "3.1", "4.3", "5.5"]

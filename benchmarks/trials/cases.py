@@ -25,7 +25,7 @@ from .files import make_file
 from .meshes import make_mesh
 from .outcome import LONGEST_MESSAGE, Outcome
 from .promises import check
-from .written import READERS, check_file
+from .written import READERS, check_file, check_report
 
 Random = np.random.Generator
 
@@ -104,7 +104,7 @@ def _flatten(
         with outcome.guarded("writing: "):
             result.save(path)
         if path.exists():
-            check_file(outcome, result, path)
+            check_file(outcome, result.as_written(path.suffix), path)
 
 
 def _file(rng: Random, outcome: Outcome) -> None:
@@ -117,7 +117,7 @@ def _file(rng: Random, outcome: Outcome) -> None:
     repair = bool(rng.random() < 0.7)
     if path.suffix == ".npz":
         result = None
-        with outcome.guarded():
+        with outcome.guarded(expects_nan=True):
             result = coneflat.read_flattening(path)
         if result is not None and "damaged" not in what:
             check(outcome, result, {}, result.vertices, result.faces[np.argsort(result.face_origin)])
@@ -158,10 +158,11 @@ def _file_by_command(rng: Random, outcome: Outcome, path: Path, weld: bool | Non
     line += {None: [], True: ["--weld"], False: ["--no-weld"]}[weld]
     _run(outcome, line)
     report = Path("report.json")
-    if outcome.status == "ok" and report.exists():
-        json.loads(report.read_text(), parse_constant=lambda word: outcome.breach("report: not JSON", word))
-        if not Path(line[3]).exists():
-            outcome.breach("command: nothing written", line)
+    if outcome.status == "ok":
+        told = json.loads(
+            report.read_text(), parse_constant=lambda word: outcome.breach("report: not JSON", word)
+        )
+        check_report(outcome, told, Path(line[3]))
 
 
 def _argument(rng: Random, outcome: Outcome) -> None:

@@ -31,6 +31,8 @@ _HOMES = {
     "CheckedMesh": "validation",
     "measure": "distortion",
     "Distortion": "distortion",
+    "measure_uv": "uvs",
+    "UVMeasures": "uvs",
     "edge_lengths": "geometry",
     "corner_angles": "geometry",
     "cotangents": "geometry",
@@ -72,6 +74,7 @@ __all__ = [
     "MeshFile",
     "PAPER",
     "TriangleMesh",
+    "UVMeasures",
     "__version__",
     "angle_defect",
     "check_mesh",
@@ -98,6 +101,7 @@ __all__ = [
     "least_squares_layout",
     "make_figure",
     "measure",
+    "measure_uv",
     "mollify",
     "pack_together",
     "read_flattening",
@@ -133,6 +137,7 @@ if TYPE_CHECKING:
     from .result import Flattening
     from .sample import sample_path
     from .seams import CutMesh, cut_open, edge_costs, find_seams
+    from .uvs import UVMeasures, measure_uv
     from .validation import CheckedMesh, check_mesh
     from .view import (
         draw_checker,

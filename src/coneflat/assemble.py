@@ -95,7 +95,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
             parted, overlaps = part_touching(uv, corners)
             if len(overlaps.pairs) < distortion.overlapping_pairs:
                 uv = parted
-                distortion = measure(scaled, uv[corners], errors, cones, prescribed)
+                distortion = measure(scaled, uv[corners], errors, cones, prescribed, overlaps)
         rotations = None
         if options.quantum is not None:
             flat = np.split(uv[own], np.cumsum([len(one.corners) for one in laid_out])[:-1])

@@ -81,6 +81,7 @@ def find_cones(
     forbidden_cones: Iterable[int] = (),
     allowed_cones: Iterable[int] | None = None,
     repair: bool = False,
+    strict: bool = False,
     progress: Progress | None = None,
 ) -> FoundCones:
     """Find the cones of the largest component of a mesh, without flattening it.
@@ -101,6 +102,7 @@ def find_cones(
         forbidden_cones=forbidden_cones,
         allowed_cones=allowed_cones,
         repair=repair,
+        strict=strict,
     )
     stages = Stages(progress)
     with one_blas_thread():
@@ -126,14 +128,18 @@ def cone_curve(
     forbidden_cones: Iterable[int] = (),
     allowed_cones: Iterable[int] | None = None,
     repair: bool = False,
+    strict: bool = False,
     progress: Progress | None = None,
 ) -> ConeCurve:
     """Search for the best cones of every number up to `most`, on the largest component of a mesh.
 
     Arguments are those of `coneflat.flatten`, and so are the errors.
     """
-    if isinstance(most, bool) or most != int(most) or most < 1:
-        raise OptionError(f"the largest number of cones must be a whole number from 1, not {most!r}")
+    is_number = isinstance(most, (int, float, np.integer, np.floating)) and not isinstance(most, bool)
+    if not is_number or not float(most).is_integer() or most < 1:
+        raise OptionError(
+            f"the largest number of cones must be a whole number from 1, not {' '.join(repr(most).split())[:80]}"
+        )
     options = Options(
         min_cone_angle=min_cone_angle,
         max_cone_angle=max_cone_angle,
@@ -143,6 +149,7 @@ def cone_curve(
         forbidden_cones=forbidden_cones,
         allowed_cones=allowed_cones,
         repair=repair,
+        strict=strict,
     )
     stages = Stages(progress)
     with one_blas_thread():

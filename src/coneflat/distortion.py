@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from ._arrays import FloatArray, IntArray, dots
-from .atlas.overlap import find_overlaps
+from .atlas.overlap import Overlaps, find_overlaps
 from .mesh import TriangleMesh, end_corners, label_components
 from .threads import meanwhile
 
@@ -92,6 +92,7 @@ def measure(
     curvature_error: tuple[float, float] = (np.nan, np.nan),
     cones: IntArray | None = None,
     prescribed: FloatArray | None = None,
+    overlaps: Overlaps | None = None,
 ) -> Distortion:
     """Measure a UV map.
 
@@ -101,14 +102,16 @@ def measure(
         cones: (s,) vertices at which the rotation between the sides of a seam changes.
         curvature_error: what `curvature_errors` returns for the metric.
         prescribed: (n,) curvature that vertices are to have in the plane, radians; NaN where it is free.
+        overlaps: what `find_overlaps` returns, if that is known.
     """
-    with meanwhile(partial(find_overlaps, corner_uv), len(corner_uv)) as finding:
-        measured = _measure(mesh, corner_uv, curvature_error, cones)
+    find = partial(find_overlaps, corner_uv) if overlaps is None else lambda: overlaps
+    with meanwhile(find, len(corner_uv)) as finding:
+        measured = measure_map(mesh, corner_uv, curvature_error, cones)
         if prescribed is not None:
             error = angle_sum_errors(mesh, corner_uv, prescribed)[0]
             measured = replace(measured, angle_sum_error=float(np.nanmax(np.abs(error), initial=0.0)))
-        overlaps = finding.result()
-    return replace(measured, overlap=overlaps.fraction, overlapping_pairs=len(overlaps.pairs))
+        found = finding.result()
+    return replace(measured, overlap=found.fraction, overlapping_pairs=len(found.pairs))
 
 
 def measure_at_any_size(
@@ -117,11 +120,13 @@ def measure_at_any_size(
     curvature_error: tuple[float, float] = (np.nan, np.nan),
     cones: IntArray | None = None,
     prescribed: FloatArray | None = None,
+    overlaps: Overlaps | None = None,
 ) -> Distortion:
     """Measure a UV map as `measure` does, of a mesh so large or small that squares of its lengths may be no numbers."""
     exponent = -int(np.frexp(np.abs(mesh.vertices[mesh.faces]).max())[1])
     unit = TriangleMesh(np.ldexp(mesh.vertices, exponent), mesh.faces)
-    return measure(unit, corner_uv, curvature_error, cones, prescribed).rescaled(exponent * float(np.log(2)))
+    measured = measure(unit, corner_uv, curvature_error, cones, prescribed, overlaps)
+    return measured.rescaled(exponent * float(np.log(2)))
 
 
 def angle_sum_errors(
@@ -142,13 +147,13 @@ def angle_sum_errors(
     return sums - full + prescribed, change
 
 
-def _measure(
+def measure_map(
     mesh: TriangleMesh,
     corner_uv: FloatArray,
-    curvature_error: tuple[float, float],
-    cones: IntArray | None,
+    curvature_error: tuple[float, float] = (np.nan, np.nan),
+    cones: IntArray | None = None,
 ) -> Distortion:
-    """Return all measures but those of overlaps."""
+    """Return all measures but those of overlaps; arguments are those of `measure`."""
     from .distortion_kernel import measure_triangles
 
     corner_uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
@@ -162,8 +167,9 @@ def _measure(
     mean_scale = _mean(log_scale[valid], weights)
 
     seams, charts, chart = _seams_and_charts(mesh, corner_uv)
-    majority = np.sign(np.bincount(chart, weights=np.where(valid, uv_area, 0), minlength=charts))
-    against = np.where(valid, np.sign(uv_area), 0) * majority[chart] < 0
+    way = np.where(has_uv_area, np.sign(uv_area), 0)
+    majority = np.sign(np.bincount(chart, weights=np.abs(uv_area) * way, minlength=charts))
+    against = way * majority[chart] < 0
     seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
     return Distortion(
         qc=qc,
@@ -258,7 +264,8 @@ def _seam_motion_mismatch(
 
 
 def _mean(values: FloatArray, weights: FloatArray) -> float:
-    return float((values * weights).sum() / weights.sum()) if len(values) else float("nan")
+    total = float(weights.sum())
+    return float((values * weights).sum() / total) if total > 0 else float("nan")
 
 
 def _spread(log_scale: FloatArray, weights: FloatArray) -> float:

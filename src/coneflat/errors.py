@@ -42,6 +42,10 @@ class NonOrientableError(MeshError):
     """The faces cannot be oriented consistently (a Moebius strip, a Klein bottle)."""
 
 
+class MissingUVError(MeshError):
+    """The mesh has no UV coordinates, or none that are finite."""
+
+
 class OptionError(ConeflatError, ValueError):
     """An option has a value that makes no sense."""
 

@@ -41,7 +41,12 @@ class InputMesh:
         """Return (m, 3) what tells apart the UVs that a triangle's corners have in the input; None without UVs."""
         if self.source is None or self.source.texture is None or self.face_corners is None:
             return None
-        return self.source.texture[self.face_corners]
+        texture, uv = self.source.texture, self.source.uv
+        if uv is not None:
+            # Points at the same place are one, though many programs write one for every corner.
+            different = np.unique(uv + 0.0, axis=0, return_inverse=True)[1].reshape(-1)
+            texture = np.where(texture < 0, texture, different[texture])
+        return texture[self.face_corners]
 
 
 def as_input(mesh: Any, faces: ArrayLike | None = None) -> InputMesh:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import FloatArray, IntArray
+from ._arrays import BoolArray, FloatArray, IntArray
 from .assemble import assemble
 from .choose import DEARER, Surface, Turned, choose_cones, is_riddled, pursues
 from .cones import ConeSolution
@@ -247,8 +247,16 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
 def _missed_distortion(laid_out: LaidOut, part: Component, options: Options) -> tuple[str, ...]:
     """Return that the distortion asked for was not reached, if so."""
     reached = laid_out.figures.area_distortion_linear
-    if not pursues(part.mesh, options) or options.cone_count is not None:
+    if not pursues(part.mesh, options):
         return ()
+    if options.cone_count is not None:
+        found = len(laid_out.cones)
+        if found == options.cone_count:
+            return ()
+        return (
+            f"{plural(found, 'cone')} instead of the {options.cone_count:,} asked for: more of them, within the bounds "
+            "given, would gain nothing or have no vertex inside to be at.",
+        )
     if reached <= options.distortion * (1 + NARROWLY):
         return ()
     why = "no better was found within the bounds given"
@@ -371,6 +379,7 @@ def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, option
     choices = ExactChoices(
         scale_at_cones=options.scale_at_cones,
         boundary=boundary,
+        kept=_kept_boundary(mesh, wishes, options),
         # Both sides of a marked seam are to have the same length.
         keep_area=options.boundary_kind != "lengths" and not options.marks_seams,
         best_effort=options.best_effort,
@@ -380,3 +389,12 @@ def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, option
     if options.correct_handles and options.quantum is not None and mesh.genus():
         return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantum)
     return exact_flattening(mesh, lengths, solution, choices)
+
+
+def _kept_boundary(mesh: TriangleMesh, wishes: Wishes, options: Options) -> BoolArray:
+    """Return (n,) the boundary vertices between which lengths stay: on marked seams, so that both sides are equal."""
+    if options.boundary_kind == "lengths":
+        return mesh.is_boundary_vertex
+    if wishes.on_marks is None:
+        return np.zeros(len(mesh.vertices), dtype=bool)
+    return mesh.is_boundary_vertex & wishes.on_marks

@@ -21,7 +21,7 @@ from .graph import MultiGraph
 from .mesh import NEXT, PREVIOUS, TriangleMesh, corner_fans, label_components, sort_by_counting, sort_pairs
 from .text import list_some, plural
 
-REPAIR_ADVICE = "run with --repair (repair=True)"
+REPAIR_ADVICE = "pass repair=True (on the command line: leave out --strict)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,8 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -
         vertices: (n, 3) positions.
         faces: (m, 3) vertex indices, from 0.
         repair: drop faces that use a vertex twice and faces given twice, split non-manifold edges and
-            vertices, cut non-orientable surfaces, instead of refusing them.
+            vertices, cut non-orientable surfaces, instead of refusing them. A mesh that would not be refused is
+            left as it is.
 
     Raises:
         EmptyMeshError, ArrayShapeError, NonFiniteError, FaceIndexError: the arrays are no mesh.
@@ -65,12 +66,20 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -
     points = _as_vertices(vertices)
     triangles = as_faces(faces, len(points))
     require_finite(points, triangles)
-    work = _Check(points, triangles, repair)
-    work.drop_degenerate_faces()
-    work.pair_halfedges()
-    work.orient()
-    work.split_fans()
-    return work.finish()
+    try:
+        return _Check(points, triangles, False).run()
+    except (DegenerateFaceError, NonManifoldError, NonOrientableError):
+        if not repair:
+            raise
+    return _Check(points, triangles, True).run()
+
+
+LEFT_OUT = "Left out "
+
+
+def left_out(count: int) -> str:
+    """Return the note that vertices belong to no face."""
+    return f"{LEFT_OUT}{plural(count, 'vertex', 'vertices')} without a face."
 
 
 def _as_vertices(vertices: ArrayLike) -> FloatArray:
@@ -140,6 +149,14 @@ class _Check:
         self.pairs = np.empty((0, 2), dtype=np.int64)
         self.vertex_origin = np.arange(len(vertices))
         self.notes: list[str] = []
+
+    def run(self) -> CheckedMesh:
+        """Take all steps."""
+        self.drop_degenerate_faces()
+        self.pair_halfedges()
+        self.orient()
+        self.split_fans()
+        return self.finish()
 
     def _keep(self, keep: BoolArray) -> None:
         self.faces = self.faces[keep]
@@ -251,7 +268,7 @@ class _Check:
                 )
             self.notes.append(f"Split {plural(len(split), 'non-manifold vertex', 'non-manifold vertices')}.")
         if isolated:
-            self.notes.append(f"Left out {plural(isolated, 'vertex', 'vertices')} without a face.")
+            self.notes.append(left_out(isolated))
         # Numbered as the input is, the parts of a split vertex one after the other.
         order = sort_by_counting(origin, len(self.vertices))
         rank = np.empty(fans, dtype=np.int64)

@@ -52,6 +52,7 @@ class Wishes:
         is_allowed: (n,) whether a search may put a cone there.
         weights: (n,) importance of each vertex, or None.
         seam_weights: (n,) by which seams are dearer, or None.
+        on_marks: (n,) vertices on seams that are marked, or None.
     """
 
     names: IntArray
@@ -61,6 +62,7 @@ class Wishes:
     is_allowed: BoolArray
     weights: FloatArray | None
     seam_weights: FloatArray | None = None
+    on_marks: BoolArray | None = None
 
     def without(self, vertices: IntArray) -> Wishes:
         """Return wishes that forbid cones at some vertices, too."""
@@ -76,6 +78,12 @@ class Wishes:
                     f"cone {self.names[vertex]} lies on a seam that is marked, which takes what curvature it needs"
                 )
 
+    def with_marks(self, seams: IntArray) -> Wishes:
+        """Return wishes that know the marked seams, given by vertices."""
+        on_marks = np.zeros(len(self.names), dtype=bool)
+        on_marks[seams] = True
+        return replace(self, on_marks=on_marks)
+
     def within(self, component: IntArray) -> Wishes:
         """Return what is said of a component, numbered there; `component` are its vertices, ascending."""
         return Wishes(
@@ -86,6 +94,7 @@ class Wishes:
             self.is_allowed[component],
             _weights_within(self.weights, component),
             _weights_within(self.seam_weights, component),
+            None if self.on_marks is None else self.on_marks[component],
         )
 
 

@@ -12,6 +12,10 @@ from ..mesh import NEXT, sort_pairs
 
 # Crossings of horizontal lines with sides that are sorted at a time, to bound the memory.
 AT_A_TIME = 2_000_000
+# Of these crossings, about a minute: with more the areas are not computed.
+MOST_CROSSINGS = 200_000_000
+# Pixels along a side of the box around all, where areas are counted in pixels.
+RASTER = 2048
 
 
 def covered_twice(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
@@ -20,6 +24,9 @@ def covered_twice(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
     Args:
         corners: (m, 3, 2) of the triangles, counterclockwise or without area.
         pairs: (k, 2) all that overlap.
+
+    Returns:
+        Both NaN where it would take too long, as of long triangles in all directions.
 
     Notes:
         How many triangles cover a point is the winding number of their sides about it, where those that two
@@ -39,6 +46,24 @@ def covered_twice(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
     steps = _outline(corners)
     twice, more = _sweep(corners, steps, _crossings(corners, steps != 0, pairs))
     return twice, total - more
+
+
+def layers_of_raster(corners: FloatArray) -> tuple[float, float]:
+    """Return about the area inside at least two triangles, and that inside at least one, by counting pixels.
+
+    corners: (m, 3, 2) of the triangles, either way around.
+    """
+    from ..geometry.raster_kernel import count_steps
+
+    low = corners.min(axis=(0, 1))
+    size = corners.max(axis=(0, 1)) - low
+    if not size.min() > 0:
+        return 0.0, 0.0
+    steps = np.zeros((RASTER, RASTER + 1), dtype=np.int64)
+    count_steps(np.ascontiguousarray((corners - low) * (RASTER / size)), steps)
+    layers = np.cumsum(steps, axis=1)
+    pixel = float(np.prod(size / RASTER))
+    return int(np.count_nonzero(layers > 1)) * pixel, int(np.count_nonzero(layers)) * pixel
 
 
 def _cross(one: FloatArray, two: FloatArray) -> FloatArray:
@@ -92,6 +117,8 @@ def _sweep(corners: FloatArray, steps: IntArray, crossings: FloatArray) -> tuple
     step, way = np.where(falls, step, -step), high - low
     heights = np.unique(np.concatenate([low[:, 1], high[:, 1], crossings]))
     first, last = np.searchsorted(heights, low[:, 1]), np.searchsorted(heights, high[:, 1])
+    if int((last - first).sum()) > MOST_CROSSINGS:
+        return float("nan"), float("nan")
     twice = more = 0.0
     for begin, stop in _blocks(first, last, len(heights)):
         bottom = np.maximum(first, begin)

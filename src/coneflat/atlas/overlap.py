@@ -25,7 +25,8 @@ class Overlaps:
         pairs: (k, 2) all pairs of triangles whose interiors have a point in common, each with the smaller index
             first, in lexicographic order.
         area: of the points of the plane inside at least two triangles, in squared units of the layout.
-        fraction: the same over the area of the points inside at least one.
+        fraction: the same over the area of the points inside at least one. Both are NaN where they would take too
+            long, as of thousands of long triangles in all directions.
         complete: False if there are more pairs than asked for; then `area` and `fraction` are NaN.
     """
 
@@ -69,7 +70,7 @@ def find_overlaps(
     if not complete:
         return Overlaps(pairs, float("nan"), float("nan"), False)
     twice, once = covered_twice(turned, pairs)
-    return Overlaps(pairs, float(np.ldexp(twice, 2 * exponent)), twice / once if once > 0 else 0.0)
+    return Overlaps(pairs, float(np.ldexp(twice, 2 * exponent)), 0.0 if once <= 0 else twice / once)
 
 
 def _corners(points: ArrayLike, triangles: ArrayLike | None) -> FloatArray:

@@ -8,6 +8,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..geometry.planar import signed_double_areas
+from .overlap import Overlaps, find_overlaps
 from .touch import part_touching
 
 # Of 32-bit numbers below 1: how far apart they are.
@@ -20,8 +21,10 @@ ROUNDS, MOST = 4, 5000
 
 def snap_apart(
     points: FloatArray, corners: IntArray, stored: Callable[[FloatArray], FloatArray]
-) -> FloatArray:
+) -> tuple[FloatArray, Overlaps]:
     """Return points as they are stored, triangles upright and apart where they were and rounding admits it.
+
+    And what overlaps nevertheless.
 
     Args:
         points: (u, 2) of the plane.
@@ -30,12 +33,14 @@ def snap_apart(
     """
     rounded = stored(points)
     if np.array_equal(rounded, points):
-        return points
+        return points, find_overlaps(points, corners)
     upright = signed_double_areas(points[corners]) > 0
     rounded = _turned_back(rounded, corners, upright, stored)
-    parted, _ = part_touching(rounded, corners, stored)
-    lost = signed_double_areas(parted[corners]) <= 0
-    return parted if np.count_nonzero(lost & upright) == 0 else _turned_back(parted, corners, upright, stored)
+    parted, overlaps = part_touching(rounded, corners, stored)
+    if (upright & (signed_double_areas(parted[corners]) <= 0)).any():
+        parted = _turned_back(parted, corners, upright, stored)
+        overlaps = find_overlaps(parted, corners)
+    return parted, overlaps
 
 
 def _turned_back(

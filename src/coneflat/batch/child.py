@@ -18,18 +18,23 @@ COLUMNS = (
 def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     """Flatten a mesh file to a file and return the row of the summary; errors become rows, too."""
     from ..errors import ConeflatError
-    from ..io import read_mesh
+    from ..io.join import read_joined
     from ..io.write import write_measured
     from ..pipeline import flatten
+    from ..requirements import REPORTED, breaches, parse_requirements
 
     start = time.perf_counter()
     row: dict[str, Any] = {"mesh": job["mesh"], "output": job["output"]}
     try:
-        result = flatten(read_mesh(job["mesh"], job["weld"]), **job["options"])
+        source = read_joined(job["mesh"], job["weld"])
+        result = flatten(source.mesh, **job["options"])
         result = write_measured(result, job["output"])
         report = result.report()
-        row |= {"status": "done", "error": ""} | {name: report[name] for name in COLUMNS}
-        row["notes"] = " ".join(report["notes"])
+        unmet = breaches(parse_requirements(job["required"], REPORTED), report)
+        row |= {"status": "failed" if unmet else "done", "error": "; ".join(unmet)} | {
+            name: report[name] for name in COLUMNS
+        }
+        row["notes"] = " ".join(source.notes_of(report["notes"]))
     except ConeflatError as error:
         row |= {"status": "failed", "error": str(error)}
     except MemoryError:

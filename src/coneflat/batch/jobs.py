@@ -22,8 +22,9 @@ class Job:
     Attributes:
         mesh, output: absolute paths.
         options: keyword arguments of `coneflat.flatten`, as JSON has them.
-        weld: merge vertices at the same position; None for the format's default.
-        mark: what changes when the mesh file, the options or the version do.
+        weld: merge vertices at the same position; None for the default, see `coneflat.io.join.read_joined`.
+        mark: what changes when the mesh file, the options or the version do; "" where there is no such file.
+        required: what measures must be, such as "flipped=0"; a mesh that does not meet it has failed.
     """
 
     mesh: str
@@ -31,6 +32,7 @@ class Job:
     options: Mapping[str, Any]
     weld: bool | None
     mark: str
+    required: tuple[str, ...] = ()
 
     def as_json(self) -> str:
         """Return the job as one line."""
@@ -38,7 +40,12 @@ class Job:
 
 
 def find_jobs(
-    patterns: Iterable[str], folder: Path, ending: str, options: Mapping[str, Any], weld: bool | None
+    patterns: Iterable[str],
+    folder: Path,
+    ending: str,
+    options: Mapping[str, Any],
+    weld: bool | None,
+    required: tuple[str, ...] = (),
 ) -> list[Job]:
     """Return a job for each mesh that the patterns name, in the order of their paths.
 
@@ -46,7 +53,7 @@ def find_jobs(
         patterns: files, folders (every mesh in them), or patterns with *, ? and ** for any depth.
         folder: where results go, under the meshes' own names.
         ending: of the results, such as ".obj".
-        options, weld: see `Job`.
+        options, weld, required: see `Job`.
 
     Raises:
         OptionError: a pattern matches nothing, or a result would overwrite a mesh.
@@ -58,7 +65,7 @@ def find_jobs(
             found[os.path.realpath(path)] = None
     meshes = sorted(found)
     jobs = [
-        Job(mesh, str(folder / name), options, weld, _mark(mesh, options, weld))
+        Job(mesh, str(folder / name), options, weld, _mark(mesh, options, weld, required), required)
         for mesh, name in zip(meshes, _names(meshes, ending), strict=True)
     ]
     for job in jobs:
@@ -80,17 +87,31 @@ def _names(meshes: list[str], ending: str) -> list[str]:
             _longer(path, depth) if name.lower() in twice else name
             for path, name in zip(paths, names, strict=True)
         ]
+    # What differs by upper and lower case alone, or runs together, is numbered.
+    taken: set[str] = set()
+    for i, name in enumerate(names):
+        count = 1
+        while names[i].lower() in taken:
+            count += 1
+            names[i] = f"{name}_{count}"
+        taken.add(names[i].lower())
     return [name + ending for name in names]
 
 
 def _longer(path: Path, depth: int) -> str:
     kind = f"{path.stem}_{path.suffix[1:].lower()}"
-    return "_".join([*path.parent.parts[len(path.parent.parts) - depth :], kind]) if depth else kind
+    folders = path.parent.relative_to(path.anchor).parts
+    return "_".join([*folders[max(len(folders) - depth, 0) :], kind])
 
 
-def _mark(mesh: str, options: Mapping[str, Any], weld: bool | None) -> str:
+def _mark(mesh: str, options: Mapping[str, Any], weld: bool | None, required: tuple[str, ...]) -> str:
     from .. import __version__
 
-    about = os.stat(mesh)
-    text = json.dumps([about.st_size, about.st_mtime_ns, dict(options), weld, __version__], sort_keys=True)
+    try:
+        about = os.stat(mesh)
+    except (OSError, ValueError):  # A link that leads nowhere: reading it says so.
+        return ""
+    text = json.dumps(
+        [about.st_size, about.st_mtime_ns, dict(options), weld, required, __version__], sort_keys=True
+    )
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -9,8 +9,9 @@ from typing import Any
 
 import click
 
-from ..text import plural
+from ..text import plural, printable
 from .method import check_combinations, method_keywords, method_options
+from .shared import require_option
 from .talk import talk_options
 
 FAILED = 1
@@ -49,6 +50,7 @@ LONGEST = 3  # meshes that are named
 )
 @click.option("--redo", is_flag=True, help="Flatten again what is done.")
 @method_options
+@require_option
 @talk_options
 @click.pass_context
 def batch(
@@ -63,6 +65,7 @@ def batch(
     dask: str | None,
     redo: bool,
     weld: bool | None,
+    required: tuple[str, ...],
     talk: str | None,
     **method: Any,
 ) -> None:
@@ -79,6 +82,7 @@ def batch(
     from ..batch import find_jobs, run_batch
     from ..io.atomic import make_folder
     from ..options import Options
+    from ..requirements import REPORTED, parse_requirements
     from .console import Console
 
     check_combinations(context)
@@ -87,8 +91,9 @@ def batch(
     options = method_keywords(method, f".{ending}")
     if options.get("weights") is not None and not isinstance(options["weights"], str):
         raise click.UsageError("a file of --weights fits one mesh: name a property, or color", context)
+    parse_requirements(required, REPORTED)
     Options(**options)  # Says what makes no sense before the work.
-    todo = find_jobs(patterns, out.absolute(), f".{ending}", options, weld)
+    todo = find_jobs(patterns, out.absolute(), f".{ending}", options, weld, required)
     make_folder(out)
     rows = []
     with Console(talk) as console:
@@ -96,7 +101,9 @@ def batch(
         def tell(row: dict[str, Any], done: int, count: int) -> None:
             rows.append(row)
             what, *more = _lines(row, console.verbose)
-            console.say([f"{done:>{len(str(count))}}/{count}  {Path(row['mesh']).name}  {what}", *more])
+            console.say(
+                [f"{done:>{len(str(count))}}/{count}  {printable(Path(row['mesh']).name)}  {what}", *more]
+            )
             console.progress(f"{done} of {plural(count, 'mesh', 'meshes')}", done / count)
 
         console.say([f"flattening {plural(len(todo), 'mesh', 'meshes')} into {out}"])
@@ -113,6 +120,7 @@ def batch(
         )
         before = f", {found.skipped:,} of them before" if found.skipped else ""
         failed = f"; {found.failed:,} failed" if found.failed else ""
+        console.say(f"note: {note}" for note in found.notes)
         console.say([f"{len(todo) - found.failed:,} of {len(todo):,} meshes are flattened{before}{failed}"])
         console.say(_slowest(rows, console.elapsed))
         console.finish([summary or out / "summary.csv"])
@@ -123,18 +131,18 @@ def batch(
 def _lines(row: dict[str, Any], verbose: bool) -> Iterator[str]:
     """Yield what became of a mesh; if verbose, also where the result is, and the notes on it."""
     if row["status"] != "done":
-        yield f"failed: {row['error']}"
+        yield f"failed: {printable(row['error'])}"
         return
     counts = f"{plural(row['triangles'], 'triangle')}, {plural(row['cones'], 'cone')}"
     yield f"{counts}, QC {row['qc_mean']:.4f}, {row['seconds']:.1f} s"
     if verbose:
-        yield f"wrote {row['output']}"
+        yield f"wrote {printable(row['output'])}"
         yield from [f"note: {row['notes']}"] * bool(row["notes"])
 
 
 def _slowest(rows: Sequence[dict[str, Any]], elapsed: float) -> Iterator[str]:
     """Yield where the time went, if anything was done."""
-    took = sorted(((row["seconds"] or 0.0, Path(row["mesh"]).name) for row in rows), reverse=True)
+    took = sorted(((row["seconds"] or 0.0, printable(Path(row["mesh"]).name)) for row in rows), reverse=True)
     if took:
         longest = ", ".join(f"{name} {seconds:.1f}" for seconds, name in took[:LONGEST])
         yield f"time {elapsed:.1f} s, {sum(seconds for seconds, _ in took):.1f} s of work; the longest: {longest}"

@@ -9,7 +9,7 @@ import click
 from click.core import ParameterSource
 
 from .search import as_keywords, place_options, search_options
-from .shared import Eye, repair_option, up_option
+from .shared import Eye, checking, input_options, up_option
 from .talk import talk_options
 
 #: What `compare` writes.
@@ -44,7 +44,7 @@ eye_option = click.option(
 @place_options
 @eye_option
 @up_option
-@repair_option
+@input_options
 @talk_options
 @click.pass_context
 def compare(
@@ -58,6 +58,7 @@ def compare(
     eye: Any,
     up: str,
     repair: bool,
+    weld: bool | None,
     talk: str | None,
     **search: Any,
 ) -> None:
@@ -71,7 +72,7 @@ def compare(
     from ..compare.run import compare_methods
     from ..compare.table import comparison_csv, comparison_markdown
     from ..errors import MetricError
-    from ..io import read_mesh
+    from ..io.join import read_joined
     from ..options import METHODS, PAPER
     from .console import Console
     from .run import FLATTENED, READ
@@ -83,7 +84,7 @@ def compare(
     for name in ("eye", "up") if output is None else ():
         if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             raise click.UsageError(f"pictures need a folder: give -o, or leave out --{name}", context)
-    options = {"repair": repair, **(PAPER if paper else as_keywords(search))}
+    options = {**checking(repair), **(PAPER if paper else as_keywords(search))}
     chosen = METHODS if methods is None else tuple(name.strip() for name in methods.split(","))
     if output is not None:
         from ..compare.pictures import Sight, draw_layouts, draw_qualities
@@ -92,17 +93,18 @@ def compare(
         sight = Sight(eye, up)
     with Console(talk) as console:
         with console.stage("read", 0.0):
-            source = read_mesh(mesh)
+            source = read_joined(mesh, weld)
         if output is not None:
             open_folder(output, COMPARED)
         with console.stage("compare", READ):
             found = compare_methods(
-                source,
+                source.mesh,
                 methods=chosen,
                 peers=() if no_peers else None,
                 progress=console.part(READ, FLATTENED),
-                **options,
+                **source.renamed(options),
             )
+        console.say(f"note: {note}" for note in source.notes())
         if not found.drawn:
             why = "; ".join(f"{entry.method}: {entry.note}" for entry in found.entries)
             raise MetricError(f"no method came to a layout: {why}")

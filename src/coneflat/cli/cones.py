@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from ..text import plural
 from .search import as_keywords, place_options, search_options
-from .shared import repair_option
+from .shared import checking, input_options
 from .talk import talk_options
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path),
     help="With --curve: the picture to write.  [default: MESH's name with _cones, as .png]",
 )
-@repair_option
+@input_options
 @talk_options
 @click.pass_context
 def cones(
@@ -52,6 +52,7 @@ def cones(
     most: int,
     picture: Path | None,
     repair: bool,
+    weld: bool | None,
     talk: str | None,
     **search: Any,
 ) -> None:
@@ -63,8 +64,9 @@ def cones(
       coneflat cones horse.ply --curve
     """
     from ..curve import cone_curve, find_cones
-    from ..io import atomic_write, read_mesh
+    from ..io import atomic_write
     from ..io.atomic import check_target
+    from ..io.join import read_joined
     from ..view import check_figure_target, make_figure, new_figure, save_figure
     from .console import Console
     from .run import FLATTENED, READ
@@ -83,12 +85,14 @@ def cones(
         check_target(output)
     if picture is not None:
         check_figure_target(picture)
-    keywords = {**as_keywords(search), "repair": repair}
+    keywords = {**as_keywords(search), **checking(repair)}
     with Console(talk) as console:
         with console.stage("read", 0.0):
-            source = read_mesh(mesh)
+            joined = read_joined(mesh, weld)
+            source, keywords = joined.mesh, joined.renamed(keywords)
         with console.stage("cones", READ):
             chosen = find_cones(source, progress=console.part(READ, 0.5 if curve else FLATTENED), **keywords)
+        console.say(f"note: {note}" for note in joined.notes())
         if curve:
             wanted = keywords.pop("distortion")
             del keywords["cone_count"]

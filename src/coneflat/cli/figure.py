@@ -8,7 +8,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from .shared import Eye, repair_option, up_option
+from .shared import Eye, again_option, input_options, up_option
 from .talk import talk_options
 
 KINDS = ("layout", "checker", "quality", "cones", "curvature", "curve")
@@ -22,6 +22,7 @@ _TAKEN_BY = {
     "cells": ("checker",),
     "color_charts": ("layout",),
     "most": ("curve",),
+    "again": ("layout", "quality", *_VIEWS),
 }
 
 
@@ -65,7 +66,8 @@ _TAKEN_BY = {
 @click.option(
     "--most", type=int, default=30, show_default=True, help="Of the curve: the largest number of cones."
 )
-@repair_option
+@again_option
+@input_options
 @click.option("--title", default="", help="A line above all.")
 @talk_options
 @click.pass_context
@@ -77,11 +79,13 @@ def figure(
     output: Path | None,
     eye: tuple[Any, ...],
     most: int,
+    again: bool,
     repair: bool,
+    weld: bool | None,
     talk: str | None,
     **look: Any,
 ) -> None:
-    """Draw MESH for print: a mesh, which is flattened first with all defaults, or a result of coneflat (.npz).
+    """Draw MESH for print: the UVs that it has, or those of a result (.npz); without any it is flattened first.
 
     \b
     Examples:
@@ -104,23 +108,30 @@ def figure(
         shown: Any
         if kind == "curve":
             with console.stage("read", 0.0):
-                surface = _surface(mesh)
+                surface = _surface(mesh, weld)
             with console.stage("cones", READ):
-                shown = cone_curve(surface, most=most, repair=repair, progress=console.part(READ, FLATTENED))
+                shown = cone_curve(
+                    surface,
+                    most=most,
+                    repair=repair,
+                    strict=not repair,
+                    progress=console.part(READ, FLATTENED),
+                )
         else:
-            shown = open_result(mesh, console, repair=repair)
+            shown = open_result(mesh, console, again=again, repair=repair, weld=weld)
             console.say(f"note: {note}" for note in shown.notes)
         with console.stage("draw", FLATTENED):
             save_figure(make_figure(shown, kind, **look), output)
         console.finish([output])
 
 
-def _surface(file: Path) -> Any:
+def _surface(file: Path, weld: bool | None) -> Any:
     """Return what a search for cones takes: a mesh file as it is, of a result its mesh."""
-    from ..io import read_flattening, read_mesh
+    from ..io import read_flattening
+    from ..io.join import read_joined
 
     if file.suffix.lower() != ".npz":
-        return read_mesh(file)
+        return read_joined(file, weld).mesh
     result = read_flattening(file)
     return result.vertices, result.faces
 

@@ -6,13 +6,18 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from .method import check_combinations, method_keywords, method_options
-from .search import place_options
+from .search import forbidding_options
+from .shared import NOT_MET, numbers_among
 from .talk import talk_options
 
 
-@click.command(short_help="Flatten a mesh and write it with UV coordinates.")
+@click.command(
+    short_help="Flatten a mesh and write it with UV coordinates.",
+    context_settings={"allow_extra_args": True},
+)
 @click.argument("mesh", type=click.Path(path_type=Path))
 @click.option(
     "-o",
@@ -28,7 +33,15 @@ from .talk import talk_options
     help="Of standard output, and without -o: what to write.  [default: obj]",
 )
 @method_options
-@place_options
+@click.option(
+    "--require",
+    "required",
+    metavar="VERTEX|MEASURE=VALUE",
+    multiple=True,
+    help="Make this vertex a cone; or exit with code "
+    f"{NOT_MET} unless measures of the report are so: flipped=0,overlap=0 or qc_mean<=1.05; repeat for more.",
+)
+@forbidding_options
 @click.option(
     "--cone",
     metavar="VERTEX[:CURVATURE]",
@@ -71,6 +84,7 @@ def flatten(
     mesh: Path,
     output: Path | None,
     form: str | None,
+    required: tuple[str, ...],
     cone: tuple[str, ...],
     cones_file: Path | None,
     corner: tuple[str, ...],
@@ -93,9 +107,21 @@ def flatten(
       coneflat flatten sheet.obj -o flat.obj --corner 10 --corner 95 --corner 230 --corner 310
       curl -s https://example.org/part.stl | coneflat flatten - -o - --format glb > part.glb
     """
+    if context.args:
+        raise click.UsageError(
+            f"flatten takes one mesh, and there are {1 + len(context.args)}: `coneflat batch "
+            f"{mesh} {context.args[0]} ... --out FOLDER` flattens many",
+            context,
+        )
+    method["require"], texts = numbers_among(required)
+    if method["require"]:
+        context.set_parameter_source("require", ParameterSource.COMMANDLINE)
+
+    from ..requirements import REPORTED, parse_requirements
     from .given import parse_vertices, read_pairs
     from .run import named_output, run
 
+    requirements = parse_requirements(texts, REPORTED)
     check_combinations(context)
     ending = f".{form or 'obj'}"
     output = named_output(mesh, ending) if output is None else output
@@ -116,4 +142,14 @@ def flatten(
         options["forbidden_seams"] = read_pairs(forbidden_seams)
     if corners:
         options["boundary"] = corners
-    run(mesh, output, options, weld=weld, report=report, texture=texture, talk=talk, ending=ending)
+    run(
+        mesh,
+        output,
+        options,
+        weld=weld,
+        report=report,
+        texture=texture,
+        talk=talk,
+        ending=ending,
+        requirements=requirements,
+    )

@@ -17,6 +17,7 @@ from .cones import cones
 from .demo import demo
 from .figure import figure
 from .flatten import flatten
+from .measure import measure
 from .view import view
 
 USER_ERROR = 2
@@ -32,6 +33,7 @@ def cli() -> None:
 
 cli.add_command(flatten)
 cli.add_command(batch)
+cli.add_command(measure)
 cli.add_command(cones)
 cli.add_command(figure)
 cli.add_command(view)

@@ -9,7 +9,7 @@ import click
 from click.core import ParameterSource
 
 from .search import PURSUIT_OPTIONS, Angle, Direction, as_keywords, search_options
-from .shared import repair_option
+from .shared import checking, input_options
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -136,8 +136,6 @@ _AFTER_SEARCH = (
         help="Seams prefer what can hardly be seen: a tenth of the cost in deep folds and, with --up, below.",
     ),
     click.option("--keep-seams", is_flag=True, help="Cut where the file's own UV coordinates have seams."),
-    repair_option,
-    click.option("--strict", is_flag=True, help="Refuse triangles without area instead of opening them."),
     click.option(
         "--solver",
         type=click.Choice(["auto", "pardiso", "scikit-sparse", "cholespy", "scipy", "amg"]),
@@ -145,16 +143,12 @@ _AFTER_SEARCH = (
         show_default=True,
         help="What solves the linear systems; auto is the fastest installed.  amg iterates, for what fits no other.",
     ),
-    click.option(
-        "--weld/--no-weld",
-        default=None,
-        help="Merge vertices at the same position.  [default: for STL and glTF only]",
-    ),
 )
 
 
 def method_options(command: Command) -> Command:
     """Add the options that do not name vertices of one mesh."""
+    command = input_options(command)
     for option in reversed(_AFTER_SEARCH):
         command = option(command)
     command = search_options(command)
@@ -172,7 +166,7 @@ def method_keywords(params: Mapping[str, Any], ending: str) -> dict[str, Any]:
         OptionError: vertices or weights are not what they should be.
         MeshFileError: a file of them cannot be read.
     """
-    general = {name: params[name] for name in ("repair", "strict", "solver", "charts")}
+    general = {name: params[name] for name in ("solver", "charts")} | checking(params["repair"])
     if general["charts"] is None:
         general["charts"] = "atlas" if ending in TEXTURED and not params["paper"] else "one"
     general |= {name: params[name] for name in ("resolution", "padding", "tiles", "up")}

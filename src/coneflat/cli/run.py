@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from io import BytesIO
@@ -13,16 +13,21 @@ from pathlib import Path
 from typing import IO, Any
 
 from ..errors import OptionError
-from ..io import PIPE, atomic_write, check_output, read_flattening, read_mesh, write_stream
+from ..io import PIPE, atomic_write, check_output, read_flattening, write_stream
 from ..io.atomic import check_target
+from ..io.join import Joined, read_joined
 from ..io.write import write_measured
 from ..io.written import as_written
 from ..pipeline import flatten
+from ..requirements import Requirement
 from ..result import Flattening
 from .console import Console
+from .shared import check_required, checking
 
 READ, FLATTENED = 0.03, 0.92
 """Fractions of the whole that are done when the mesh is read, and when it is flattened, about."""
+
+AGAIN = "--again flattens the mesh anew"
 
 
 def run(
@@ -35,6 +40,7 @@ def run(
     texture: str | None = None,
     talk: str | None = None,
     ending: str = ".obj",
+    requirements: Sequence[Requirement] = (),
 ) -> None:
     """Flatten a mesh file, write the result and its report, and print what came out.
 
@@ -43,23 +49,25 @@ def run(
         output: file to write, "-" for standard output; None for a file in the current folder that is named after the
             input, or standard output for what comes from standard input.
         options: keyword arguments of `coneflat.flatten`.
-        weld: merge vertices at the same position; None for the format's default.
+        weld: merge vertices at the same position; None for the default, see `read_joined`.
         report: JSON file for the measures.
         texture: of a .glb: "checker", or an image file.
         talk: how much to print, see `talk_options`.
         ending: format of what goes to standard output, or of a file without a name.
+        requirements: what measures must be; the files are written in any case.
     """
     output = named_output(mesh, ending) if output is None else output
     # What can fail at the end is looked at before the work.
     check_output(Path(f"stdout{ending}") if output == PIPE else output, texture)
     if report is not None:
         check_target(report)
-    _require_distinct({"input": mesh, "output": output, "report": report})
+    require_distinct({"input": mesh, "output": output, "report": report})
 
     with _kept_apart(output) as stdout, Console(talk) as console:
         result = flatten_file(mesh, console, options, weld)
         result = save(result, console, output, report, texture, stdout, ending)
-        console.finish([path for path in (output, report) if path not in (None, PIPE)], result)
+        console.finish([path for path in (output, report) if path is not None and path != PIPE], result)
+    check_required(requirements, result.report(), str(output))
 
 
 def named_output(mesh: Path, ending: str) -> Path:
@@ -78,12 +86,25 @@ def _kept_apart(output: Path) -> Iterator[IO[bytes] | None]:
         yield stdout
 
 
-def open_result(file: Path, console: Console, **options: Any) -> Flattening:
-    """Return the result that a .npz file holds, or that of a mesh, flattened without overlaps."""
-    if file.suffix.lower() != ".npz":
-        return flatten_file(file, console, {"charts": "atlas", **options})
+def open_result(
+    file: Path, console: Console, *, again: bool = False, repair: bool = True, weld: bool | None = None
+) -> Flattening:
+    """Return the result that a .npz file holds, the UVs of a mesh, or the mesh flattened without overlaps.
+
+    again: flatten a mesh that has UVs, too.
+    """
     with console.stage("read", 0.0):
-        return read_flattening(file)
+        if file.suffix.lower() == ".npz":
+            return read_flattening(file)
+        source = read_joined(file, weld)
+    if not again:
+        from ..view.own import own_flattening
+
+        with console.stage("measure", READ):
+            own = own_flattening(source, strict=not repair)
+        if own is not None:
+            return replace(own, notes=(f"Shown are the UVs that {file.name} has; {AGAIN}.", *own.notes))
+    return flatten_joined(source, console, {"charts": "atlas", **checking(repair)})
 
 
 def flatten_file(
@@ -91,13 +112,15 @@ def flatten_file(
 ) -> Flattening:
     """Return the result of a mesh file, and show how it is made."""
     with console.stage("read", 0.0):
-        source = read_mesh(mesh, weld)
-    result = flatten(source, progress=console.part(READ, FLATTENED), **options)
+        source = read_joined(mesh, weld)
+    return flatten_joined(source, console, options)
+
+
+def flatten_joined(source: Joined, console: Console, options: Mapping[str, Any]) -> Flattening:
+    """Return the result of a mesh that was read, and show how it is made."""
+    result = flatten(source.mesh, progress=console.part(READ, FLATTENED), **source.renamed(options))
     console.seconds.update(result.seconds)
-    if source.welded:
-        note = f"Merged {source.welded:,} vertices at the same positions."
-        result = replace(result, notes=(note, *result.notes))
-    return result
+    return replace(result, notes=source.notes_of(result.notes))
 
 
 def save(
@@ -130,7 +153,7 @@ def save(
     return result
 
 
-def _require_distinct(files: Mapping[str, Path | None]) -> None:
+def require_distinct(files: Mapping[str, Path | None]) -> None:
     """Raise OptionError if two names mean one file, of which one would overwrite the other."""
     seen: dict[str, str] = {}
     for role, path in files.items():

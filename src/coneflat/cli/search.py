@@ -97,14 +97,14 @@ _OPTIONS = (
         "is painted, or a file with a number for each vertex (.txt, .npy).",
     ),
 )
+_REQUIRE = click.option(
+    "--require",
+    metavar="VERTEX",
+    type=int,
+    multiple=True,
+    help="Make this vertex a cone; repeat for more.",
+)
 _PLACES = (
-    click.option(
-        "--require",
-        metavar="VERTEX",
-        type=int,
-        multiple=True,
-        help="Make this vertex a cone; repeat for more.",
-    ),
     click.option(
         "--forbid",
         metavar="VERTICES",
@@ -127,6 +127,11 @@ def search_options(command: Command) -> Command:
 
 def place_options(command: Command) -> Command:
     """Add the options of the pursuit that name vertices of one mesh."""
+    return _REQUIRE(forbidding_options(command))
+
+
+def forbidding_options(command: Command) -> Command:
+    """Add those of them that say where no cones are to be."""
     for option in reversed(_PLACES):
         command = option(command)
     return command

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .shared import up_option
+from .shared import again_option, input_options, up_option
 from .talk import talk_options
 
 
@@ -27,6 +27,8 @@ from .talk import talk_options
     help="What the page shows first.  [default: checker, or picture with --texture]",
 )
 @up_option
+@again_option
+@input_options
 @click.option(
     "--most-triangles",
     type=int,
@@ -41,17 +43,21 @@ def view(
     texture: Path | None,
     show: str | None,
     up: str,
+    again: bool,
+    repair: bool,
+    weld: bool | None,
     most_triangles: int,
     talk: str | None,
 ) -> None:
     """Write a page, one HTML file, that shows FILE and its layout side by side.
 
-    FILE is a result, .npz as `coneflat flatten -o` writes it, or a mesh (.obj, .ply, .stl, .off, .gltf, .glb), which
-    is flattened first with default options, without overlaps.
+    FILE is a result, .npz as `coneflat flatten -o` writes it, or a mesh (.obj, .ply, .stl, .off, .gltf, .glb): the
+    UVs that it has are shown; without, it is flattened first with default options, without overlaps.
 
     \b
     Examples:
       coneflat view horse.ply
+      coneflat view horse_uv.obj --show qc
       coneflat view horse.npz -o horse.html --show qc
       coneflat view hand.obj -o hand.html --texture leather.jpg
     """
@@ -65,7 +71,7 @@ def view(
     if texture is not None:
         read_picture(texture)
     with Console(talk) as console:
-        result = open_result(file, console)
+        result = open_result(file, console, again=again, repair=repair, weld=weld)
         with console.stage("page", FLATTENED):
             text = page_of(
                 result, name=file.name, texture=texture, up=up, show=show, most_triangles=most_triangles

@@ -31,6 +31,8 @@ TABLE_2 = ("model", "method", "QC mean", "of the paper", "ratio", "time, s", "of
 # How their numbers are written.
 FORMS_1 = ("", ",d", "", "d", ".2e", ".2e", ".2f")
 FORMS_2 = ("", "", ".4f", ".3f", ".3f", ".2f", ".3g", ".3f")
+# Inches, of pictures in a row.
+HEIGHT = 2.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +152,8 @@ class Reproduction:
             quality_panels,
             same_scale,
             texture_panel,
+            turned_alike,
+            with_room,
         )
 
         cones = [cone_panel(m.linear, sight, f"{m.name}: {_cones(m.linear)}") for m in self.models]
@@ -158,17 +162,14 @@ class Reproduction:
             shown = model.comparison.drawn
             quantities = same_scale(shown)
             panels = quality_panels(shown, quantities, sight)
-            quality.append(Row(panels, quantities[:1], tallest=2.2))
-            layouts.append(
-                Row(
-                    [
-                        layout_panel(entry.result, f"{model.name}, {entry.method}")
-                        for entry in shown
-                        if entry.result is not None
-                    ],
-                    tallest=2.2,
-                )
+            quality.append(
+                Row([with_room(panel, HEIGHT) for panel in panels], quantities[:1], tallest=HEIGHT)
             )
+            flat = [
+                layout_panel(result, f"{model.name}, {entry.method}")
+                for entry, result in zip(shown, turned_alike(shown), strict=True)
+            ]
+            layouts.append(Row([with_room(panel, HEIGHT) for panel in flat], tallest=HEIGHT))
             linear = [entry for entry in shown if entry.method == "linear"]
             own = same_scale(linear)
             textures.append(

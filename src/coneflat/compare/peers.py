@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
@@ -45,9 +46,11 @@ def run_peer(name: str, base: Flattening) -> tuple[Flattening, float]:
     Raises:
         MetricError: it fails, or what it returns is no map of the mesh.
     """
-    start = time.perf_counter()
+    peer = PEERS[name]
     try:
-        corner_uv = PEERS[name].run(base)
+        import_module(peer.module)
+        start = time.perf_counter()
+        corner_uv = peer.run(base)
     except Exception as error:  # whatever others raise
         raise MetricError(f"{name} failed: {type(error).__name__}: {error}") from error
     seconds = time.perf_counter() - start

@@ -8,10 +8,14 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from .._arrays import FloatArray, IntArray
+from ..geometry.planar import signed_double_areas
+from ..mesh import label_components
 from ..view import draw_checker, draw_cones, draw_layout
 from ..view.camera import Eye, eye_direction, view_aspect
-from ..view.compose import Panel, Row, compose
+from ..view.compose import Panel, Row, compose, text_width
 from ..view.layout import fill_layout, layout_aspect
 from ..view.marks import mark_handles
 from ..view.model import draw_quantity
@@ -65,8 +69,7 @@ def draw_layouts(comparison: Comparison) -> Figure:
         Panel(
             layout_aspect(result, crop=True), partial(_fill, result, quantity), labelled(entry.method, result)
         )
-        for entry, quantity in zip(shown, quantities, strict=True)
-        if (result := entry.result) is not None
+        for entry, quantity, result in zip(shown, quantities, turned_alike(shown), strict=True)
     ]
     return _grid(panels, quantities[:1])
 
@@ -89,6 +92,43 @@ def quality_panels(entries: Sequence[Entry], quantities: Sequence[Quantity], sig
         for entry, quantity in zip(entries, quantities, strict=True)
         if (result := entry.result) is not None
     ]
+
+
+def turned_alike(entries: Sequence[Entry]) -> list[Flattening]:
+    """Return the results of entries, each turned as a whole so that the first one's largest chart lies alike in it.
+
+    Those of other charts stay as they are.
+    """
+    results = [entry.result for entry in entries if entry.result is not None]
+    return [_turned_like(result, results[0]) for result in results]
+
+
+def _turned_like(result: Flattening, model: Flattening) -> Flattening:
+    same = np.array_equal(result.faces, model.faces) and result.distortion.charts == model.distortion.charts
+    if result is model or not same:
+        return result
+    largest = _largest_chart(model)
+    one, other = (_centred(each.corner_uv[largest]) for each in (result, model))
+    product = np.vdot(one, other)
+    if product == 0:
+        return result
+    turned = (result.uv @ np.array([1, 1j])) * (product / abs(product))
+    return replace(result, uv=np.stack([turned.real, turned.imag], axis=1))
+
+
+def _largest_chart(result: Flattening) -> IntArray:
+    """Return the triangles of the chart of most area."""
+    corners = result.uv_faces
+    count, label = label_components(len(result.uv), corners[:, :2].reshape(-1), np.repeat(corners[:, 2], 2))
+    chart = label[corners[:, 0]]
+    areas = np.bincount(chart, np.abs(signed_double_areas(result.corner_uv)), count)
+    return np.flatnonzero(chart == areas.argmax())
+
+
+def _centred(corner_uv: FloatArray) -> NDArray[np.complex128]:
+    """Return the corners of triangles in the plane, as complex numbers around their mean."""
+    corners = (corner_uv @ np.array([1, 1j])).ravel()
+    return np.asarray(corners - corners.mean())
 
 
 def labelled(method: str, result: Flattening) -> str:
@@ -129,7 +169,13 @@ def figure_of(rows: Sequence[Row], *, marks_of: Flattening | None = None) -> Fig
 
 def in_rows(panels: Sequence[Panel], quantities: Sequence[Quantity] = (), count: int = IN_A_ROW) -> list[Row]:
     """Return panels in rows of so many."""
-    return [Row(panels[k : k + count], quantities, tallest=TALLEST) for k in range(0, len(panels), count)]
+    wide = [with_room(panel, TALLEST) for panel in panels]
+    return [Row(wide[k : k + count], quantities, tallest=TALLEST) for k in range(0, len(wide), count)]
+
+
+def with_room(panel: Panel, height: float) -> Panel:
+    """Return a panel that is wide enough for its label, if it is of a height in inches."""
+    return replace(panel, aspect=max(panel.aspect, text_width(panel.label) / height))
 
 
 def _grid(panels: Sequence[Panel], quantities: Sequence[Quantity]) -> Figure:

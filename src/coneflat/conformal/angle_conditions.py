@@ -19,6 +19,9 @@ from ..seams.handles import handle_loops
 from ..solver import Factor, factorize
 from ..text import plural
 
+# Smaller angles, radians, are rounded to 0 in needles; their logs and relative squares are to be finite.
+LEAST_ANGLE = 1e-8
+
 
 @dataclass(frozen=True, eq=False)
 class AngleConditions:
@@ -124,12 +127,19 @@ def wanted_angles(mesh: TriangleMesh, angles: FloatArray, curvature: FloatArray)
         curvature: (n,) radians.
 
     Raises:
-        CurvatureError: a cone has an angle of half a turn and more for each of its triangles.
+        CurvatureError: a cone has an angle of half a turn and more for each of its triangles, or none.
     """
     at = mesh.faces.ravel()
+    angles = np.maximum(angles, LEAST_ANGLE)
     count = np.bincount(at, minlength=len(mesh.vertices))
     total = np.bincount(at, angles.ravel(), len(mesh.vertices))
     wanted = np.where(mesh.is_boundary_vertex, total, 2 * np.pi - curvature)
+    closed = np.flatnonzero(wanted <= LEAST_ANGLE)
+    if len(closed):
+        raise CurvatureError(
+            f"{plural(len(closed), 'cone')} without an angle: no triangles make one of "
+            f"{wanted[closed[0]] / np.pi:.4g} pi; ask for curvatures below 2 pi"
+        )
     crowded = np.flatnonzero(wanted >= np.pi * count)
     if len(crowded):
         worst = crowded[0]

@@ -62,3 +62,25 @@ def fill_nearest(points: FloatArray, faces: IntArray, depth: FloatArray, face: I
                 if z < depth[row, column]:
                     depth[row, column] = z
                     face[row, column] = f
+
+
+@compiled
+def count_steps(corners: FloatArray, steps: IntArray) -> None:
+    """Add to every row where triangles begin, and subtract where they end: sums along rows are numbers of layers.
+
+    corners: (m, 3, 2) pixel x to the right, pixel y downwards. steps: (h, w + 1). A pixel is covered if its centre is.
+    """
+    height, width = steps.shape[0], steps.shape[1] - 1
+    for points in corners:
+        first = first_centre(points[:, 1].min(), height)
+        for row in range(first, first_centre(points[:, 1].max(), height)):
+            left, end = math.inf, -math.inf
+            for p in range(3):
+                x = crossing(points, p, (p + 1) % 3, row + 0.5)
+                if x < left:
+                    left = x
+                if x > end:
+                    end = x
+            if left < end:
+                steps[row, first_centre(left, width)] += 1
+                steps[row, first_centre(end, width)] -= 1

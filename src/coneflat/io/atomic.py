@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import glob
 import os
 import secrets
 import shutil
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 from typing import IO, Any
@@ -100,7 +101,7 @@ def atomic_write(path: str | PathLike[str], mode: str = "wb") -> Iterator[IO[Any
         raise ValueError(f"mode must be 'w' or 'wb', not {mode!r}")
     target = check_target(path)
     # Created by open(), and not by tempfile, so that it has the permissions of any new file.
-    temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
+    temporary = target.with_name(_temporary(target.name, secrets.token_hex(6)))
     text = {} if mode == "wb" else {"encoding": "utf-8", "newline": ""}
     try:
         with open(temporary, mode.replace("w", "x"), **text) as stream:  # type: ignore[call-overload]
@@ -114,6 +115,18 @@ def atomic_write(path: str | PathLike[str], mode: str = "wb") -> Iterator[IO[Any
         raise _failure(as_path(path), error) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _temporary(name: str, mark: str) -> str:
+    return f".{name[:100]}.{mark}.tmp"
+
+
+def remove_unfinished(path: str | PathLike[str]) -> None:
+    """Remove what a process that was killed while it wrote a file has left of it."""
+    target = Path(os.path.realpath(path))
+    for left in target.parent.glob(_temporary(glob.escape(target.name[:100]), "?" * 12)):
+        with suppress(OSError):
+            left.unlink()
 
 
 def _failure(path: Path, error: Exception) -> MeshFileError:

@@ -28,8 +28,10 @@ class MeshFile:
         obj: the text of an OBJ file, from which the output keeps groups, materials and comments.
         properties: what the file says of every vertex besides its position, by name, each (n,): `quality` or
             `red` of a PLY file, say. Colours are 0 to 1.
-        texture: (c,) a number for the UV point that the file gives every corner, if it gives some.
-        uv: (u, 2) the UV points that `texture` numbers, v upwards; None where the reader has none.
+        texture: (c,) a number for the UV point that the file gives every corner, -1 for those that it gives none;
+            None if it gives none at all.
+        uv: (u, 2) the UV points that `texture` numbers, v upwards, not checked: they may be NaN; None where the
+            reader has none.
         normals: (k, 3) the normals that the file gives, of any length, in the directions of its positions.
         normal: (c,) index into `normals` of every corner, -1 where it has none; None where the file has none at all.
         scene: what else there is in a glTF file, which a GLB written keeps.

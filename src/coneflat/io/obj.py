@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .._arrays import FloatArray, IntArray
 from ..errors import EmptyMeshError, FaceIndexError, MeshFileError
 from .growing import Growing
-from .raw import COLOURS, RawMesh, first_bad_corner, offsets_of
+from .raw import COLOURS, NO_UV, RawMesh, first_bad_corner, offsets_of
 from .text import TextBlock, newline_of, text_blocks
 
 _OTHER, _VERTEX, _FACE, _TEXTURE, _NORMAL, _ELEMENT, _COMMENTED_FACE = range(7)
@@ -33,6 +33,8 @@ for _head, _kind in (
     (b"vn", _NORMAL),
 ):
     _KINDS[int.from_bytes(_head, "big")] = _kind
+#: Instead of the number of a UV point that counts back beyond the first.
+_NO_SUCH_UV = -2
 _TEXTURE_INDICES = re.compile(rb"(#[^\r\n]*)|/[-+0-9]*")
 
 
@@ -60,13 +62,13 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
 
     Raises:
         EmptyMeshError: there is no vertex or no face.
-        MeshFileError: a `v` or `f` line is not what it should be.
-        FaceIndexError: a face names vertex 0 or one that does not exist.
+        MeshFileError: a `v`, `vt` or `f` line is not what it should be.
+        FaceIndexError: a face names vertex 0, or a vertex or UV point that does not exist.
     """
     newline = newline_of(content)
     vertices, colours, directions = (Growing(np.float64, 3) for _ in range(3))
     corners, textures, normals, shading, sizes = (Growing(np.int64) for _ in range(5))
-    uv_count = 0
+    uv = Growing(np.float64, 2)
     gaps: defaultdict[int, bytearray] = defaultdict(bytearray)
     for block in text_blocks(path, content, continued=True):
         kinds = _KINDS[block.heads()]
@@ -81,17 +83,19 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
             colours.add(points[:, 3:6])
         sizes.add(counts)
         if texture is not None:
-            beyond = uv_count + np.cumsum(kinds == _TEXTURE)[kinds == _FACE]
-            texture = np.where(texture < 0, np.repeat(beyond, counts) + texture, texture - 1)
-        uv_count += int(np.count_nonzero(kinds == _TEXTURE))
+            beyond = len(uv) + np.cumsum(kinds == _TEXTURE)[kinds == _FACE]
+            counted = np.repeat(beyond, counts) + texture
+            # A number that counts back beyond the first is no sign that there is none.
+            texture = np.where(texture < 0, np.where(counted < 0, _NO_SUCH_UV, counted), texture - 1)
+        uv.add(_uv_points(block, np.flatnonzero(kinds == _TEXTURE)))
         shade = normal
         if normal is not None:
             beyond = len(directions) + np.cumsum(kinds == _NORMAL)[kinds == _FACE]
             shade = np.where(normal < 0, np.repeat(beyond, counts) + normal + 1, normal)
         directions.add(_directions(block, np.flatnonzero(kinds == _NORMAL)))
-        for known, found in ((textures, texture), (normals, normal), (shading, shade)):
+        for known, found, none in ((textures, texture, NO_UV), (normals, normal, 0), (shading, shade, 0)):
             if found is not None:
-                known.add(np.zeros(len(corners) - len(known), np.int64))
+                known.add(np.full(len(corners) - len(known), none))
                 known.add(found)
         # A negative number counts back from the vertices that stand above the face.
         corners.add(np.where(given < 0, np.repeat(above, counts) + given, given - 1))
@@ -99,9 +103,9 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
         raise EmptyMeshError(f"{path} has no vertices")
     if not len(sizes):
         raise EmptyMeshError(f"{path} has no faces")
-    for known in (textures, normals, shading):
+    for known, none in ((textures, NO_UV), (normals, 0), (shading, 0)):
         if len(known):
-            known.add(np.zeros(len(corners) - len(known), np.int64))
+            known.add(np.full(len(corners) - len(known), none))
     has_colours = len(colours) == len(vertices)
     mesh = RawMesh(
         vertices=vertices.done(),
@@ -114,11 +118,26 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
         ),
         properties=dict(zip(COLOURS, colours.done().T, strict=True)) if has_colours else {},
         texture=textures.done() if len(textures) else None,
+        # Some programs number UV points that they do not write.
+        uv=uv.done() if len(textures) and len(uv) else None,
         normals=directions.done(),
         normal=shading.done() - 1 if len(shading) else None,
     )
     _check_corners(path, content, mesh)
     return mesh
+
+
+def _uv_points(block: TextBlock, rows: IntArray) -> FloatArray:
+    """Return (k, 2) the points of `vt` lines; v is 0 where a line has but one number, and a third is left out."""
+    words = block.words(rows, first=1)
+    if len(rows) and words.counts.min() < 1:
+        block.fail(int(rows[np.argmin(words.counts)]), "a UV point needs at least 1 number, but has none")
+    numbers, first = words.floats(), np.cumsum(words.counts) - words.counts
+    points = np.zeros((len(rows), 2))
+    points[:, 0] = numbers[first]
+    has_v = words.counts > 1
+    points[has_v, 1] = numbers[first[has_v] + 1]
+    return points
 
 
 def _faces(
@@ -163,18 +182,30 @@ def _texts(block: TextBlock, kinds: NDArray[np.uint8], newline: bytes) -> Iterat
 
 
 def _check_corners(path: Path, content: bytes, mesh: RawMesh) -> None:
-    """Raise FaceIndexError for the first corner that names no vertex, and say what stands there."""
+    """Raise FaceIndexError for the first corner that names no vertex, or no UV point."""
     c = first_bad_corner(mesh.corners, len(mesh.vertices))
-    if c is None:
+    if c is not None:
+        line, given = _corner_line(path, content, c, 0)
+        known = "OBJ counts from 1" if given == 0 else f"there are {len(mesh.vertices)} vertices"
+        raise FaceIndexError(f"{path}, line {line}: a face names vertex {given}, but {known}")
+    if mesh.texture is None or mesh.uv is None:
         return
+    c = first_bad_corner(np.where(mesh.texture == NO_UV, 0, mesh.texture), len(mesh.uv))
+    if c is not None:
+        line, given = _corner_line(path, content, c, 1)
+        raise FaceIndexError(
+            f"{path}, line {line}: a face names UV point {given}, but there are {len(mesh.uv)} (vt lines)"
+        )
+
+
+def _corner_line(path: Path, content: bytes, c: int, part: int) -> tuple[int, int]:
+    """Return the line in which corner c stands, and the number there of its vertex (part 0) or UV point (part 1)."""
     for block in text_blocks(path, content, continued=True):
         rows = np.flatnonzero(_KINDS[block.heads()] == _FACE)
         words = block.words(rows, first=1)
         if c < words.counts.sum():
-            given = words.corners()[0][c]
+            numbers = words.corners()[part]
             row = int(rows[np.searchsorted(np.cumsum(words.counts), c, side="right")])
-            known = "OBJ counts from 1" if given == 0 else f"there are {len(mesh.vertices)} vertices"
-            raise FaceIndexError(
-                f"{path}, line {block.line_number(row)}: a face names vertex {given}, but {known}"
-            )
+            return block.line_number(row), 0 if numbers is None else int(numbers[c])
         c -= int(words.counts.sum())
+    raise AssertionError("there is no such corner")

@@ -13,7 +13,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..errors import EmptyMeshError, MeshFileError
 from .growing import Growing
-from .raw import COLOURS, RawMesh, offsets_of
+from .raw import COLOURS, NO_UV, RawMesh, offsets_of
 from .text import text_blocks
 
 _TYPES = {
@@ -30,6 +30,9 @@ _STRUCT = {
 }  # fmt: skip
 _NORMAL = ("nx", "ny", "nz")
 _CORNERS = ("vertex_indices", "vertex_index")
+#: What programs call a vertex's UV point, and the list of those of a face's corners: u, v, u, v, ...
+_VERTEX_UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("u0", "v0"))
+_FACE_UV = "texcoord"
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +68,7 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
     vertices: FloatArray | None = None
     properties: dict[str, FloatArray] = {}
     polygons: tuple[IntArray, IntArray] | None = None
+    corner_uv: tuple[IntArray, FloatArray] | None = None
     for element in elements:
         wanted = _wanted(path, element)
         try:
@@ -78,8 +82,8 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
             vertices = np.stack([np.asarray(c, np.float64) for c in columns[:3]], axis=1)
             properties = {name: _shade(name, c) for name, c in zip(names[3:], columns[3:], strict=True)}
         elif element.name == "face":
-            sizes, corners = columns
-            polygons = (sizes.astype(np.int64), _whole(path, corners))
+            polygons = (columns[0].astype(np.int64), _whole(path, columns[1]))
+            corner_uv = _corner_uv(path, polygons[0], *columns[2:]) if columns[2:] else None
         if vertices is not None and polygons is not None:
             break
     if vertices is None or not len(vertices):
@@ -89,7 +93,7 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
     normals = None
     if all(name in properties for name in _NORMAL):
         normals = np.stack([properties[name] for name in _NORMAL], axis=1)
-    return RawMesh(
+    mesh = RawMesh(
         vertices,
         polygons[1],
         offsets_of(polygons[0]),
@@ -97,6 +101,30 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
         normals=normals,
         normal=None if normals is None else polygons[1],
     )
+    if corner_uv is not None and len(corner_uv[1]):
+        return mesh._replace(texture=corner_uv[0], uv=corner_uv[1])
+    for pair in _VERTEX_UV:
+        if all(name in properties for name in pair):
+            return mesh._replace(texture=mesh.corners, uv=np.stack([properties[n] for n in pair], axis=1))
+    return mesh
+
+
+def _corner_uv(path: Path, sizes: IntArray, counts: Column, numbers: Column) -> tuple[IntArray, FloatArray]:
+    """Return (c,) the number of each corner's UV point and (u, 2) the points; a face may have no list.
+
+    Raises:
+        MeshFileError: a face's list has not two numbers for each of its corners.
+    """
+    wrong = (counts != 0) & (counts != 2 * sizes)
+    if wrong.any():
+        face = int(np.argmax(wrong))
+        raise MeshFileError(
+            f"{path}: face {face} has {sizes[face]} corners and {int(counts[face])} numbers in '{_FACE_UV}', which "
+            "needs two for each corner"
+        )
+    has_uv = np.repeat(counts != 0, sizes)
+    texture = np.where(has_uv, np.cumsum(has_uv) - 1, NO_UV)
+    return texture, np.asarray(numbers, np.float64).reshape(-1, 2)
 
 
 def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
@@ -147,9 +175,9 @@ def _wanted(path: Path, element: _Element) -> list[int]:
     if element.name == "face":
         lists = [i for i, p in enumerate(element.properties) if p.count]
         named = [i for i in lists if element.properties[i].name in _CORNERS]
-        if not named and len(lists) != 1:
+        if not named and (len(lists) != 1 or element.properties[lists[0]].name == _FACE_UV):
             raise MeshFileError(f"{path}: its faces have no list 'vertex_indices'")
-        return named[:1] or lists
+        return (named[:1] or lists) + [i for i in lists if element.properties[i].name == _FACE_UV][:1]
     return []
 
 
@@ -228,7 +256,7 @@ def _decode_ragged(
     if rows[-1] > len(content):
         raise _EndOfFile
     places: IntArray = rows[:-1]
-    columns: list[Column] = []
+    columns: dict[int, list[Column]] = {}
     for i, p in enumerate(element.properties):
         size = np.dtype(p.kind).itemsize
         lengths: IntArray = np.ones(element.length, np.int64)
@@ -238,9 +266,9 @@ def _decode_ragged(
         if i in wanted:
             within = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
             items = read(np.repeat(places, lengths) + within * size, p.kind)
-            columns += [lengths, items] if p.count else [items]
+            columns[i] = [lengths, items] if p.count else [items]
         places = places + lengths * size
-    return columns, int(rows[-1])
+    return [column for i in wanted for column in columns[i]], int(rows[-1])
 
 
 def _row_starts(content: bytes, start: int, element: _Element, order: str) -> Iterator[int]:

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 #: Names of the properties that are a vertex's colour.
 COLOURS = ("red", "green", "blue")
 
+#: Instead of the number of a UV point: the corner has none.
+NO_UV = -1
+
 
 #: Stands for standard input, and for standard output.
 PIPE = Path("-")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
+from ..atlas.overlap import Overlaps
 from ..atlas.snap import snap_apart
 from ..distortion import measure_at_any_size
 from ..errors import MeshFileError
@@ -52,12 +53,13 @@ def as_written(result: Flattening, ending: str) -> Flattening:
 
 def _in_single_precision(result: Flattening) -> Flattening:
     """Return the result with 32-bit positions and UVs."""
-    uv = snap_apart(result.uv, result.uv_faces, stored_in_glb)
     keeps_scene = result.source is not None and result.source.scene is not None
     vertices = result.vertices if keeps_scene else _positions_in_glb(result.vertices)
-    if np.array_equal(uv, result.uv) and np.array_equal(vertices, result.vertices):
+    is_stored = np.array_equal(stored_in_glb(result.uv), result.uv)
+    if is_stored and np.array_equal(vertices, result.vertices):
         return result
-    return _measured(result, replace(result, vertices=vertices, uv=uv), SINGLE)
+    uv, overlaps = snap_apart(result.uv, result.uv_faces, stored_in_glb)
+    return _measured(result, replace(result, vertices=vertices, uv=uv), SINGLE, overlaps=overlaps)
 
 
 def _positions_in_glb(vertices: FloatArray) -> FloatArray:
@@ -118,7 +120,11 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
 
 
 def _measured(
-    result: Flattening, changed: Flattening, unit: float, notes: tuple[str, ...] = ()
+    result: Flattening,
+    changed: Flattening,
+    unit: float,
+    notes: tuple[str, ...] = (),
+    overlaps: Overlaps | None = None,
 ) -> Flattening:
     """Return a changed result, measured anew, with the notes that it then has.
 
@@ -127,6 +133,7 @@ def _measured(
         changed: with the measures and notes of that.
         unit: rounding of its coordinates.
         notes: more of them.
+        overlaps: of its triangles, if they are known.
     """
     told = broken_promises(result)
     old = result.distortion
@@ -136,6 +143,7 @@ def _measured(
         (old.curvature_error, old.curvature_error_max),
         changed.cones,
         changed.prescribed,
+        overlaps,
     )
     changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
     kept = tuple(note for note in result.notes if note not in told)

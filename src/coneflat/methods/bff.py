@@ -62,7 +62,7 @@ class BoundaryFirst:
                 f"The boundary closes after its lengths were changed by up to {100 * change:,.1f} %: with those of the "
                 "linear scale factors it does not.",
             )
-        return laid_out_at(points, self.mesh, disk, seams, self.solution, notes=notes)
+        return laid_out_at(points, self.mesh, disk, seams, self.lengths, self.solution, notes=notes)
 
     def _boundary_curve(
         self, disk: TriangleMesh, border: IntArray, inside: HarmonicExtension

@@ -42,7 +42,7 @@ class CutFirst:
                 "of seams come out as they may.",
             )
         points = self.place(disk, self.lengths)
-        return laid_out_at(points, self.mesh, disk, seams, self.solution, notes=notes)
+        return laid_out_at(points, self.mesh, disk, seams, self.lengths, self.solution, notes=notes)
 
 
 def map_cut_mesh(

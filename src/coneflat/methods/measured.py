@@ -6,11 +6,13 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..cones import ConeSolution
+from ..errors import MetricError
 from ..figures import SolveFigures
-from ..geometry import angle_defect, double_areas, edge_lengths
-from ..geometry.planar import signed_angles, signed_double_areas
-from ..mesh import NEXT, PREVIOUS, TriangleMesh
-from .base import LaidOut, all_faces
+from ..geometry import double_areas
+from ..geometry.planar import signed_double_areas
+from ..mesh import TriangleMesh
+from ..text import plural
+from .base import LaidOut, all_faces, laid_out_curvature
 
 # Areas below so much of the mean are taken as so much, where a logarithm is wanted.
 TINY = 1e-12
@@ -21,6 +23,7 @@ def laid_out_at(
     mesh: TriangleMesh,
     disk: TriangleMesh,
     seams: IntArray,
+    lengths: FloatArray,
     solution: ConeSolution,
     figures: SolveFigures | None = None,
     notes: tuple[str, ...] = (),
@@ -32,16 +35,22 @@ def laid_out_at(
         mesh: connected.
         disk: the mesh cut open.
         seams: (k,) the edges along which it was cut.
+        lengths: (m, 3) side lengths, with which every triangle has area.
         solution: the cones and what was asked of them.
         figures, notes: how it was found, and what falls short.
+
+    Raises:
+        MetricError: the layout has no area.
     """
     corners = points[disk.faces]
     doubles = np.abs(signed_double_areas(corners))
-    sides = corners[:, PREVIOUS] - corners[:, NEXT]
-    before = double_areas(edge_lengths(mesh.vertices, mesh.faces))
+    if not doubles.sum() > 0:
+        raise MetricError(
+            f"all {plural(len(corners), 'triangle')} of the layout lie on a line: use method 'exact'"
+        )
+    before = double_areas(lengths)
     factor = float(np.sqrt(before.sum() / doubles.sum()))
-    angles = signed_angles(sides[..., 0] + 1j * sides[..., 1])
-    curvature = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+    curvature = laid_out_curvature(mesh, corners)
     return LaidOut(
         mesh=mesh,
         face_origin=all_faces(mesh),

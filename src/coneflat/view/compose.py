@@ -29,6 +29,10 @@ SCALE_LEFT, SCALE_BELOW = 0.55, 0.42  # for the ticks and labels of a graph
 # Points.
 TITLE_SIZE, LABEL_SIZE, SMALL_SIZE = 10.0, 8.5, 7.5
 TEXT_COLOR = "#333333"
+LETTER = 0.6
+"""Width of a letter over the size of the font, about; the mean of words is less."""
+SAMPLE = 0.45
+"""Inches that stand before a name in the legend."""
 BINS = 36
 
 MOST_PIXELS = 30e6
@@ -88,7 +92,8 @@ def compose(
     least = [max(CARD_HEIGHT * len(row.quantities), 0.3) for row in rows]
     if size is None:
         natural = [min(_room(row, width) / _aspect(row), row.tallest) for row in rows]
-        width -= min(_room(row, width) - h * _aspect(row) for row, h in zip(rows, natural, strict=True))
+        spare = min(_room(row, width) - h * _aspect(row) for row, h in zip(rows, natural, strict=True))
+        width = max(width - spare, _legend_width(marks))
         heights = np.maximum(natural, least).tolist()
         size = width, sum(heights) + fixed
     else:
@@ -100,7 +105,14 @@ def compose(
     from matplotlib import rc_context
 
     _write(
-        figure, MARGIN, size[1] - TITLE / 2 - MARGIN / 2, title, size=TITLE_SIZE, weight="bold", va="center"
+        figure,
+        MARGIN,
+        size[1] - TITLE / 2 - MARGIN / 2,
+        title,
+        room=size[0] - 2 * MARGIN,
+        size=TITLE_SIZE,
+        weight="bold",
+        va="center",
     )
     top = size[1] - MARGIN - TITLE * bool(title)
     with rc_context({"font.size": LABEL_SIZE}):
@@ -138,7 +150,8 @@ def _draw_row(figure: Figure, row: Row, floor: float, height: float) -> None:
     unit = _room(row, width) / _aspect(row)
     left = MARGIN
     for panel in row.panels:
-        _write(figure, left, floor + height + 0.05, panel.label, size=LABEL_SIZE, va="bottom")
+        room = unit * panel.aspect
+        _write(figure, left, floor + height + 0.05, panel.label, room=room, size=LABEL_SIZE, va="bottom")
         x, y = (SCALE_LEFT, SCALE_BELOW) if panel.is_graph else (0.0, 0.0)
         panel.draw(_add_axes(figure, left + x, floor + y, unit * panel.aspect - x, height - y))
         left += unit * panel.aspect + GAP
@@ -153,7 +166,7 @@ def _draw_card(figure: Figure, quantity: Quantity, left: float, floor: float, he
     used = LABEL + TICKS + (len(lines) + 0.7) * LINE
     graph = min(max(height - used, 0.25), 0.7)
     top = floor + min(height, (height + used + graph) / 2)
-    _write(figure, left, top, quantity.label, size=LABEL_SIZE, va="top")
+    _write(figure, left, top, quantity.label, room=CARD - 0.05, size=LABEL_SIZE, va="top")
     draw_histogram(_add_axes(figure, left + 0.05, top - LABEL - graph, CARD - 0.15, graph), quantity)
     for k, (name, percent) in enumerate(lines):
         y = top - LABEL - graph - TICKS - k * LINE
@@ -209,8 +222,24 @@ def _add_axes(figure: Figure, left: float, floor: float, width: float, height: f
     return figure.add_axes((left / wide, floor / tall, width / wide, height / tall))
 
 
-def _write(figure: Figure, x: float, y: float, text: str, **look: Any) -> None:
-    """Write text at a place given in inches."""
+def _write(figure: Figure, x: float, y: float, text: str, room: float | None = None, **look: Any) -> None:
+    """Write text at a place given in inches, smaller where the room, inches, too, is too narrow for it."""
     wide, tall = figure.get_size_inches()
-    if text:
-        figure.text(x / wide, y / tall, text, parse_math=False, **{"ha": "left", "color": TEXT_COLOR, **look})
+    if not text:
+        return
+    written = figure.text(
+        x / wide, y / tall, text, parse_math=False, **{"ha": "left", "color": TEXT_COLOR, **look}
+    )
+    if room is not None:
+        needed = written.get_window_extent().width / figure.dpi
+        written.set_fontsize(float(look["size"]) * min(1.0, room / needed))
+
+
+def text_width(text: str, size: float = LABEL_SIZE) -> float:
+    """Return about how wide a text is, inches; size: of the font, points."""
+    return len(text) * LETTER * size / 72.0
+
+
+def _legend_width(marks: Sequence[Any]) -> float:
+    """Return about how wide a legend of marks is, inches."""
+    return sum(SAMPLE + text_width(str(mark.get_label()), SMALL_SIZE) for mark in marks)

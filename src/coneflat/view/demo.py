@@ -13,6 +13,7 @@ from .compose import Panel, Row, compose
 from .layout import draw_layout, layout_aspect
 from .marks import mark_handles
 from .model import draw_checker, draw_quality
+from .own import is_own
 from .quantity import conformal_distortion
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def title(result: Flattening) -> str:
     measures = result.distortion
     parts = [
         plural(len(result.faces), "triangle"),
-        plural(len(result.cones), "cone"),
+        *([] if is_own(result) else [plural(len(result.cones), "cone")]),
         f"QC mean {measures.qc_mean:.4f}",
         f"{measures.flipped:,} flipped",
         f"seam length {measures.seam_length:.2f} √area",

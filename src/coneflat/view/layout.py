@@ -132,16 +132,27 @@ def frame_layout(axes: Axes, result: Flattening, crop: bool) -> None:
 
 
 def layout_tiles(result: Flattening) -> IntArray:
-    """Return the (k, 2) lower left corners of the unit squares that hold charts: one, or those of several textures."""
-    return np.unique(np.floor(result.corner_uv.mean(axis=1)).astype(np.int64), axis=0)
+    """Return the (k, 2) lower left corners of the unit squares that hold charts: one, or those of several textures.
+
+    A chart may reach out of its square, if others made it.
+    """
+    corners = result.uv_faces
+    ends = corners[:, :2].reshape(-1), np.repeat(corners[:, 2], 2)
+    count, label = label_components(len(result.uv), *ends)
+    chart = label[corners[:, 0]]
+    size = np.maximum(np.bincount(chart, minlength=count), 1)
+    middles = [
+        np.bincount(chart, result.corner_uv[..., k].mean(axis=1), minlength=count) / size for k in (0, 1)
+    ]
+    return np.unique(np.floor(np.stack(middles, axis=1)[chart]).astype(np.int64), axis=0)
 
 
 def layout_box(result: Flattening, crop: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the (2,) lower left and upper right corners of the box around the charts, or around whole tiles."""
+    """Return the (2,) lower left and upper right corners of the box around the charts, or around whole tiles, too."""
     used = result.uv[np.unique(result.uv_faces)]
     if not crop:
         tiles = layout_tiles(result)
-        used = np.concatenate([tiles, tiles + 1]).astype(np.float64)
+        used = np.concatenate([tiles, tiles + 1, used]).astype(np.float64)
     return used.min(axis=0), used.max(axis=0)
 
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from ..checker import CELLS
 from ..io.texture import Texture
-from ..report import as_rows
 from .camera import fit_camera
 from .colours import diverging, sequential
 from .content import Content
 from .demo import title
 from .layout import CHART_COLORS
+from .own import shown_rows
 from .scales import as_plain
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def payload_of(
     head: dict[str, Any] = {
         "name": name,
         "title": title(replace(result, source=None)),
-        "rows": as_rows(result),
+        "rows": shown_rows(result),
         "notes": list(result.notes),
         "triangles": len(result.faces),
         "left_out": content.left_out,

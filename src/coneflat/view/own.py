@@ -1,0 +1,91 @@
+"""UVs that a file has, as a flattening that pages and figures show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import FloatArray
+from ..checker import cell_side
+from ..distortion import seams_of
+from ..errors import MissingUVError
+from ..figures import SolveFigures
+from ..geometry import corner_angles, double_areas, edge_lengths
+from ..io.join import Joined
+from ..mapped import Mapped, has_uv, of_file
+from ..mesh import TriangleMesh
+from ..report import as_rows
+from ..result import Flattening
+from ..uvs import measure_mapped, uv_points
+
+#: The `method` in the settings of what was not made but found in the file.
+OWN = "the file's own UVs"
+#: Rows of a report that say nothing of a map that no search for cones has led to.
+_OF_A_SEARCH = ("cones", "curvature error", "of the metric")
+
+
+def own_flattening(source: Joined, *, strict: bool = False) -> Flattening | None:
+    """Return the UVs that a file has as a flattening; None if no triangle has any.
+
+    Triangles without UVs are left out, with a note, and so is nothing else: what is no manifold is repaired.
+
+    Raises:
+        MeshError: the triangles are no mesh.
+    """
+    if not has_uv(source.mesh):
+        return None
+    try:
+        return flattening_of(of_file(source), strict=strict)
+    except MissingUVError:
+        return None
+
+
+def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
+    """Return a map as a flattening without cones, whose curvature residuals are those of the plane it makes.
+
+    Raises:
+        MissingUVError: no triangle has UVs.
+        MeshError: the triangles are no mesh.
+    """
+    measured = measure_mapped(mapped, strict=strict)
+    mesh = measured.mesh
+    uv, uv_faces = uv_points(mesh, measured.corner_uv)
+    area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
+    return Flattening(
+        vertices=mesh.vertices,
+        faces=mesh.faces,
+        uv=uv,
+        uv_faces=uv_faces,
+        uv_scale=cell_side(uv, uv_faces, 1.0) / float(np.sqrt(area)) if area > 0 else float("nan"),
+        packing_efficiency=measured.counts["packing_efficiency"],
+        cones=np.empty(0, dtype=np.int64),
+        curvatures=np.empty(0),
+        log_scale=np.full(len(mesh.vertices), np.nan),
+        prescribed=np.full(len(mesh.vertices), np.nan),
+        curvature_residual=-_flat_curvature(mesh, uv[uv_faces]),
+        seams=mesh.edges[seams_of(mesh, measured.corner_uv)],
+        distortion=measured.distortion,
+        seconds={},
+        notes=measured.notes,
+        settings={"method": OWN},
+        solve=SolveFigures(),
+        source=mapped.source,
+    )
+
+
+def is_own(result: Flattening) -> bool:
+    """Return whether a flattening is what a file had."""
+    return result.settings.get("method") == OWN
+
+
+def shown_rows(result: Flattening) -> list[tuple[str, str, str]]:
+    """Return the rows of a result's report that say something of it."""
+    return [row for row in as_rows(result) if not (is_own(result) and row[0] in _OF_A_SEARCH)]
+
+
+def _flat_curvature(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
+    """Return (n,) what the angles in the plane around each vertex miss of a full turn, across seams, too, radians."""
+    flat = np.concatenate([corner_uv, np.zeros((*corner_uv.shape[:2], 1))], axis=2).reshape(-1, 3)
+    angles = corner_angles(edge_lengths(flat, np.arange(len(flat)).reshape(-1, 3)))
+    sums = np.bincount(mesh.faces.reshape(-1), np.nan_to_num(angles).reshape(-1), len(mesh.vertices))
+    curvature: FloatArray = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - sums
+    return curvature

@@ -1,0 +1,140 @@
+"""What a user requires of the measures becomes an exit code."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+import shapes
+from click.testing import CliRunner
+
+import coneflat
+from coneflat import errors
+from coneflat.cli.main import cli
+from coneflat.requirements import REPORTED, Requirement, breaches, parse_requirements
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    for name, (vertices, faces) in (("ball", shapes.sphere(1)), ("hill", shapes.hill(6, 5))):
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
+        (tmp_path / f"{name}.obj").write_text("\n".join(lines))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(*words):
+    return CliRunner().invoke(cli, words)
+
+
+class TestForm:
+    @pytest.mark.parametrize(
+        ("text", "relation", "bound"),
+        [("qc_mean=1", "=", 1), ("qc_mean==1", "=", 1), ("qc_mean<=1.05", "<=", 1.05), ("qc_mean >= 1e-3", ">=", 1e-3),
+         ("qc_mean<2", "<", 2), (" qc_mean > -inf ", ">", -math.inf)],
+    )  # fmt: skip
+    def test_relations(self, text, relation, bound):
+        assert parse_requirements([text], ["qc_mean"]) == (Requirement("qc_mean", relation, bound),)
+
+    def test_several(self):
+        found = parse_requirements(["flipped=0,overlap=0", "qc_mean<=2"], REPORTED)
+        assert [str(each) for each in found] == ["flipped=0", "overlap=0", "qc_mean<=2"]
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ("flipped", "'flipped' is no requirement; write flipped=0"),
+            ("", "'' is no requirement"),
+            ("flipped=0,", "'' is no requirement"),
+            ("=3", "'=3' is no requirement"),
+            ("flipped=none", "'none' is not a number"),
+            ("flipped=nan", "'nan' is not a number"),
+            ("beauty=1", "no measure 'beauty': choose from .*area_std, .*flipped, .*overlap, "),
+        ],
+    )
+    def test_what_is_none(self, text, message):
+        with pytest.raises(errors.OptionError, match=message):
+            parse_requirements([text], REPORTED)
+
+    def test_every_number_of_the_report_can_be_required(self):
+        report = coneflat.flatten(*shapes.hill(6, 5)).report()
+        numbers = {name for name, value in report.items() if isinstance(value, (int, float))}
+        assert numbers <= set(REPORTED) <= set(report)
+
+
+class TestMeeting:
+    @pytest.mark.parametrize(
+        ("text", "value", "met"),
+        [("a=0", 0, True), ("a=0", 1, False), ("a<=1", 1.0, True), ("a<1", 1.0, False), ("a>=1", 1.0, True),
+         ("a>1", 1.0, False), ("a<=1", None, False), ("a>=0", math.nan, False)],
+    )  # fmt: skip
+    def test_bounds(self, text, value, met):
+        assert (breaches(parse_requirements([text], ["a"]), {"a": value}) == ()) == met
+
+    def test_an_overlap_that_is_rounded_to_nothing_is_one(self):
+        wanted = parse_requirements(["overlap=0"], REPORTED)
+        assert breaches(wanted, {"overlap": 0.0, "overlapping_pairs": 0}) == ()
+        assert len(breaches(wanted, {"overlap": 0.0, "overlapping_pairs": 2})) == 1
+
+    def test_the_number_is_named(self):
+        wanted = parse_requirements(["flipped=0,qc_mean<=1.05"], REPORTED)
+        assert breaches(wanted, {"flipped": 3, "qc_mean": 1.25}) == (
+            "flipped is 3, and flipped=0 is required",
+            "qc_mean is 1.25, and qc_mean<=1.05 is required",
+        )
+
+
+class TestFlatten:
+    def test_met(self, folder):
+        done = run("flatten", "hill.obj", "-o", "a.obj", "--require", "flipped=0,overlap=0")
+        assert (done.exit_code, done.stderr) == (0, "")
+
+    def test_not_met_is_exit_code_3_and_the_file_is_written(self, folder):
+        done = run("flatten", "hill.obj", "-q", "-o", "a.obj", "--require", "flipped=0,qc_mean<=1,charts>5")
+        assert done.exit_code == 3
+        lines = done.stderr.splitlines()
+        assert [line.split(" is ")[0] for line in lines] == [
+            "coneflat: not met: qc_mean",
+            "coneflat: not met: charts",
+            "coneflat: a.obj",
+        ]
+        assert (folder / "a.obj").exists()
+
+    def test_what_makes_no_sense_is_said_before_the_work(self, folder):
+        done = run("flatten", "hill.obj", "-o", "a.obj", "--require", "beauty=1")
+        assert isinstance(done.exception, errors.OptionError)
+        assert not (folder / "a.obj").exists()
+
+    def test_vertices_and_measures_go_together(self, folder):
+        words = ("--require", "3", "--require", "flipped=0", "--report", "r.json")
+        done = run("flatten", "ball.obj", "-q", "-o", "a.obj", *words)
+        assert done.exit_code == 0
+        assert 3 in json.loads((folder / "r.json").read_text())["cone_vertices"]
+        done = run("flatten", "ball.obj", "--cones", "none", "--require", "3")
+        assert "leave out --require" in str(done.output)
+        assert run("flatten", "hill.obj", "-q", "--cones", "none", "--require", "flipped=0").exit_code == 0
+
+
+def test_measure(folder):
+    coneflat.flatten("ball.obj", charts="atlas").save("a.obj")
+    assert run("measure", "a.obj", "--require", "flipped=0,overlap=0,corners_without_uv=0").exit_code == 0
+    done = run("measure", "a.obj", "-q", "--require", "packing_efficiency>=1")
+    assert done.exit_code == 3
+    assert done.stderr.startswith("coneflat: not met: packing_efficiency is 0.")
+    assert done.stderr.count("\n") == 1
+
+
+def test_batch_counts_what_is_not_met_as_failed(folder):
+    done = run("batch", "ball.obj", "hill.obj", "--out", "flat", "--jobs", "1", "--require", "triangles=60")
+    assert done.exit_code == 1
+    with open("flat/summary.csv", newline="") as file:
+        rows = {row["mesh"][-8:]: row for row in csv.DictReader(file)}
+    assert rows["hill.obj"]["status"] == "done"
+    assert rows["ball.obj"]["status"] == "failed"
+    assert "triangles is 80" in rows["ball.obj"]["error"]
+    assert (folder / "flat" / "ball.obj").exists()
+    assert np.isfinite(float(rows["ball.obj"]["qc_mean"]))
