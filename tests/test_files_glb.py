@@ -12,6 +12,7 @@ from shapes import join, sphere
 
 import coneflat
 from coneflat.io import read_mesh, read_mesh_from
+from coneflat.io.join import read_joined
 
 trimesh = pytest.importorskip("trimesh")
 
