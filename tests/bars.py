@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
+from coneflat.distortion import measure
 from coneflat.io import read_mesh, triangulate
+from coneflat.mesh import TriangleMesh
+from coneflat.result import Flattening
 
 OBJ = b"""\
 # a bar of two cells \xe9
@@ -38,23 +39,27 @@ POINTS = np.array(
 
 
 def flattening(vertices, faces, uv, uv_faces, source=None, face_corners=None, origin=None):
-    return SimpleNamespace(
-        vertices=np.asarray(vertices, dtype=float),
-        faces=np.asarray(faces),
-        uv=np.asarray(uv, dtype=float),
-        uv_faces=np.asarray(uv_faces),
+    vertices, faces = np.asarray(vertices, dtype=float), np.asarray(faces)
+    uv, uv_faces = np.asarray(uv, dtype=float), np.asarray(uv_faces)
+    return Flattening(
+        vertices=vertices,
+        faces=faces,
+        uv=uv,
+        uv_faces=uv_faces,
         uv_scale=0.25,
         cones=np.array([1]),
         curvatures=np.array([np.pi / 2]),
         log_scale=np.linspace(0, 1, len(vertices)),
+        prescribed=np.full(len(vertices), np.nan),
         curvature_residual=np.zeros(len(vertices)),
         seams=np.array([[1, 4]]),
+        packing_efficiency=0.5,
+        distortion=measure(TriangleMesh(vertices, faces), uv[uv_faces]),
+        seconds={"check": 0.0},
+        notes=("größer",),
         vertex_origin=np.arange(len(vertices)) if origin is None else np.asarray(origin),
-        face_origin=None,
         face_corners=face_corners,
-        distortion=SimpleNamespace(qc=np.ones(len(faces)), log_area_scale=np.zeros(len(faces))),
         source=source,
-        report=lambda: {"faces": len(faces), "note": "größer"},
     )
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import os
 import signal
+import socket
+import sys
 import threading
 import time
 
@@ -21,7 +24,7 @@ from coneflat.cli.main import cli
 def write_obj(path, mesh):
     vertices, faces = mesh
     lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a} {b} {c}" for a, b, c in faces + 1]
-    path.parent.mkdir(exist_ok=True)
+    path.parent.mkdir(exist_ok=True, parents=True)
     path.write_text("\n".join(lines))
 
 
@@ -108,7 +111,7 @@ def test_a_process_that_dies_is_replaced(models, tmp_path):
         killer.start()
         row = child.flatten(jobs[0], None)
         assert row["status"] == "failed"
-        assert "ended with code" in row["error"]
+        assert "was ended by SIGKILL" in row["error"]
         assert child.flatten(jobs[0], None)["status"] == "done"
     finally:
         child.end()
@@ -191,7 +194,7 @@ def test_a_cluster_does_the_same_even_if_it_loses_a_worker(models, tmp_path, mon
 
 def test_no_cluster_answers(models, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("coneflat.batch.cluster.PATIENCE", "1s")
+    monkeypatch.setattr("coneflat.batch.cluster.PATIENCE", 1.0)
     with pytest.raises(errors.OptionError, match="no Dask scheduler"):
         run_batch(find_jobs([str(models)], tmp_path, ".obj", {}, None), tmp_path, dask="tcp://127.0.0.1:9")
 
@@ -225,3 +228,160 @@ def test_a_folder_that_cannot_be_read(models, tmp_path, monkeypatch):
     monkeypatch.setattr(os, "listdir", refuse)
     with pytest.raises(errors.MeshFileError, match="cannot be read: Permission denied"):
         find_jobs([str(models)], tmp_path, ".obj", {}, None)
+
+
+def test_a_link_that_leads_nowhere_is_one_failed_mesh(models, tmp_path):
+    (models / "dangling.obj").symlink_to("nowhere.obj")
+    (models / "loop.obj").symlink_to("loop.obj")
+    out = tmp_path / "out"
+    result = invoke("batch", models, "--out", out)
+    assert result.exit_code == 1
+    assert "2 of 5 meshes are flattened; 3 failed" in result.output
+    rows = rows_of(out / "summary.csv")
+    assert "there is no such file" in rows["nowhere.obj"]["error"]
+    assert "symbolic links" in rows["loop.obj"]["error"]
+
+
+def test_a_mesh_that_vanishes_meanwhile_is_one_failed_mesh(models, tmp_path):
+    jobs = find_jobs([str(models)], tmp_path, ".obj", {}, None)
+    (models / "hill.obj").unlink()
+    found = run_batch(jobs, tmp_path, processes=1)
+    assert {os.path.basename(row["mesh"]): row["status"] for row in found.rows} == {
+        "ball.obj": "done",
+        "hill.obj": "failed",
+        "broken.obj": "failed",
+    }
+
+
+@pytest.mark.skipif(os.name != "posix" or sys.platform == "darwin", reason="names are Unicode there")
+@pytest.mark.parametrize("summary", ["all.csv", "all.parquet"])
+def test_a_name_that_is_no_text_has_a_result_and_a_row(models, tmp_path, summary):
+    if summary.endswith("parquet"):
+        pytest.importorskip("pyarrow.parquet")
+    os.rename(models / "ball.obj", os.fsencode(models) + b"/ball\xff.obj")
+    out = tmp_path / "out"
+    result = invoke("batch", models, "--out", out, "--summary", tmp_path / summary, "-v")
+    assert "2 of 3 meshes are flattened; 1 failed" in result.output
+    assert r"ball\udcff.obj" in result.output
+    assert (tmp_path / summary).exists()
+    assert os.path.getsize(os.fsencode(out) + b"/ball\xff.obj") > 1000
+    assert "2 of them before" in invoke("batch", models, "--out", out, "--summary", tmp_path / summary).output
+
+
+def test_broken_lines_of_the_journal_are_left_out_and_named(models, tmp_path):
+    out = tmp_path / "out"
+    invoke("batch", models / "ball.obj", "--out", out)
+    with (out / "batch.jsonl").open("ab") as file:
+        file.write(b'\xff\xfe\x00\n[]\n{"output": []}\n' + b"[" * 100_000 + b'\n{"mesh": "hal')
+    result = invoke("batch", models / "ball.obj", models / "hill.obj", "--out", out)
+    assert "Left out 5 broken lines of the journal" in result.output
+    assert "2 of 2 meshes are flattened, 1 of them before" in result.output
+    # What is written after a line that was cut off is whole.
+    assert (
+        "2 of them before" in invoke("batch", models / "ball.obj", models / "hill.obj", "--out", out).output
+    )
+
+
+def test_limits_of_time_that_are_none(models, tmp_path):
+    for limit in ("inf", "1e300"):
+        result = invoke(
+            "batch", models / "ball.obj", "--out", tmp_path / "out", "--redo", "--time-limit", limit
+        )
+        assert "1 of 1 meshes are flattened" in result.output
+    jobs = find_jobs([str(models)], tmp_path, ".obj", {}, None)
+    for limit in (float("nan"), -1.0, 0.0, -float("inf")):
+        with pytest.raises(errors.OptionError, match="the time limit must be positive"):
+            run_batch(jobs, tmp_path, limit=limit)
+
+
+@pytest.mark.parametrize("talks", [False, True])
+def test_what_listens_but_is_no_scheduler_is_given_up_soon(models, tmp_path, talks, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("coneflat.batch.cluster.PATIENCE", 1.0)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer():
+            with contextlib.suppress(OSError):
+                server.accept()[0].sendall(b"HTTP/1.0 400 Bad Request\r\n\r\n")
+
+        if talks:
+            threading.Thread(target=answer, daemon=True).start()
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(errors.OptionError, match="no Dask scheduler answers") as caught:
+            run_batch(find_jobs([str(models)], tmp_path, ".obj", {}, None), tmp_path, dask=address)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("address", ["", "nonsense://x", "tcp://127.0.0.1:99999"])
+def test_addresses_that_are_none(models, tmp_path, address, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("coneflat.batch.cluster.PATIENCE", 1.0)
+    with pytest.raises(errors.OptionError, match="no Dask scheduler answers"):
+        run_batch(find_jobs([str(models)], tmp_path, ".obj", {}, None), tmp_path, dask=address)
+
+
+def test_what_cannot_be_written_is_said_before_the_work(models, tmp_path):
+    jobs = find_jobs([str(models)], tmp_path, ".obj", {}, None)
+    (tmp_path / "file").write_text("")
+    (tmp_path / "journal" / "batch.jsonl").mkdir(parents=True)
+
+    def listener(row, done, count):
+        raise AssertionError("work was done")
+
+    for folder, summary in (
+        (tmp_path / "file" / "out", None),
+        (tmp_path / "journal", None),
+        (tmp_path, tmp_path / "missing" / "summary.csv"),
+        (tmp_path, tmp_path / "file" / "summary.csv"),
+    ):
+        with pytest.raises(errors.MeshFileError, match=r"cannot (be written|make the folder)"):
+            run_batch(jobs, folder, summary=summary, listener=listener)
+
+
+def test_every_result_has_a_name_of_its_own_in_the_folder(tmp_path):
+    names = ["a/ball.obj", "a/ball.OBJ", "a/Ball.obj", "b/ball.obj", "ball.ply", "ball_ply.obj", "a_ball.obj"]
+    for name in names:
+        write_obj(tmp_path / "models" / name, shapes.tetrahedron())
+    jobs = find_jobs([str(tmp_path / "models" / "**")], tmp_path / "out", ".obj", {}, None)
+    results = {job.output.lower() for job in jobs}
+    assert len(results) == len({job.mesh for job in jobs})
+    assert {os.path.dirname(job.output) for job in jobs} == {str(tmp_path / "out")}
+
+
+@pytest.mark.parametrize("what", [b"", b"no JSON\n", b'{"half": '])
+def test_a_worker_that_crashes_fails_its_mesh_alone_and_leaves_nothing_half_written(
+    models, tmp_path, monkeypatch, what
+):
+    """The process for ball.obj begins to write, says something, and kills itself."""
+    monkeypatch.setattr("coneflat.batch.process.COMMAND", [sys.executable, "-c", CRASHING, what.decode()])
+    jobs = find_jobs([str(models / "ball.obj"), str(models / "hill.obj")], tmp_path, ".obj", {}, None)
+    found = run_batch(jobs, tmp_path, processes=1)
+    assert [row["status"] for row in found.rows] == ["failed", "done"]
+    assert "SIGKILL" in found.rows[0]["error"]
+    assert not list(tmp_path.glob(".*.tmp"))
+    assert not (tmp_path / "ball.obj").exists()
+
+
+CRASHING = """
+import json, os, signal, sys
+from coneflat.batch import child
+from coneflat.io import atomic_write
+job = json.loads(sys.stdin.readline())
+if job["mesh"].endswith("ball.obj"):
+    with atomic_write(job["output"]) as file:
+        file.write(b"half")
+        file.flush()
+        os.write(1, sys.argv[1].encode())
+        os.kill(os.getpid(), signal.SIGKILL)
+os.write(1, (json.dumps(child.flatten_file(job)) + chr(10)).encode())
+"""
+
+
+def test_a_process_that_cannot_be_started_fails_its_mesh(models, tmp_path, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(12, "Cannot allocate memory")
+
+    monkeypatch.setattr("coneflat.batch.process.subprocess.Popen", refuse)
+    found = run_batch(find_jobs([str(models)], tmp_path, ".obj", {}, None), tmp_path)
+    assert found.failed == 3
+    assert all("Cannot allocate memory" in row["error"] for row in found.rows)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 
+import numpy as np
 import pytest
+import shapes
 from bars import cut_bar, read_bar
 
+import coneflat
 from coneflat.errors import MeshFileError, UnknownFormatError
 from coneflat.io import OUTPUT_FORMATS, atomic_write, check_output, write_flattening
+from coneflat.view.picture import read_picture
 
 
 @pytest.fixture
@@ -99,3 +103,17 @@ class TestTargets:
         assert target.stat().st_mode & 0o777 == 0o640
         with pytest.raises(MeshFileError, match="not an ordinary file"), atomic_write("/dev/null"):
             pass
+
+
+@pytest.mark.parametrize("name", [None, 3, 2.5, object(), ["a.obj"], np.zeros(3), {"a": 1}])
+def test_what_is_no_path_is_refused_by_name(name):
+    result = coneflat.flatten(*shapes.hill(4, 4))
+    for call in (coneflat.read_mesh, coneflat.read_flattening, result.save, read_picture):
+        with pytest.raises(MeshFileError, match=f"not by {type(name).__name__}"):
+            call(name)
+
+
+def test_a_path_may_be_bytes(tmp_path):
+    path = coneflat.flatten(*shapes.hill(4, 4)).save(os.fsencode(tmp_path / "hill.npz"))
+    assert path == tmp_path / "hill.npz"
+    assert len(coneflat.read_flattening(os.fsencode(path)).faces) == 32

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import struct
 import sys
+from dataclasses import replace
 from io import BytesIO
 
 import numpy as np
@@ -54,7 +55,7 @@ class TestObj:
 
     def test_round_trip_is_exact(self, bar, tmp_path):
         result = cut_bar(bar)
-        result.uv = np.random.default_rng(1).random((9, 2)) ** 20
+        result = replace(result, uv=np.random.default_rng(1).random((9, 2)) ** 20)
         out = write_flattening(result, tmp_path / "out.obj")
         again = read_mesh(out)
         assert again.vertices.tobytes() == POINTS.tobytes() == bar.vertices.tobytes()
@@ -181,25 +182,27 @@ def embedded_image(path, tree):
 class TestSplitFormats:
     def test_ply_round_trip(self, bar, tmp_path):
         result = cut_bar(bar)
-        result.uv = np.random.default_rng(1).random((9, 2))
-        result.vertex_origin = np.arange(7) + 10
+        uv = np.random.default_rng(1).random((9, 2))
+        result = replace(result, uv=uv, vertex_origin=np.arange(7) + 10)
         out = write_flattening(result, tmp_path / "out.ply")
         mesh = read_mesh(out)
-        # Vertex 6 has no face, vertices 1 and 4 lie on the seam.
-        assert len(mesh.vertices) == 8
+        # Vertex 6 has no face, vertices 1 and 4 lie on the seam, and at 2 and 5 one face has a normal, the other none.
+        assert len(mesh.vertices) == 10
         triangles = mesh.corners.reshape(-1, 3)
         assert mesh.vertices[triangles].tobytes() == result.vertices[result.faces].tobytes()
         header, _, body = out.read_bytes().partition(b"end_header\n")
         properties = [line.split()[-1] for line in header.splitlines() if line.startswith(b"property")]
-        assert properties == [b"x", b"y", b"z", b"s", b"t", b"source_vertex", b"vertex_indices"]
-        rows = np.frombuffer(body, [("xyz", "<f8", 3), ("uv", "<f8", 2), ("source", "<i4")], 8)
+        assert properties == b"x y z nx ny nz s t source_vertex vertex_indices".split()
+        kind = [("xyz", "<f8", 3), ("normal", "<f8", 3), ("uv", "<f8", 2), ("source", "<i4")]
+        rows = np.frombuffer(body, kind, len(mesh.vertices))
         assert rows["uv"][triangles].tobytes() == result.uv[result.uv_faces].tobytes()
         np.testing.assert_array_equal(rows["source"][triangles], result.faces + 10)
+        np.testing.assert_array_equal(rows["normal"][triangles][:3], np.tile([0.0, 0, 1], (3, 3, 1)))
 
     def test_glb_by_the_specification(self, bar, tmp_path):
         result = cut_bar(bar)
-        result.uv = np.random.default_rng(1).random((9, 2))
-        result.vertex_origin = np.arange(7) + 10
+        uv = np.random.default_rng(1).random((9, 2))
+        result = replace(result, uv=uv, vertex_origin=np.arange(7) + 10)
         out = write_flattening(result, tmp_path / "out.glb")
         tree, accessor = glb_parts(out)
         (primitive,) = tree["meshes"][0]["primitives"]
@@ -207,8 +210,9 @@ class TestSplitFormats:
         attributes = {name: accessor(i)[triangles] for name, i in primitive["attributes"].items()}
         np.testing.assert_array_equal(attributes["POSITION"], result.vertices[result.faces].astype("f4"))
         # glTF counts v from the top of the image.
-        expected = result.uv[result.uv_faces] * [1, -1] + [0, 1]
-        np.testing.assert_array_equal(attributes["TEXCOORD_0"], expected.astype("f4"))
+        expected = result.as_written(".glb").corner_uv * [1, -1] + [0, 1]
+        np.testing.assert_array_equal(attributes["TEXCOORD_0"], expected)
+        np.testing.assert_allclose(expected, result.corner_uv * [1, -1] + [0, 1], rtol=0, atol=2.0**-24)
         np.testing.assert_array_equal(attributes["_SOURCE_VERTEX"][..., 0], result.faces + 10)
         np.testing.assert_allclose(np.linalg.norm(attributes["NORMAL"], axis=-1), 1, rtol=1e-6)
         assert (attributes["NORMAL"][..., 2] > 0).all()
@@ -282,6 +286,7 @@ class TestSplitFormats:
             "cones",
             "curvatures",
             "log_scale",
+            "prescribed",
             "curvature_residual",
             "seams",
         ]

@@ -204,8 +204,8 @@ class TestCosts:
     @pytest.mark.parametrize(
         ("wishes", "message"),
         [
-            ({"creases": -1}, "creases must be a number from 0 up, not -1"),
-            ({"hiding": np.inf}, "hiding must be a number from 0 up, not inf"),
+            ({"creases": -1}, "creases must be a number from 0 to 10, not -1"),
+            ({"hiding": np.inf}, "hiding must be a number from 0 to 10, not inf"),
             (
                 {"vertex_weights": np.ones(3)},
                 r"vertex weights of seams must be 162 numbers, not of shape \(3,\)",

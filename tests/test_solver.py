@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapes
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, diags
 
 from coneflat import errors, flatten
 from coneflat.cli.main import cli
@@ -64,6 +64,15 @@ def test_indefinite_matrices_are_solved_with_pivots(name, matrix):
     with solving(name):
         solution = factorize(csc_matrix(changed)).solve(right)
     assert solution == pytest.approx(np.linalg.solve(changed.toarray(), right), abs=1e-8)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_matrices_without_a_positive_diagonal_print_nothing(name, matrix, capfd):
+    matrix = matrix - 2 * diags(matrix.diagonal() * (np.arange(matrix.shape[0]) == 7))
+    with solving(name):
+        solution = factorize(csc_matrix(matrix)).solve(np.ones(matrix.shape[0]))
+    assert matrix @ solution == pytest.approx(np.ones(matrix.shape[0]), abs=1e-6)
+    assert capfd.readouterr().out == ""
 
 
 @pytest.mark.parametrize("name", SOLVERS)

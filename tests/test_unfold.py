@@ -10,9 +10,10 @@ from coneflat import TriangleMesh, cut_open, find_seams
 from coneflat.conformal.exact import exact_metric
 from coneflat.geometry import edge_lengths
 from coneflat.geometry.intrinsic import halfedge_twins
+from coneflat.layout.patches import DEGENERATE, heights
 from coneflat.layout.straighten import FlatTriangles, straight_triangles
 from coneflat.layout.unfold import unfold
-from coneflat.layout.untangle import DEGENERATE, heights, untangle
+from coneflat.layout.untangle import untangle
 
 
 def flat_surface(shape, cones, seed=0):
@@ -40,6 +41,18 @@ def planar(points, faces):
 def side_vectors(uv, corners):
     points = (uv[:, 0] + 1j * uv[:, 1])[corners]
     return points[:, [2, 0, 1]] - points[:, [1, 2, 0]]
+
+
+def turns(mesh):
+    """The angle around each vertex that turns by a full or a half turn: none has curvature."""
+    return np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
+
+
+def angles_around(flat, mesh):
+    """The angle around each vertex of flat triangles, none of them inverted."""
+    sides = flat.sides.reshape(-1, 3)
+    angles = np.abs(np.angle(-sides[:, [1, 2, 0]] / sides[:, [2, 0, 1]]))
+    return np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
 
 
 def seam_mismatch(flat, cut, uv, corners):
@@ -117,7 +130,7 @@ class TestUntangle:
         mesh, flat = planar(points[:, :2], faces)
         nobody = np.zeros(len(points), dtype=bool)
         border = mesh.is_boundary_vertex
-        result = untangle(flat, faces, nobody, nobody, border)
+        result = untangle(flat, faces, turns(mesh), nobody, nobody, border)
         assert len(result.left) == 0
         assert not border[result.moved].any()
         assert len(result.moved) < 20
@@ -132,7 +145,7 @@ class TestUntangle:
         points, faces = shapes.grid(4, 4)
         mesh, flat = planar(points[:, :2], faces)
         nobody = np.zeros(len(points), dtype=bool)
-        result = untangle(flat, faces, nobody, nobody, mesh.is_boundary_vertex)
+        result = untangle(flat, faces, turns(mesh), nobody, nobody, mesh.is_boundary_vertex)
         assert result.flat.sides is flat.sides
         assert len(result.moved) == len(result.left) == 0
         assert result.largest_move == 0
@@ -142,7 +155,7 @@ class TestUntangle:
         points[12] += [0.6, 0.1, 0]
         mesh, flat = planar(points[:, :2], faces)
         nobody = np.zeros(len(points), dtype=bool)
-        result = untangle(flat, faces, ~nobody, nobody, mesh.is_boundary_vertex)
+        result = untangle(flat, faces, turns(mesh), ~nobody, nobody, mesh.is_boundary_vertex)
         np.testing.assert_array_equal(result.left, np.flatnonzero(flat.is_inverted))
         assert len(result.moved) == 0
 
@@ -157,7 +170,9 @@ class TestUntangle:
         tangled = drag(flat, mesh.faces, victim, 1.3)
         assert tangled.is_inverted.any()
         nobody = np.zeros(n, dtype=bool)
-        result = untangle(tangled, mesh.faces, pinned, nobody, mesh.is_boundary_vertex)
+        result = untangle(
+            tangled, mesh.faces, angles_around(flat, mesh), pinned, nobody, mesh.is_boundary_vertex
+        )
         assert len(result.left) == 0
         assert victim in result.moved
         assert not pinned[result.moved].any()
@@ -180,9 +195,9 @@ class TestUntangle:
         near = np.zeros(n, dtype=bool)
         near[mesh.faces[seam[mesh.faces].any(axis=1)]] = True
         victim = int(np.flatnonzero(near & ~seam)[0])
-        result = untangle(
-            drag(flat, mesh.faces, victim, 1.3), mesh.faces, pinned, seam, mesh.is_boundary_vertex
-        )
+        tangled = drag(flat, mesh.faces, victim, 1.3)
+        angles = angles_around(flat, mesh)
+        result = untangle(tangled, mesh.faces, angles, pinned, seam, mesh.is_boundary_vertex)
         assert len(result.left) == 0
         assert not seam[result.moved].any()
 

@@ -31,6 +31,8 @@ def compile_kernels() -> None:
     for mesh in (_tube(closed=True), _tube(closed=False)):
         flatten(*mesh)
         flatten(*mesh, cones="greedy", refine=True)
+    points, faces = _tube(closed=True)
+    flatten(points * [10, 1, 1], faces)  # has triangles to be turned over
     for method in ("ricci", "circle-patterns"):
         flatten(*_tube(closed=True), method=method)
     flatten(*_tube(closed=True), quantum=np.pi / 2)

@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._arrays import FloatArray, IntArray
-from .atlas import Packed, orient_charts, pack_charts, part_touching
+from .atlas import part_touching
+from .atlas.arrange import arrange_charts
 from .distortion import curvature_errors, measure
 from .figures import SolveFigures
-from .geometry.planar import signed_double_areas
+from .layout.convex import Polygons, make_convex
 from .mesh import TriangleMesh
 from .numbering import result_numbering, turn_corners
 from .options import Options
+from .promises import broken_promises
 from .result import Flattening
-from .rotations import Rotations
+from .rotations import Rotations, measure_rotations
 from .stages import Stages
 
 if TYPE_CHECKING:
@@ -44,26 +46,22 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     faces = np.concatenate([ids[one.mesh.faces] for ids, one in zip(numbers, laid_out, strict=True)])[order]
 
     with stages("pack"):
-        points, corners, chart = _all_charts(laid_out)
-        corners, chart = corners[order], chart[order]
-        uv, packed = _packed(points, corners, chart, positions[faces], options)
+        points, corners, chart, component = _all_charts(laid_out)
+        own, corners, chart = corners, corners[order], chart[order]
+        packed = arrange_charts(
+            points[corners],
+            chart,
+            component,
+            positions[faces],
+            resolution=options.resolution,
+            padding=options.padding,
+            tiles=options.tiles,
+            up=options.up,
+            quantum=options.quantum,
+        )
+        uv = np.empty_like(points)
+        uv[corners] = packed.corner_uv
 
-    def spread(values: Sequence[FloatArray]) -> FloatArray:
-        every = np.full(len(positions), np.nan)
-        for ids, value in zip(numbers, values, strict=True):
-            every[ids] = value
-        return every
-
-    target = spread([one.target for one in laid_out])
-    residual = target - spread([one.curvature for one in laid_out])
-    cones = np.concatenate([ids[one.cones] for ids, one in zip(numbers, laid_out, strict=True)])
-    with stages("measure"):
-        scaled = _known_or_new(checked.mesh, np.ldexp(positions, checked.exponent), faces)
-        errors = curvature_errors(residual[np.isfinite(residual)])
-        distortion = measure(scaled, uv[corners], errors, cones).rescaled(checked.exponent * np.log(2))
-        if options.charts == "atlas" and distortion.overlapping_pairs:
-            uv, overlaps = part_touching(uv, corners)
-            distortion = replace(distortion, overlap=overlaps.fraction, overlapping_pairs=len(overlaps.pairs))
     refined = any(one.figures.refined_triangles for one in laid_out)
     lost: tuple[str, ...] = ()
     if refined and given.source is not None:
@@ -73,7 +71,39 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     face_corners = (
         None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
     )
-    return Flattening(
+    if face_corners is not None and given.source is not None:
+        with stages("polygons"):
+            uv = make_convex(uv, corners, Polygons(given.source.offsets, face_corners), positions[faces])
+
+    def spread(values: Sequence[FloatArray]) -> FloatArray:
+        every = np.full(len(positions), np.nan)
+        for ids, value in zip(numbers, values, strict=True):
+            every[ids] = value
+        return every
+
+    target = spread([one.target for one in laid_out])
+    prescribed = spread([_prescribed(one, options) for one in laid_out])
+    # What was opened there has several copies of a vertex.
+    prescribed[number[prepared.seams]] = np.nan
+    residual = target - spread([one.curvature for one in laid_out])
+    cones = np.concatenate([ids[one.cones] for ids, one in zip(numbers, laid_out, strict=True)])
+    with stages("measure"):
+        scaled = _known_or_new(checked.mesh, np.ldexp(positions, checked.exponent), faces)
+        errors = curvature_errors(residual[np.isfinite(residual)])
+        distortion = measure(scaled, uv[corners], errors, cones, prescribed)
+        if options.charts == "atlas" and distortion.overlapping_pairs:
+            parted, overlaps = part_touching(uv, corners)
+            if len(overlaps.pairs) < distortion.overlapping_pairs:
+                uv = parted
+                distortion = measure(scaled, uv[corners], errors, cones, prescribed, overlaps)
+        rotations = None
+        if options.quantum is not None:
+            flat = np.split(uv[own], np.cumsum([len(one.corners) for one in laid_out])[:-1])
+            rotations = Rotations.of_all(
+                measure_rotations(one.mesh, corner_uv, options.quantum)
+                for one, corner_uv in zip(laid_out, flat, strict=True)
+            )
+    result = Flattening(
         vertices=positions,
         faces=faces,
         uv=uv,
@@ -83,23 +113,31 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         cones=cones,
         curvatures=target[cones],
         log_scale=spread([one.log_scale for one in laid_out]),
+        prescribed=prescribed,
         curvature_residual=residual,
         seams=np.concatenate(
             [number[prepared.seams], *(ids[one.seams] for ids, one in zip(numbers, laid_out, strict=True))]
         ),
-        distortion=distortion,
+        distortion=distortion.rescaled(checked.exponent * np.log(2)),
         seconds=dict(stages.seconds),
         notes=(*checked.notes, *prepared.notes, *_distinct_notes(laid_out), *lost),
         settings=options.as_dict(),
         solve=SolveFigures.of_all(
             [one.figures for one in laid_out], [one.area if len(laid_out) > 1 else 1.0 for one in laid_out]
         ),
-        rotations=Rotations.of_all(one.rotations for one in laid_out),
+        rotations=rotations,
         vertex_origin=np.concatenate([vertex_origin, np.full(len(positions) - len(vertex_origin), -1)]),
         face_origin=checked.face_origin[face_origin[order]],
         face_corners=face_corners,
         source=given.source,
     )
+    return replace(result, notes=(*result.notes, *broken_promises(result)))
+
+
+def _prescribed(one: LaidOut, options: Options) -> FloatArray:
+    """Return (n,) the curvature that vertices are to have in the plane, NaN on a free boundary."""
+    is_free = one.mesh.is_boundary_vertex & (not options.prescribes_boundary)
+    return np.where(is_free, np.nan, one.target)
 
 
 def _known_or_new(known: TriangleMesh, positions: FloatArray, faces: IntArray) -> TriangleMesh:
@@ -114,46 +152,20 @@ def _distinct_notes(laid_out: Sequence[LaidOut]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(note for one in laid_out for note in one.notes))
 
 
-def _all_charts(laid_out: Sequence[LaidOut]) -> tuple[FloatArray, IntArray, IntArray]:
-    """Return the points, corners and charts of all components, numbered one after the other."""
-    corners, charts, points, count = [], [], 0, 0
-    for one in laid_out:
+def _all_charts(laid_out: Sequence[LaidOut]) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
+    """Return the points, corners and charts of all components, numbered one after the other.
+
+    And (k,) the component of each chart.
+    """
+    corners, charts, component, points, count = [], [], [], 0, 0
+    for i, one in enumerate(laid_out):
         chart = np.zeros(len(one.corners), dtype=np.int64) if one.chart is None else one.chart
         corners.append(one.corners + points)
         charts.append(chart + count)
+        component += [i] * (int(chart.max()) + 1)
         points, count = points + len(one.points), count + int(chart.max()) + 1
-    return np.concatenate([one.points for one in laid_out]), np.concatenate(corners), np.concatenate(charts)
-
-
-def _packed(
-    points: FloatArray, corners: IntArray, chart: IntArray, space: FloatArray, options: Options
-) -> tuple[FloatArray, Packed]:
-    """Return the points with the charts in their places in the texture, and what came of it.
-
-    space: (m, 3, 3) the triangles' corners on the model.
-    """
-    flat, rotate = _upright(points[corners], chart), "any"
-    if options.up is not None:
-        flat, rotate = orient_charts(flat, chart, corners=space, up=options.up), "none"
-    packed = pack_charts(
-        flat,
-        chart,
-        resolution=options.resolution,
-        padding=options.padding,
-        tiles=options.tiles,
-        rotate=rotate,
-    )
-    uv = np.empty_like(points)
-    uv[corners] = packed.corner_uv
-    return uv, packed
-
-
-def _upright(flat: FloatArray, chart: IntArray) -> FloatArray:
-    """Return (m, 3, 2) charts, those turned over of which more area is upside down than not."""
-    is_mirrored = np.bincount(chart, weights=signed_double_areas(flat)) < 0
-    if is_mirrored.any():
-        flat[is_mirrored[chart], :, 1] *= -1
-    return flat
+    every = np.concatenate([one.points for one in laid_out])
+    return every, np.concatenate(corners), np.concatenate(charts), np.array(component, dtype=np.int64)
 
 
 def _number_vertices(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ._arrays import FloatArray
+from ._arrays import BoolArray, FloatArray
 from .cones import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
 from .geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
 from .geometry.areas import vertex_areas
@@ -171,11 +171,23 @@ def _pursued(
 def only_choice(surface: Surface, wishes: Wishes, options: Options) -> ConeSolution | None:
     """Return the solution without cones where no vertex may be one, and none need be; else None."""
     mesh = surface.mesh
-    takes_rest = mesh.is_boundary_vertex & (options.boundary_kind != "straight")
+    takes_rest = _takes_rest(mesh, wishes, options)
     if (wishes.is_allowed & ~takes_rest).any() or not (takes_rest.any() or mesh.euler_characteristic == 0):
         return None
     given = surface.laplacian, surface.curvature, takes_rest, mesh.euler_characteristic
     return cones_at(*given, np.empty(0, dtype=np.int64))
+
+
+def _takes_rest(mesh: TriangleMesh, wishes: Wishes, options: Options) -> BoolArray:
+    """Return (n,) the boundary vertices that take what curvature the cones leave.
+
+    Corners of a straightened boundary are part of the trade, like the cones inside; but not on marked seams.
+    """
+    if options.boundary_kind != "straight":
+        return mesh.is_boundary_vertex
+    if wishes.on_marks is None:
+        return np.zeros(len(mesh.vertices), dtype=bool)
+    return mesh.is_boundary_vertex & wishes.on_marks
 
 
 def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages) -> ConeSearch:
@@ -199,8 +211,7 @@ def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages
         surface.laplacian,
         surface.curvature,
         surface.areas,
-        # Corners of a straightened boundary are part of the trade, like the cones inside.
-        mesh.is_boundary_vertex & (not is_straight),
+        _takes_rest(mesh, wishes, options),
         mesh.euler_characteristic,
         tie_key=tie_key(mesh.vertices),
         # A corner of angle a has a curvature of pi - a: cones inside keep to the same bound.

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from ._arrays import FloatArray, IntArray, dots
-from .atlas.overlap import find_overlaps
+from .atlas.overlap import Overlaps, find_overlaps
 from .mesh import TriangleMesh, end_corners, label_components
 from .threads import meanwhile
 
@@ -42,6 +42,8 @@ class Distortion:
         density_spread: of texels per length on the model, the quantile at 95% over that at 5%.
         overlap: part of the area that the layout covers that it covers more than once.
         overlapping_pairs: pairs of triangles with inner points in common, without rounding.
+        angle_sum_error: largest difference, radians, between the sum of the angles around a vertex in the plane and
+            what it is to be: 2 pi (pi on the boundary) less the curvature prescribed; NaN if none is known.
         curvature_error: ||target - K||_2 / n of the metric, in units of pi (Table 1 of the paper).
         curvature_error_max: largest |target - K|, in units of pi.
     """
@@ -64,6 +66,7 @@ class Distortion:
     density_spread: float
     overlap: float
     overlapping_pairs: int
+    angle_sum_error: float = float("nan")
     curvature_error: float = float("nan")
     curvature_error_max: float = float("nan")
 
@@ -88,6 +91,8 @@ def measure(
     corner_uv: FloatArray,
     curvature_error: tuple[float, float] = (np.nan, np.nan),
     cones: IntArray | None = None,
+    prescribed: FloatArray | None = None,
+    overlaps: Overlaps | None = None,
 ) -> Distortion:
     """Measure a UV map.
 
@@ -96,11 +101,50 @@ def measure(
         corner_uv: (m, 3, 2) the UV point of every triangle corner.
         cones: (s,) vertices at which the rotation between the sides of a seam changes.
         curvature_error: what `curvature_errors` returns for the metric.
+        prescribed: (n,) curvature that vertices are to have in the plane, radians; NaN where it is free.
+        overlaps: what `find_overlaps` returns, if that is known.
     """
-    with meanwhile(partial(find_overlaps, corner_uv), len(corner_uv)) as finding:
+    find = partial(find_overlaps, corner_uv) if overlaps is None else lambda: overlaps
+    with meanwhile(find, len(corner_uv)) as finding:
         measured = measure_map(mesh, corner_uv, curvature_error, cones)
-        overlaps = finding.result()
-    return replace(measured, overlap=overlaps.fraction, overlapping_pairs=len(overlaps.pairs))
+        if prescribed is not None:
+            error = angle_sum_errors(mesh, corner_uv, prescribed)[0]
+            measured = replace(measured, angle_sum_error=float(np.nanmax(np.abs(error), initial=0.0)))
+        found = finding.result()
+    return replace(measured, overlap=found.fraction, overlapping_pairs=len(found.pairs))
+
+
+def measure_at_any_size(
+    mesh: TriangleMesh,
+    corner_uv: FloatArray,
+    curvature_error: tuple[float, float] = (np.nan, np.nan),
+    cones: IntArray | None = None,
+    prescribed: FloatArray | None = None,
+    overlaps: Overlaps | None = None,
+) -> Distortion:
+    """Measure a UV map as `measure` does, of a mesh so large or small that squares of its lengths may be no numbers."""
+    exponent = -int(np.frexp(np.abs(mesh.vertices[mesh.faces]).max())[1])
+    unit = TriangleMesh(np.ldexp(mesh.vertices, exponent), mesh.faces)
+    measured = measure(unit, corner_uv, curvature_error, cones, prescribed, overlaps)
+    return measured.rescaled(exponent * float(np.log(2)))
+
+
+def angle_sum_errors(
+    mesh: TriangleMesh, corner_uv: FloatArray, prescribed: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return (n,) by what the angles around each vertex sum to too much, radians; and what a rounded point makes of it.
+
+    Args:
+        mesh: the mesh.
+        corner_uv: (m, 3, 2) the UV point of every triangle corner.
+        prescribed: (n,) curvature of vertices in the plane, NaN where it is free; so is the error then.
+    """
+    from .distortion_kernel import sum_angles
+
+    uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
+    sums, change = sum_angles(mesh.faces, uv, len(prescribed))
+    full = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
+    return sums - full + prescribed, change
 
 
 def measure_map(
@@ -123,8 +167,9 @@ def measure_map(
     mean_scale = _mean(log_scale[valid], weights)
 
     seams, charts, chart = _seams_and_charts(mesh, corner_uv)
-    majority = np.sign(np.bincount(chart, weights=np.where(valid, uv_area, 0), minlength=charts))
-    against = np.where(valid, np.sign(uv_area), 0) * majority[chart] < 0
+    way = np.where(has_uv_area, np.sign(uv_area), 0)
+    majority = np.sign(np.bincount(chart, weights=np.abs(uv_area) * way, minlength=charts))
+    against = way * majority[chart] < 0
     seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
     return Distortion(
         qc=qc,
@@ -219,7 +264,7 @@ def _seam_motion_mismatch(
 
 
 def _mean(values: FloatArray, weights: FloatArray) -> float:
-    total = weights.sum()
+    total = float(weights.sum())
     return float((values * weights).sum() / total) if total > 0 else float("nan")
 
 

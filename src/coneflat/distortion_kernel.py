@@ -93,3 +93,25 @@ def find_joined(edge_halfedges: IntArray, corner_uv: FloatArray, near: float) ->
         other_length = math.hypot(other_end[0] - other_start[0], other_end[1] - other_start[1])
         joined[e] = gap <= near * max(length, other_length)
     return joined
+
+
+@compiled
+def sum_angles(faces: IntArray, corner_uv: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return (n,) the sum of the angles in the plane around each vertex, and by what a rounded point changes it.
+
+    Angles are those of the triangles' shapes, whichever way these are turned, so a vertex that its triangles go
+    around twice has 4 pi. The change is in radians per unit that points are off by.
+
+    Args:
+        faces: (m, 3).
+        corner_uv: (m, 3, 2).
+        count: n.
+    """
+    sums, change = np.zeros(count), np.zeros(count)
+    for f in range(len(faces)):
+        for i in range(3):
+            at, one, two = corner_uv[f, i], corner_uv[f, (i + 1) % 3], corner_uv[f, (i + 2) % 3]
+            u1, v1, u2, v2 = one[0] - at[0], one[1] - at[1], two[0] - at[0], two[1] - at[1]
+            sums[faces[f, i]] += abs(math.atan2(u1 * v2 - v1 * u2, u1 * u2 + v1 * v2))
+            change[faces[f, i]] += 1.0 / math.hypot(u1, v1) + 1.0 / math.hypot(u2, v2)
+    return sums, change

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import IntArray
+from ._arrays import FloatArray, IntArray
 from .errors import OptionError
 
 CONES = ("auto", "pursuit", "greedy", "none")
@@ -28,6 +28,14 @@ SOLVERS = ("auto", "pardiso", "scikit-sparse", "cholespy", "scipy", "amg")
 CHARTS = ("one", "atlas")
 BOUNDARIES = ("free", "lengths", "disk", "straight")
 
+# Radians: finer quanta than this restrict nothing that could be told from none, as multiples are known to 1e-6.
+LEAST_QUANTUM = 1e-4
+# Radians: no triangulation has room for wider cones than this.
+WIDEST_CONE = 1000 * math.pi
+# A preference for creases or hidden places of 1 makes seams ten times cheaper; with a factor of more than 1e10, the
+# lengths of seams are beneath the rounding of their costs.
+MOST_PREFERENCE = 10.0
+
 # What asks for cones by the pursuit, and it alone.
 PURSUIT_FIELDS = (
     "cone_count",
@@ -38,6 +46,9 @@ PURSUIT_FIELDS = (
     "allowed_cones",
     "quantum",
 )
+
+# Elements of an array, and characters of anything, that a message shows.
+FEW_SHOWN, MOST_SHOWN = 4, 80
 
 Cones = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
 Boundary = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
@@ -130,9 +141,6 @@ class Options:
         _choice("length_rule", self.length_rule, LENGTH_RULES)
         _choice("solver", self.solver, SOLVERS)
         _choice("charts", self.charts, CHARTS)
-        epsilon = _number("epsilon", self.epsilon)
-        if not 0 < epsilon < math.inf:
-            raise OptionError(f"epsilon must be a positive number, not {epsilon:g}")
         for name in ("cone_count", "max_cones"):
             value = getattr(self, name)
             if value is None:
@@ -141,13 +149,15 @@ class Options:
                 raise OptionError(f"{name} cannot be negative ({value})")
             object.__setattr__(self, name, int(value))
         for name in ("distortion", "min_cone_angle", "max_cone_angle", "epsilon", "quantum"):
-            if getattr(self, name) is not None or name == "min_cone_angle":
+            if getattr(self, name) is not None or name not in ("max_cone_angle", "quantum"):
                 object.__setattr__(self, name, _number(name, getattr(self, name)))
         for name in ("positive_only", "correct_handles", "best_effort", "refine", "repair", "strict"):
             if not isinstance(getattr(self, name), (bool, np.bool_)):
-                raise OptionError(f"{name} is True or False, not {getattr(self, name)!r}")
-        if not 0 < _number("distortion", self.distortion) < math.inf:
-            raise OptionError(f"distortion must be a positive number, not {self.distortion:g}")
+                raise OptionError(f"{name} is True or False, not {_shown(getattr(self, name))}")
+        for name in ("distortion", "epsilon"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise OptionError(f"{name} must be a positive number, not {getattr(self, name):g}")
+        self._check_angles()
         for name in ("required_cones", "forbidden_cones", "allowed_cones"):
             if getattr(self, name) is None and name != "allowed_cones":
                 object.__setattr__(self, name, ())
@@ -159,6 +169,23 @@ class Options:
         self._check_texture()
         self._check_marks()
         self._check_pursuit()
+
+    def _check_angles(self) -> None:
+        """Check the bounds of cone angles; one beyond the widest is no bound."""
+        if not 0 < self.min_cone_angle <= WIDEST_CONE:
+            raise OptionError(
+                f"the smallest cone angle must be positive and at most {WIDEST_CONE / math.pi:g} pi, not "
+                f"{self.min_cone_angle:g} radians"
+            )
+        if self.max_cone_angle is None:
+            return
+        if not self.max_cone_angle > self.min_cone_angle:
+            raise OptionError(
+                f"the largest cone angle ({self.max_cone_angle:g} radians) must exceed the smallest "
+                f"({self.min_cone_angle:g})"
+            )
+        if self.max_cone_angle > WIDEST_CONE:
+            object.__setattr__(self, "max_cone_angle", None)
 
     def _check_texture(self) -> None:
         """Check what says how charts are packed."""
@@ -177,9 +204,9 @@ class Options:
             up = _array("up", self.up)
             if up.shape != (3,) or up.dtype.kind not in "fiu" or not (np.isfinite(up).all() and up.any()):
                 raise OptionError(
-                    f"up must be a direction, three numbers that are not all 0, not {self.up!r}"
+                    f"up must be a direction, three numbers that are not all 0, not {_shown(self.up)}"
                 )
-            object.__setattr__(self, "up", tuple(up.astype(np.float64).tolist()))
+            object.__setattr__(self, "up", tuple(_of_finite_length(up.astype(np.float64)).tolist()))
 
     def _check_marks(self) -> None:
         """Check what names edges that are to be cut."""
@@ -193,8 +220,8 @@ class Options:
             given = getattr(self, name)
             strength = float(given) if isinstance(given, (bool, np.bool_)) else _number(name, given)
             object.__setattr__(self, name, strength)
-            if not 0 <= strength < math.inf:
-                raise OptionError(f"{name} must be a number from 0 up, not {strength:g}")
+            if not 0 <= strength <= MOST_PREFERENCE:
+                raise OptionError(f"{name} must be a number from 0 to {MOST_PREFERENCE:g}, not {strength:g}")
         if self.sharp_angle is not None:
             object.__setattr__(self, "sharp_angle", _number("sharp_angle", self.sharp_angle))
             if not 0 < self.sharp_angle < math.pi:
@@ -206,6 +233,11 @@ class Options:
     def marks_seams(self) -> bool:
         """Whether there may be edges that are cut in any case."""
         return self.seams is not None or self.sharp_angle is not None
+
+    @property
+    def prescribes_boundary(self) -> bool:
+        """Whether vertices on the boundary have a curvature to keep."""
+        return self.boundary_kind not in ("free", "lengths")
 
     def _check_pursuit(self) -> None:
         """Check the options that only a pursuit takes, and those of whole quanta."""
@@ -220,8 +252,11 @@ class Options:
                     "rotations along handles are made whole for whole quanta only: give a quantum"
                 )
             return
-        if not 0 < _number("quantum", self.quantum) <= 2 * math.pi * (1 + 1e-6):
-            raise OptionError(f"the quantum must be positive and at most 2 pi, not {self.quantum:g} radians")
+        if not LEAST_QUANTUM <= self.quantum <= 2 * math.pi * (1 + 1e-6):
+            raise OptionError(
+                f"the quantum must be from {LEAST_QUANTUM:g} radians, below which it restricts nothing, to 2 pi, not "
+                f"{self.quantum:g}"
+            )
         if self.correct_handles and self.method != "exact":
             raise OptionError("rotations along handles are corrected by method 'exact' only")
 
@@ -277,30 +312,48 @@ class Options:
 
 
 def _choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        raise OptionError(f"unknown {name} {value!r}: choose from {', '.join(allowed)}")
+    if not isinstance(value, str) or value not in allowed:
+        raise OptionError(f"unknown {name} {_shown(value)}: choose from {', '.join(allowed)}")
+
+
+def _shown(value: object) -> str:
+    """Return what a message says of a value: one short line."""
+    if isinstance(value, np.ndarray) and value.size > FEW_SHOWN:
+        return f"an array of shape {value.shape} and type {value.dtype}"
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # Whatever a foreign class does there.
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
 
 
 def _number(name: str, value: object) -> float:
-    if isinstance(value, (bool, np.bool_, str)):
-        raise OptionError(f"{name} must be a number, not {value!r}")
+    is_scalar = np.ndim(value) == 0 if isinstance(value, np.ndarray) else not isinstance(value, (str, bytes))
+    if not is_scalar or isinstance(value, (bool, np.bool_, complex, np.complexfloating)):
+        raise OptionError(f"{name} must be a number, not {_shown(value)}")
     try:
         return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError) as error:
-        raise OptionError(f"{name} must be a number, not {value!r}") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise OptionError(f"{name} must be a number, not {_shown(value)}") from error
 
 
 def _whole(name: str, value: object) -> int:
     number = math.nan if isinstance(value, (bool, np.bool_)) else _number(name, value)
     if not number.is_integer() or abs(number) >= 2**62:
-        raise OptionError(f"{name} must be a whole number, not {value!r}")
+        raise OptionError(f"{name} must be a whole number, not {_shown(value)}")
     return int(number)
+
+
+def _of_finite_length(direction: FloatArray) -> FloatArray:
+    """Return a direction whose squared length is neither 0 nor infinite in double precision."""
+    largest = np.abs(direction).max()
+    return direction if 1e-100 < largest < 1e100 else direction / largest
 
 
 def _array(name: str, value: object) -> NDArray[Any]:
     try:
         return np.asarray(value)
-    except ValueError as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise OptionError(f"{name}: {error}") from error
 
 
@@ -316,6 +369,13 @@ def _pairs(noun: str, given: object) -> IntArray:
     return pairs.astype(np.int64)
 
 
+def _listed(noun: str, vertices: Iterable[Any]) -> list[Any]:
+    """Return the elements of a flat list."""
+    if np.ndim(vertices) != 1 if isinstance(vertices, np.ndarray) else False:
+        raise OptionError(f"{noun}s must be a list of vertices, not {_shown(vertices)}")
+    return list(vertices)
+
+
 def _given_vertices(noun: str, vertices: object) -> dict[int, float | None]:
     """Return vertex -> curvature, None where it is to be computed: for all or for none."""
     if isinstance(vertices, Mapping):
@@ -323,11 +383,11 @@ def _given_vertices(noun: str, vertices: object) -> dict[int, float | None]:
             _whole(f"a {noun}'s vertex", v): None if k is None else _number(f"a {noun}'s curvature", k)
             for v, k in vertices.items()
         }
-    elif isinstance(vertices, Iterable):
-        listed = [_whole(f"a {noun}'s vertex", v) for v in np.ravel(list(vertices)).tolist()]
+    elif isinstance(vertices, Iterable) and not isinstance(vertices, (str, bytes)):
+        listed = [_whole(f"a {noun}'s vertex", v) for v in _listed(noun, vertices)]
         given = dict.fromkeys(listed)
         if len(given) < len(listed):
-            twice = next(v for v in listed if listed.count(v) > 1)
+            twice = next(v for i, v in enumerate(listed) if v in listed[:i])
             raise OptionError(f"vertex {twice} is given as a {noun} twice")
     else:
         raise OptionError(

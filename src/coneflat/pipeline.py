@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import FloatArray, IntArray
+from ._arrays import BoolArray, FloatArray, IntArray
 from .assemble import assemble
 from .choose import DEARER, Surface, Turned, choose_cones, is_riddled, pursues
 from .cones import ConeSolution
@@ -20,7 +20,6 @@ from .conformal.turning import open_turning
 from .distortion import measure
 from .errors import CurvatureError, MetricError, SeamError
 from .geometry.areas import area_distortion, weighted_areas
-from .geometry.planar import signed_double_areas
 from .mesh import TriangleMesh
 from .methods import ExactChoices, FlatMetric, LaidOut, exact_flattening, linear_flattening
 from .methods.exact import ExactFlatMetric
@@ -248,8 +247,16 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
 def _missed_distortion(laid_out: LaidOut, part: Component, options: Options) -> tuple[str, ...]:
     """Return that the distortion asked for was not reached, if so."""
     reached = laid_out.figures.area_distortion_linear
-    if not pursues(part.mesh, options) or options.cone_count is not None:
+    if not pursues(part.mesh, options):
         return ()
+    if options.cone_count is not None:
+        found = len(laid_out.cones)
+        if found == options.cone_count:
+            return ()
+        return (
+            f"{plural(found, 'cone')} instead of the {options.cone_count:,} asked for: more of them, within the bounds "
+            "given, would gain nothing or have no vertex inside to be at.",
+        )
     if reached <= options.distortion * (1 + NARROWLY):
         return ()
     why = "no better was found within the bounds given"
@@ -271,12 +278,6 @@ def shortfalls(laid_out: LaidOut, names: IntArray) -> tuple[str, ...]:
             f"{plural(len(unheld), 'cone')} too wide for the triangles around: that at vertex {names[unheld[0]]} has "
             f"an angle of {angle:.3g} pi. Choose others, or refine (--refine)."
         )
-    flipped = int(np.count_nonzero(signed_double_areas(laid_out.points[laid_out.corners]) <= 0))
-    if flipped and laid_out.figures.ptolemy_flips + laid_out.figures.euclidean_flips:
-        notes.append(
-            f"{plural(flipped, 'triangle')} could not be turned over on the input's own triangles: refine (--refine), "
-            "which cannot invert any."
-        )
     return tuple(notes)
 
 
@@ -292,10 +293,11 @@ def _flatten_once(surface: Surface, part: Component, options: Options, stages: S
             surface, part.wishes, options, stages, _turning_meter(surface, part.wishes, options)
         )
     laid_out = _lay_out(surface, part, solution, replace(options, correct_handles=False), stages)
-    if not options.correct_handles or not part.mesh.genus():
+    if not options.correct_handles or options.quantum is None or not part.mesh.genus():
         return laid_out
     corrected = _lay_out(surface, part, solution, options, stages)
-    return replace(corrected, notes=(*corrected.notes, _cost_of_correction(laid_out, corrected)))
+    cost = _cost_of_correction(laid_out, corrected, options.quantum)
+    return replace(corrected, notes=(*corrected.notes, cost))
 
 
 def _turning_meter(surface: Surface, wishes: Wishes, options: Options) -> Turned | None:
@@ -311,9 +313,11 @@ def _turning_meter(surface: Surface, wishes: Wishes, options: Options) -> Turned
     return turned
 
 
-def _cost_of_correction(before: LaidOut, after: LaidOut) -> str:
+def _cost_of_correction(before: LaidOut, after: LaidOut, quantum: float) -> str:
     qc = [measure(one.mesh, one.points[one.corners]).qc_mean for one in (before, after)]
-    off = 0.0 if before.rotations is None else np.abs(before.rotations.handles).max()
+    off = np.abs(measure_rotations(before.mesh, before.points[before.corners], quantum).handles).max(
+        initial=0.0
+    )
     return (
         f"Rotations along handles were off by up to {off:.2g} rad; making them whole changed the mean QC distortion "
         f"from {qc[0]:.5f} to {qc[1]:.5f}."
@@ -339,10 +343,7 @@ def _lay_out(
             for phi in (solution.log_scale, laid_out.log_scale[: len(mesh.vertices)])
         )
         figures = replace(laid_out.figures, area_distortion_linear=linear, area_distortion=reached)
-        rotations = None
-        if options.quantum is not None:
-            rotations = measure_rotations(laid_out.mesh, laid_out.points[laid_out.corners], options.quantum)
-        return replace(laid_out, figures=figures, rotations=rotations)
+        return replace(laid_out, figures=figures)
 
 
 def _cut(part: Component, solution: ConeSolution, options: Options) -> tuple[TriangleMesh, IntArray]:
@@ -378,6 +379,7 @@ def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, option
     choices = ExactChoices(
         scale_at_cones=options.scale_at_cones,
         boundary=boundary,
+        kept=_kept_boundary(mesh, wishes, options),
         # Both sides of a marked seam are to have the same length.
         keep_area=options.boundary_kind != "lengths" and not options.marks_seams,
         best_effort=options.best_effort,
@@ -387,3 +389,12 @@ def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, option
     if options.correct_handles and options.quantum is not None and mesh.genus():
         return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantum)
     return exact_flattening(mesh, lengths, solution, choices)
+
+
+def _kept_boundary(mesh: TriangleMesh, wishes: Wishes, options: Options) -> BoolArray:
+    """Return (n,) the boundary vertices between which lengths stay: on marked seams, so that both sides are equal."""
+    if options.boundary_kind == "lengths":
+        return mesh.is_boundary_vertex
+    if wishes.on_marks is None:
+        return np.zeros(len(mesh.vertices), dtype=bool)
+    return mesh.is_boundary_vertex & wishes.on_marks

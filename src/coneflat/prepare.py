@@ -93,6 +93,7 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
         if len(alone):
             notes.append(_nothing_cut(wishes.names[checked.mesh.edges[alone]]))
         wishes.keep_off(checked.mesh.edges[marked])
+        wishes = wishes.with_marks(checked.mesh.edges[marked])
         opened = open_along(checked.mesh, marked)
     seen = None
     if options.hide_seams:

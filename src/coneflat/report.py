@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 MEASURES = (
     "curvature_error",
     "curvature_error_max",
+    "angle_sum_error",
     "qc_mean",
     "qc_p95",
     "qc_max",

@@ -32,6 +32,8 @@ class Flattening:
         curvatures: (s,) their target curvatures, radians.
         log_scale: (n,) log conformal factor phi, so that flat lengths are about l * exp(phi) in model
             units; NaN at vertices without a face.
+        prescribed: (n,) curvature that each vertex is to have in the plane, radians: 0 but for cones and a prescribed
+            boundary; NaN where it is free, on other boundaries and on marked seams.
         curvature_residual: (n,) target minus curvature of the flat metric, radians; NaN likewise.
         seams: (k, 2) vertex pairs of the mesh edges that were cut.
         packing_efficiency: area of the layout over that of the texture, or textures.
@@ -57,6 +59,7 @@ class Flattening:
     cones: IntArray
     curvatures: FloatArray
     log_scale: FloatArray
+    prescribed: FloatArray
     curvature_residual: FloatArray
     seams: IntArray
     packing_efficiency: float
@@ -96,6 +99,21 @@ class Flattening:
         from .io import write_flattening
 
         return write_flattening(self, path, texture)
+
+    def as_written(self, ending: str) -> Flattening:
+        """Return the result as a file of a format holds it, with the measures and notes of that.
+
+        A .glb has numbers of 32 bits; the polygons of an .obj are measured as the fans of triangles that others read.
+
+        Args:
+            ending: ".obj", ".ply", ".glb" or ".npz".
+
+        Raises:
+            MeshFileError: the file cannot hold numbers so large.
+        """
+        from .io.written import as_written
+
+        return as_written(self, ending)
 
     def view(
         self,

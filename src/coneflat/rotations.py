@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._arrays import FloatArray
+from ._arrays import FloatArray, IntArray
 from .conformal.turning import off_multiple
 from .mesh import TriangleMesh
 from .seams.handles import handle_loops
@@ -39,13 +39,27 @@ class Rotations:
 
 def measure_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> Rotations:
     """Return the rotations of a layout of a connected mesh; `corner_uv` is (m, 3, 2)."""
-    points = corner_uv[..., 0] + 1j * corner_uv[..., 1]
-    sides = (points[:, [2, 0, 1]] - points[:, [1, 2, 0]]).ravel()
     pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turns = np.angle(-sides[pairs[:, 1]] / sides[pairs[:, 0]])
-    across = np.zeros(len(sides))
+    turns = _turns(mesh, corner_uv)
+    across = np.zeros(mesh.faces.size)
     across[pairs[:, 0]], across[pairs[:, 1]] = turns, -turns
     off = np.abs(off_multiple(turns, quantum))
     handles = off_multiple(np.array([across[loop].sum() for loop in handle_loops(mesh)]), quantum)
     return Rotations(quantum, float(off.max(initial=0.0)), tuple(handles.tolist()))
+
+
+def seam_rotations(
+    vertices: FloatArray, faces: IntArray, corner_uv: FloatArray, quantum: float
+) -> FloatArray:
+    """Return how far the rotation across each inner edge is from a multiple of a quantum, radians."""
+    return np.abs(off_multiple(_turns(TriangleMesh(vertices, faces), corner_uv), quantum))
+
+
+def _turns(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
+    """Return the rotation between the two sides of each inner edge, radians."""
+    points = corner_uv[..., 0] + 1j * corner_uv[..., 1]
+    sides = (points[:, [2, 0, 1]] - points[:, [1, 2, 0]]).ravel()
+    pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turns: FloatArray = np.angle(-sides[pairs[:, 1]] / sides[pairs[:, 0]])
+    return turns

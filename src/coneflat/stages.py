@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from .errors import OptionError
+
 #: Called with what is being done and the fraction of the whole that is done.
 Progress = Callable[[str, float], None]
 
@@ -17,9 +19,16 @@ class Stages:
         seconds: wall time of each stage so far, in order of first appearance.
         done: fraction of the whole that is done before the part at hand.
         share: fraction of the whole that the part at hand makes up.
+
+    Raises:
+        OptionError: the listener cannot be called.
     """
 
     def __init__(self, progress: Progress | None = None) -> None:
+        if progress is not None and not callable(progress):
+            raise OptionError(
+                f"progress must be a function of a text and a fraction, not {type(progress).__name__}"
+            )
         self.seconds: dict[str, float] = {}
         self.done = 0.0
         self.share = 0.0

@@ -16,3 +16,8 @@ def list_some(items: Iterable[object], total: int | None = None, most: int = 5) 
     shown = list(islice(iter(items), most + 1))
     more = len(shown) > most or (total is not None and total > most)
     return ", ".join(str(item) for item in shown[:most]) + (", ..." if more else "")
+
+
+def printable(text: str) -> str:
+    """Return a text that can be written as UTF-8: bytes of file names that cannot become \\udcff, say."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")

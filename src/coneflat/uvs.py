@@ -31,8 +31,10 @@ MOST_PAIRS, FEW_PAIRS = 8, 10_000
 #: A power of two beyond which there are no numbers.
 MOST_EXPONENT = 1100
 
-#: Of the measures of a flattening, those of a map alone.
-MAP_MEASURES = tuple(name for name in MEASURES if not name.startswith("curvature"))
+#: Of the measures of a flattening, those of a map of which nothing more is known.
+MAP_MEASURES = tuple(
+    name for name in MEASURES if not name.startswith("curvature") and name != "angle_sum_error"
+)
 
 #: What is measured besides.
 COUNTS = (

@@ -9,6 +9,7 @@ import numpy as np
 
 from ._arrays import BoolArray, FloatArray, IntArray
 from .errors import OptionError
+from .geometry.areas import at_unit_scale
 from .inputs import InputMesh
 from .io import COLOURS
 from .options import Options
@@ -51,6 +52,7 @@ class Wishes:
         is_allowed: (n,) whether a search may put a cone there.
         weights: (n,) importance of each vertex, or None.
         seam_weights: (n,) by which seams are dearer, or None.
+        on_marks: (n,) vertices on seams that are marked, or None.
     """
 
     names: IntArray
@@ -60,6 +62,7 @@ class Wishes:
     is_allowed: BoolArray
     weights: FloatArray | None
     seam_weights: FloatArray | None = None
+    on_marks: BoolArray | None = None
 
     def without(self, vertices: IntArray) -> Wishes:
         """Return wishes that forbid cones at some vertices, too."""
@@ -75,6 +78,12 @@ class Wishes:
                     f"cone {self.names[vertex]} lies on a seam that is marked, which takes what curvature it needs"
                 )
 
+    def with_marks(self, seams: IntArray) -> Wishes:
+        """Return wishes that know the marked seams, given by vertices."""
+        on_marks = np.zeros(len(self.names), dtype=bool)
+        on_marks[seams] = True
+        return replace(self, on_marks=on_marks)
+
     def within(self, component: IntArray) -> Wishes:
         """Return what is said of a component, numbered there; `component` are its vertices, ascending."""
         return Wishes(
@@ -85,12 +94,13 @@ class Wishes:
             self.is_allowed[component],
             _weights_within(self.weights, component),
             _weights_within(self.seam_weights, component),
+            None if self.on_marks is None else self.on_marks[component],
         )
 
 
 def _weights_within(weights: FloatArray | None, component: IntArray) -> FloatArray | None:
     """Return the weights of a component; None where all are 0, which there says no more than that they are equal."""
-    return None if weights is None or not weights[component].any() else weights[component]
+    return None if weights is None or not weights[component].any() else at_unit_scale(weights[component])
 
 
 def locate_wishes(checked: CheckedMesh, options: Options, given: InputMesh) -> Wishes:
@@ -163,9 +173,12 @@ def _weights(noun: str, weights: object, given: InputMesh) -> FloatArray:
     if isinstance(weights, str):
         weights = _property(weights, given)
     try:
-        values = np.asarray(weights, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        numbers = np.asarray(weights)
+    except (TypeError, ValueError, OverflowError) as error:
         raise OptionError(f"{noun} must be numbers, one for each vertex: {error}") from error
+    if numbers.dtype.kind not in "fiub" and numbers.size:
+        raise OptionError(f"{noun} must be numbers, one for each vertex, not of type {numbers.dtype}")
+    values = numbers.astype(np.float64)
     if values.shape != (count,):
         raise OptionError(
             f"{noun} must be {count:,} numbers, one for each vertex, not of shape {values.shape}"

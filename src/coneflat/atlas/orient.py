@@ -46,7 +46,7 @@ def orient_charts(
     charts = read_charts(corner_uv, chart_of_triangle)
     angles = straight_angles(charts, charts.outlines())
     if up is not None:
-        rise = _mean_rise(charts, corners, up) * np.exp(1j * angles)
+        rise = mean_rise(charts, corners, up) * np.exp(1j * angles)
         angles += QUARTER * np.round((QUARTER - np.angle(rise)) / QUARTER)
     return charts.moved(np.exp(1j * angles))
 
@@ -127,7 +127,7 @@ def _extents(hull: ComplexArray, angles: FloatArray) -> tuple[FloatArray, FloatA
     return width, height
 
 
-def _mean_rise(charts: Charts, corners: ArrayLike | None, up: ArrayLike) -> ComplexArray:
+def mean_rise(charts: Charts, corners: ArrayLike | None, up: ArrayLike) -> ComplexArray:
     """Return (k,) the mean gradient of the height over the plane of each chart, times its area.
 
     The gradient is constant on a triangle; times its area it is a sum over the sides without a division.

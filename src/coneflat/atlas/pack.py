@@ -19,6 +19,8 @@ ROTATIONS = ("any", "quarter", "none")
 # Angles that a chart is tried at, for so many charts at most; more than that fill each other's gaps in quarter turns.
 TURNS = ((20, 16), (100, 8))
 QUARTERS = 4
+# Shapes are made of every chart in every turn.
+MOST_TURNS = 16
 TILES_IN_A_ROW = 10
 
 
@@ -51,7 +53,7 @@ def pack_charts(
     resolution: int = 1024,
     padding: float = 2.0,
     margin: float | None = None,
-    rotate: str = "any",
+    rotate: str | int = "any",
     tiles: int = 1,
 ) -> Packed:
     """Pack charts into a square texture as large as they go, or into several of one scale (UDIM tiles).
@@ -68,8 +70,9 @@ def pack_charts(
         padding: texels between charts, at least.
         margin: texels between charts and the border of the texture, at least; None for as many as `padding`.
         rotate: "any" turns charts so that they fill the texture best, "quarter" so that each lies straight, its
-            long side along u or v, "none" leaves them as they are, see `orient_charts`. One chart alone is turned
-            by "any" by at most an eighth of a turn.
+            long side along u or v, "none" leaves them as they are, see `orient_charts`. A whole number turns each
+            by a multiple of that part of a full turn: 4 by quarter turns from how it lies. One chart alone is
+            turned by "any" by at most an eighth of a turn, and by a number not at all.
         tiles: number of textures to distribute charts over. A chart is not cut, so the largest limits the scale.
 
     Raises:
@@ -83,7 +86,7 @@ def pack_charts(
     density = np.ones(charts.count) if areas is None else _densities(charts, areas)
     outlines = charts.outlines()
     alone = charts.count == 1
-    as_given = rotate == "none" or (alone and rotate == "any")
+    as_given = rotate == "none" or isinstance(rotate, int) or (alone and rotate == "any")
     frame = density * (1.0 if as_given else np.exp(1j * straight_angles(charts, outlines)))
     outlines = outlines.times(frame)
     room = 1.0 - 2.0 * margin / resolution
@@ -94,7 +97,8 @@ def pack_charts(
         turns = _turns(charts.count, rotate)
         angles = np.tile(np.arange(turns) * (2 * np.pi / turns), (charts.count, 1))
         gap = padding / resolution / room
-        packing = pack(outlines, area, angles, gap, min(tiles, charts.count), refine=turns > QUARTERS)
+        refine = rotate == "any" and turns > QUARTERS
+        packing = pack(outlines, area, angles, gap, min(tiles, charts.count), refine)
 
     scale = room / (packing.side or 1.0)
     factors = scale * frame * np.exp(1j * packing.angle)
@@ -135,14 +139,16 @@ def _densities(charts: Charts, areas: ArrayLike) -> FloatArray:
     return densities
 
 
-def _turns(count: int, rotate: str) -> int:
+def _turns(count: int, rotate: str | int) -> int:
     """Return how many angles charts are tried at."""
+    if isinstance(rotate, int):
+        return rotate
     if rotate == "any":
         return next((turns for most, turns in TURNS if count <= most), QUARTERS)
     return QUARTERS if rotate == "quarter" else 1
 
 
-def _alone(outlines: Outlines, rotate: str) -> Packing:
+def _alone(outlines: Outlines, rotate: str | int) -> Packing:
     """Return one chart in the middle of the smallest square around it, turned no more than it must be for that."""
     angle = square_angle(outlines.points(0)) if rotate == "any" else 0.0
     angle -= math.pi / 2 * round(angle / (math.pi / 2))
@@ -153,7 +159,7 @@ def _alone(outlines: Outlines, rotate: str) -> Packing:
     return Packing(side, np.array([angle]), np.array([shift]), np.zeros(1, dtype=np.int64))
 
 
-def _check(resolution: int, padding: float, margin: float, rotate: str, tiles: int) -> None:
+def _check(resolution: int, padding: float, margin: float, rotate: str | int, tiles: int) -> None:
     for name, count in (("resolution", resolution), ("tiles", tiles)):
         if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or count < 1:
             raise OptionError(f"{name} must be a whole number from 1, not {count!r}")
@@ -161,7 +167,12 @@ def _check(resolution: int, padding: float, margin: float, rotate: str, tiles: i
         is_number = isinstance(texels, (int, float, np.number)) and not isinstance(texels, bool)
         if not is_number or not 0 <= texels < math.inf:
             raise OptionError(f"{name} must be a number of texels, 0 or more, not {texels!r}")
-    if rotate not in ROTATIONS:
-        raise OptionError(f"unknown rotate {rotate!r}: choose from {', '.join(ROTATIONS)}")
+    if isinstance(rotate, int) and not isinstance(rotate, bool):
+        if not 1 <= rotate <= MOST_TURNS:
+            raise OptionError(f"rotate must be from 1 to {MOST_TURNS} turns, not {rotate}")
+    elif rotate not in ROTATIONS:
+        raise OptionError(
+            f"unknown rotate {rotate!r}: choose from {', '.join(ROTATIONS)}, or a number of turns"
+        )
     if 2 * margin >= resolution:
         raise OptionError(f"margins of {margin:g} texels leave nothing of a texture of {resolution} texels")

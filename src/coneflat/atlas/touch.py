@@ -6,6 +6,8 @@ scaled, such edges may come to lie across each other by a digit.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,39 +17,52 @@ from .overlap import Overlaps, find_overlaps
 
 # Of the extent of the layout: what overlaps by less touches, and is then moved by so much more than it overlaps.
 TOUCHING, APART = 1e-11, 2.0**-49
+# The same for points that are stored as 32-bit numbers, which are 2^-24 apart below 1.
+TOUCHING_SINGLE, APART_SINGLE = 2.0**-20, 2.0**-23
 # What is moved may touch something else then.
 ROUNDS = 10
 
 
-def part_touching(points: FloatArray, corners: IntArray) -> tuple[FloatArray, Overlaps]:
+def part_touching(
+    points: FloatArray, corners: IntArray, stored: Callable[[FloatArray], FloatArray] | None = None
+) -> tuple[FloatArray, Overlaps]:
     """Return points of the plane at which triangles that touch do not overlap, and what overlaps nevertheless.
 
     Args:
         points: (u, 2).
         corners: (m, 3) indices of points.
+        stored: rounds points to those that can be stored, as 32-bit numbers; None for doubles.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     extent = float((high - low).max())
+    touching, apart = (TOUCHING, APART) if stored is None else (TOUCHING_SINGLE, APART_SINGLE)
+    if stored is not None:
+        points = stored(points)
     for _ in range(ROUNDS):
         overlaps = find_overlaps(points, corners)
-        moves = _moves(points @ np.array([1, 1j]), corners, overlaps.pairs, extent)
+        moves = _moves(points @ np.array([1, 1j]), corners, overlaps.pairs, touching * extent, apart * extent)
         if not moves.any():
             break
         points = np.clip(points + np.stack([moves.real, moves.imag], axis=1), low, high)
+        if stored is not None:
+            points = stored(points)
     return points, overlaps
 
 
 def _moves(
-    places: NDArray[np.complex128], corners: IntArray, pairs: IntArray, extent: float
+    places: NDArray[np.complex128], corners: IntArray, pairs: IntArray, touching: float, apart: float
 ) -> NDArray[np.complex128]:
-    """Return (u,) by what points are to be moved so that triangles that hardly overlap are apart."""
+    """Return (u,) by what points are to be moved so that triangles that hardly overlap are apart.
+
+    touching: what overlaps by less does so hardly. apart: by how much they are then to be apart.
+    """
     moves = np.zeros(len(places), dtype=np.complex128)
     if not len(pairs):
         return moves
     both = corners[pairs]
     across, depth = _least_depth(places[both])
-    touching = depth < TOUCHING * extent
-    both, across, way = both[touching], across[touching], depth[touching] / 2 + APART * extent
+    hardly = depth < touching
+    both, across, way = both[hardly], across[hardly], depth[hardly] / 2 + apart
     # Where they have a point in common, it stays.
     shared = (
         (both[:, 0, :, None] == both[:, 1, None, :]).any(axis=2),

@@ -19,6 +19,7 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     """Flatten a mesh file to a file and return the row of the summary; errors become rows, too."""
     from ..errors import ConeflatError
     from ..io.join import read_joined
+    from ..io.write import write_measured
     from ..pipeline import flatten
     from ..requirements import REPORTED, breaches, parse_requirements
 
@@ -27,7 +28,7 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     try:
         source = read_joined(job["mesh"], job["weld"])
         result = flatten(source.mesh, **job["options"])
-        result.save(job["output"])
+        result = write_measured(result, job["output"])
         report = result.report()
         unmet = breaches(parse_requirements(job["required"], REPORTED), report)
         row |= {

@@ -12,7 +12,8 @@ from .process import Child
 
 # Workers that may be lost under one mesh before it counts as failed: it may be the mesh that kills them.
 LOSSES = 3
-PATIENCE = "20s"
+# Seconds in which a scheduler must answer: one that is there takes a fraction of one.
+PATIENCE = 4.0
 
 _own = threading.local()
 
@@ -38,11 +39,11 @@ def rows_of_cluster(
     except ImportError as error:
         raise OptionError("a Dask cluster needs distributed: pip install 'coneflat[dask]'") from error
     try:
+        _require_scheduler(address)
         client = Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise OptionError(
-            f"no Dask scheduler answers at {address}: {' '.join(str(error).split())}"
-        ) from error
+    except Exception as error:  # The library has many ways to fail at an address that is none.
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise OptionError(f"no Dask scheduler answers at {address}: {why}") from error
     with client:
         futures = {client.submit(flatten_here, job, limit, pure=False, retries=LOSSES): job for job in jobs}
         try:
@@ -52,6 +53,23 @@ def rows_of_cluster(
                 yield job, future.result() if lost is None else _lost(job, lost)
         finally:
             client.cancel(list(futures))
+
+
+def _require_scheduler(address: str) -> None:
+    """Raise an error if no scheduler answers at an address; a client would go on trying, and fail again at the end."""
+    import asyncio
+
+    from distributed.comm import connect
+
+    async def knock() -> None:
+        comm = await connect(address, timeout=PATIENCE)
+        try:
+            await comm.write({"op": "identity", "reply": True})
+            await comm.read()
+        finally:
+            comm.abort()
+
+    asyncio.run(asyncio.wait_for(knock(), PATIENCE))
 
 
 def _lost(job: Job, error: BaseException) -> dict[str, Any]:

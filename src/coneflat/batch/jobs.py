@@ -23,7 +23,7 @@ class Job:
         mesh, output: absolute paths.
         options: keyword arguments of `coneflat.flatten`, as JSON has them.
         weld: merge vertices at the same position; None for the default, see `coneflat.io.join.read_joined`.
-        mark: what changes when the mesh file, the options or the version do.
+        mark: what changes when the mesh file, the options or the version do; "" where there is no such file.
         required: what measures must be, such as "flipped=0"; a mesh that does not meet it has failed.
     """
 
@@ -87,18 +87,30 @@ def _names(meshes: list[str], ending: str) -> list[str]:
             _longer(path, depth) if name.lower() in twice else name
             for path, name in zip(paths, names, strict=True)
         ]
+    # What differs by upper and lower case alone, or runs together, is numbered.
+    taken: set[str] = set()
+    for i, name in enumerate(names):
+        count = 1
+        while names[i].lower() in taken:
+            count += 1
+            names[i] = f"{name}_{count}"
+        taken.add(names[i].lower())
     return [name + ending for name in names]
 
 
 def _longer(path: Path, depth: int) -> str:
     kind = f"{path.stem}_{path.suffix[1:].lower()}"
-    return "_".join([*path.parent.parts[len(path.parent.parts) - depth :], kind]) if depth else kind
+    folders = path.parent.relative_to(path.anchor).parts
+    return "_".join([*folders[max(len(folders) - depth, 0) :], kind])
 
 
 def _mark(mesh: str, options: Mapping[str, Any], weld: bool | None, required: tuple[str, ...]) -> str:
     from .. import __version__
 
-    about = os.stat(mesh)
+    try:
+        about = os.stat(mesh)
+    except (OSError, ValueError):  # A link that leads nowhere: reading it says so.
+        return ""
     text = json.dumps(
         [about.st_size, about.st_mtime_ns, dict(options), weld, required, __version__], sort_keys=True
     )

@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 from .jobs import Job
-from .process import Child
+from .process import Child, failed
 
 
 def rows_of_processes(
@@ -27,7 +27,12 @@ def rows_of_processes(
         with suppress(queue.Empty):
             while not stopped.is_set():
                 job = waiting.get_nowait()
-                finished.put((job, child.flatten(job, limit)))
+                try:
+                    row = child.flatten(job, limit)
+                except Exception as error:  # Else its row would be waited for in vain.
+                    child.end()
+                    row = failed(job, f"internal error: {type(error).__name__}: {error}")
+                finished.put((job, row))
         child.end()
 
     threads = [threading.Thread(target=work, args=(child,), daemon=True) for child in children]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -11,12 +12,36 @@ import time
 from contextlib import suppress
 from typing import Any
 
+from ..io.atomic import remove_unfinished
 from .jobs import Job
 
 # Each process computes on one core: there are as many processes as cores.
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
+
+COMMAND = [sys.executable, "-m", "coneflat.batch.child"]
+
+
+def failed(job: Job, error: str, seconds: float | None = None) -> dict[str, Any]:
+    """Return the row of a job that has no result."""
+    return {
+        "mesh": job.mesh,
+        "output": job.output,
+        "status": "failed",
+        "error": error,
+        "seconds": seconds,
+    }
+
+
+def _end_of(code: int) -> str:
+    """Return how a process with an exit code ended."""
+    if code >= 0:
+        return f"ended with code {code}"
+    try:
+        return f"was ended by {signal.Signals(-code).name}"
+    except ValueError:
+        return f"was ended by signal {-code}"
 
 
 class Child:
@@ -28,7 +53,10 @@ class Child:
     def flatten(self, job: Job, limit: float | None) -> dict[str, Any]:
         """Return the row of a job; a process that takes longer than the limit, seconds, is ended."""
         start = time.perf_counter()
-        process = self._started()
+        try:
+            process = self._started()
+        except OSError as error:  # No memory for another process, say.
+            return failed(job, f"no process could be started: {error.strerror or error}")
         timer = threading.Timer(limit, process.kill) if limit is not None else None
         line = ""
         if timer is not None:
@@ -43,20 +71,16 @@ class Child:
             timer.cancel()
         seconds = time.perf_counter() - start
         if line.endswith("\n"):
-            row: dict[str, Any] = json.loads(line)
-            return row
+            with suppress(ValueError):
+                row: dict[str, Any] = json.loads(line)
+                return row
         self.end()
+        remove_unfinished(job.output)
         if limit is not None and seconds >= limit:
-            error = f"it took longer than {limit:g} s"
+            why = f"it took longer than {limit:g} s"
         else:
-            error = f"its process ended with code {process.returncode}, for want of memory perhaps"
-        return {
-            "mesh": job.mesh,
-            "output": job.output,
-            "status": "failed",
-            "error": error,
-            "seconds": round(seconds, 3),
-        }
+            why = f"its process {_end_of(process.returncode)}, for want of memory perhaps"
+        return failed(job, why, round(seconds, 3))
 
     def end(self) -> None:
         """End the process, whatever it does; for the thread that uses it."""
@@ -76,7 +100,7 @@ class Child:
     def _started(self) -> subprocess.Popen[str]:
         if self._process is None or self._process.poll() is not None:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "coneflat.batch.child"],
+                COMMAND,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..errors import OptionError
+from ..io.atomic import make_folder
+from ..text import plural
 from .jobs import Job
 from .journal import Journal, check_summary, write_summary
 
@@ -23,10 +26,12 @@ class BatchSummary:
     Attributes:
         rows: one per mesh, in the order of the jobs.
         skipped: meshes that were done before.
+        notes: what is to be said of the batch as a whole, one sentence each.
     """
 
     rows: tuple[dict[str, Any], ...]
     skipped: int
+    notes: tuple[str, ...] = ()
 
     @property
     def failed(self) -> int:
@@ -54,7 +59,7 @@ def run_batch(
         jobs: see `find_jobs`.
         folder: of the results.
         processes: on this machine; None: as many as there are cores.
-        limit: seconds per mesh, after which it has failed; None for none.
+        limit: seconds per mesh, after which it has failed; None, or infinity, for none.
         dask: address of a Dask scheduler, to work on its cluster instead; its workers must see the same files.
         redo: work on meshes that are done, too.
         summary: .csv or .parquet; None: summary.csv in the folder.
@@ -68,7 +73,10 @@ def run_batch(
         raise OptionError(f"there must be at least one process, not {processes}")
     if limit is not None and not limit > 0:
         raise OptionError(f"the time limit must be positive, not {limit:g} s")
+    if limit is not None and limit > threading.TIMEOUT_MAX:
+        limit = None
     summary = folder / "summary.csv" if summary is None else summary
+    make_folder(folder)
     check_summary(summary)
     journal = Journal(folder)
     open_jobs = [job for job in jobs if redo or not journal.is_done(job)]
@@ -80,7 +88,10 @@ def run_batch(
     finally:
         rows = tuple(journal.rows[job.output] for job in jobs if job.output in journal.rows)
         write_summary(summary, rows)
-    return BatchSummary(rows, len(jobs) - len(open_jobs))
+    notes: tuple[str, ...] = ()
+    if journal.broken:
+        notes = (f"Left out {plural(journal.broken, 'broken line')} of the journal.",)
+    return BatchSummary(rows, len(jobs) - len(open_jobs), notes)
 
 
 def _rows(

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from ..text import plural
+from ..text import plural, printable
 from .method import check_combinations, method_keywords, method_options
 from .shared import require_option
 from .talk import talk_options
@@ -101,7 +101,9 @@ def batch(
         def tell(row: dict[str, Any], done: int, count: int) -> None:
             rows.append(row)
             what, *more = _lines(row, console.verbose)
-            console.say([f"{done:>{len(str(count))}}/{count}  {Path(row['mesh']).name}  {what}", *more])
+            console.say(
+                [f"{done:>{len(str(count))}}/{count}  {printable(Path(row['mesh']).name)}  {what}", *more]
+            )
             console.progress(f"{done} of {plural(count, 'mesh', 'meshes')}", done / count)
 
         console.say([f"flattening {plural(len(todo), 'mesh', 'meshes')} into {out}"])
@@ -118,6 +120,7 @@ def batch(
         )
         before = f", {found.skipped:,} of them before" if found.skipped else ""
         failed = f"; {found.failed:,} failed" if found.failed else ""
+        console.say(f"note: {note}" for note in found.notes)
         console.say([f"{len(todo) - found.failed:,} of {len(todo):,} meshes are flattened{before}{failed}"])
         console.say(_slowest(rows, console.elapsed))
         console.finish([summary or out / "summary.csv"])
@@ -128,18 +131,18 @@ def batch(
 def _lines(row: dict[str, Any], verbose: bool) -> Iterator[str]:
     """Yield what became of a mesh; if verbose, also where the result is, and the notes on it."""
     if row["status"] != "done":
-        yield f"failed: {row['error']}"
+        yield f"failed: {printable(row['error'])}"
         return
     counts = f"{plural(row['triangles'], 'triangle')}, {plural(row['cones'], 'cone')}"
     yield f"{counts}, QC {row['qc_mean']:.4f}, {row['seconds']:.1f} s"
     if verbose:
-        yield f"wrote {row['output']}"
+        yield f"wrote {printable(row['output'])}"
         yield from [f"note: {row['notes']}"] * bool(row["notes"])
 
 
 def _slowest(rows: Sequence[dict[str, Any]], elapsed: float) -> Iterator[str]:
     """Yield where the time went, if anything was done."""
-    took = sorted(((row["seconds"] or 0.0, Path(row["mesh"]).name) for row in rows), reverse=True)
+    took = sorted(((row["seconds"] or 0.0, printable(Path(row["mesh"]).name)) for row in rows), reverse=True)
     if took:
         longest = ", ".join(f"{name} {seconds:.1f}" for seconds, name in took[:LONGEST])
         yield f"time {elapsed:.1f} s, {sum(seconds for seconds, _ in took):.1f} s of work; the longest: {longest}"

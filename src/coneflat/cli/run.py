@@ -13,6 +13,7 @@ from ..errors import OptionError
 from ..io import atomic_write, check_output, read_flattening
 from ..io.atomic import check_target
 from ..io.join import Joined, read_joined
+from ..io.write import write_measured
 from ..mapped import has_uv
 from ..pipeline import flatten
 from ..requirements import Requirement
@@ -102,9 +103,9 @@ def flatten_joined(source: Joined, console: Console, options: Mapping[str, Any])
 def save(
     result: Flattening, console: Console, output: Path, report: Path | None, texture: str | None = None
 ) -> Flattening:
-    """Write a result and its report, and return it with the time that everything took."""
+    """Write a result and its report, and return it as it was written, with the time that everything took."""
     with console.stage("write", FLATTENED):
-        result.save(output, texture=texture)
+        result = write_measured(result, output, texture)
     result = replace(result, seconds=dict(console.seconds))
     if report is not None:
         with atomic_write(report, "w") as file:

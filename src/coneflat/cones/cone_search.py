@@ -199,9 +199,8 @@ class ConeSearch:
         count = min(count, self.most_cones)
         self._climb(0.0, count + 1, count)
         self._improve(max(1, count - 2), count + 1)
-        for some in (count - 1, count):
-            if some in self.coarse.best:
-                self.polished(some, 0.0)
+        for some in sorted(size for size in self.coarse.best if size <= count)[-2:]:
+            self.polished(some, 0.0)
         found = self.pool.model.best
         return self._result(min((c for c in found if c <= count), key=lambda c: (found[c][0], c)))
 
@@ -260,7 +259,11 @@ class ConeSearch:
 
     def _improve(self, least: int, most: int, goal: float = 0.0) -> None:
         model = self.coarse
-        least, most = max(least, min(model.best)), min(most, max(model.best))
+        sizes = [size for size in sorted(model.best) if least <= size <= most]
+        if not sizes:
+            # On what is nearly flat, a few cones or none leave nothing to gain by more.
+            return
+        least, most = sizes[0], sizes[-1]
         for _ in range(4):
             better = model.descend(most, least)
             better |= model.ascend(least, most)

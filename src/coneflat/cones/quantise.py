@@ -13,6 +13,7 @@ import numpy as np
 
 from .._arrays import IntArray
 from ..errors import CurvatureError, OptionError
+from ..options import LEAST_QUANTUM
 from .cone_search import COARSE_DOUBT, ConeSearch
 from .lattice import Charges, Lattice
 from .pool import ROUNDS, WORTHWHILE
@@ -20,8 +21,8 @@ from .solution import FULL_TURN, ConeSolution
 
 # How far, relative, 2 pi chi may be from a multiple of the quantum: what a quantum typed with seven digits is off by.
 WHOLE = 1e-6
-# Quanta that stand for "no bound": more than the curvature of any cone worth having.
-UNBOUNDED = 1000
+# Curvature, radians, that stands for "no bound": more than that of any cone worth having.
+UNBOUNDED = 2000 * math.pi
 # The survey ends so many sizes after the goal is met, or after E has ceased to fall: more cones of whole quanta need
 # not be better.
 BEYOND, STALLED = 2, 5
@@ -99,8 +100,8 @@ def quantise_cones(
 
 def open_lattice(search: ConeSearch, quantum: float) -> Lattice:
     """Return the lattice of multiples of a quantum that a search's limits allow, without charges yet."""
-    if not 0 < quantum <= FULL_TURN * (1 + WHOLE):
-        raise OptionError(f"the quantum must be positive and at most 2 pi, not {quantum:g} radians")
+    if not LEAST_QUANTUM <= quantum <= FULL_TURN * (1 + WHOLE):
+        raise OptionError(f"the quantum must be from {LEAST_QUANTUM:g} radians to 2 pi, not {quantum:g}")
     parts = round(FULL_TURN / quantum)
     if abs(parts * quantum - FULL_TURN) <= WHOLE * FULL_TURN:
         quantum = FULL_TURN / parts
@@ -113,8 +114,8 @@ def open_lattice(search: ConeSearch, quantum: float) -> Lattice:
                 f"curvatures must sum to 2 pi chi = {limits.total / np.pi:.6g} pi, which is no multiple of "
                 f"{quantum / np.pi:.6g} pi"
             )
-    least = -UNBOUNDED if limits.least == -math.inf else math.ceil(limits.least / quantum - WHOLE)
-    most = UNBOUNDED if limits.most == math.inf else math.floor(limits.most / quantum + WHOLE)
+    least = math.ceil(max(limits.least, -UNBOUNDED) / quantum - WHOLE)
+    most = math.floor(min(limits.most, UNBOUNDED) / quantum + WHOLE)
     if (
         least > most
         or least == most == 0

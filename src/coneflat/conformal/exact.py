@@ -17,6 +17,8 @@ from .preconditioner import Inverse
 
 # How far, in radians, prescribed curvatures may miss Gauss-Bonnet; decimals typed by hand are good to more.
 SUM_TOLERANCE = 1e-8
+# A first guess of phi with a wider range than this makes lengths whose squares overflow.
+WIDEST_RANGE = 1000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,28 +111,45 @@ def exact_metric(
     log_scale = np.zeros(n) if start is None else np.array(start, dtype=np.float64)
     log_scale[fixed] = np.broadcast_to(np.asarray(fixed_log_scale, dtype=np.float64), (n,))[fixed]
 
-    triangulation = intrinsic_triangulation(mesh, lengths)
+    plain = np.where(fixed, log_scale, 0.0)
+    if not np.ptp(log_scale) <= WIDEST_RANGE:
+        log_scale = plain
     flat_turn = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
-    problem = kind(triangulation, flat_turn, target, fixed, pinned, preconditioner)
-    euclidean = problem.prepare(delaunay)
-    state = minimize(problem, log_scale, tolerance, max_steps)
-    original = np.arange(n)
-    doubled = not _is_solved(state, tolerance) and bool(mesh.is_boundary_vertex.any())
-    steps = problem.steps
-    if doubled:
-        triangulation, original = double(intrinsic_triangulation(mesh, lengths))
-        copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
-        problem = kind(
-            triangulation,
-            np.full(len(original), 2 * np.pi),
-            (copies * target)[original],
-            fixed[original],
-            np.concatenate([pinned, np.zeros(len(original) - n, dtype=bool)]),
-        )
+    copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
+    doubled, steps = False, 0
+
+    def solved_from(first: FloatArray) -> tuple[ConformalProblem, State, IntArray, int]:
+        """Return the problem, its best state, the vertices it is about, and how many flips made it Delaunay."""
+        triangulation, original = intrinsic_triangulation(mesh, lengths), np.arange(n)
+        if doubled:
+            triangulation, original = double(triangulation)
+            problem = kind(
+                triangulation,
+                np.full(len(original), 2 * np.pi),
+                (copies * target)[original],
+                fixed[original],
+                np.concatenate([pinned, np.zeros(len(original) - n, dtype=bool)]),
+            )
+        else:
+            problem = kind(triangulation, flat_turn, target, fixed, pinned, preconditioner)
         euclidean = problem.prepare(delaunay)
-        state = minimize(problem, log_scale[original], tolerance, max_steps)
-        state.curvature[:n] /= copies
+        return problem, minimize(problem, first[original], tolerance, max_steps), original, euclidean
+
+    problem, state, original, euclidean = solved_from(log_scale)
+    steps += problem.steps
+    if not _is_solved(state, tolerance) and mesh.is_boundary_vertex.any():
+        doubled = True
+        problem, state, original, euclidean = solved_from(log_scale)
         steps += problem.steps
+    if not _is_solved(state, tolerance) and (log_scale != plain).any():
+        # A first guess may lie so far off, on a field of spikes say, that nothing is left of the triangles there. The
+        # input's own scale is finite.
+        again = solved_from(plain)
+        steps += again[0].steps
+        if again[1].largest < state.largest:
+            problem, state, original, euclidean = again
+    if doubled:
+        state.curvature[:n] /= copies
     if pinned.any():
         state.log_scale = _keep_area(mesh, lengths, problem, state.log_scale, original)
     return _finish(problem, state, n, euclidean, steps, tolerance, doubled)
@@ -163,7 +182,9 @@ def _keep_area(
     before = np.bincount(labels[mesh.faces[:, 0]], weights=double_areas(lengths), minlength=count)
     after = np.bincount(component[faces[:, 0]], weights=double_areas(metric), minlength=count)
     copies = len(metric) / len(lengths)  # 2 if the surface was doubled
-    shift = np.log(copies * before / after) / 2
+    # Where nothing is left of the area, the metric is refused: any shift will do.
+    is_left = np.isfinite(after) & (after > 0)
+    shift = np.log(copies * before / np.where(is_left, after, copies * before)) / 2
     shifted: FloatArray = log_scale + np.where(free, shift, 0.0)[component]
     return shifted
 

@@ -25,6 +25,8 @@ LARGEST_STEP = 5.0
 COARSEST = 0.05
 # Log scales that differ by less than this have nearly the same Hessian.
 NEARLY = 0.05
+# A step of this share of phi is lost in the sum: triangles are too thin for the tolerance.
+ROUNDING = 2.0**-52
 # Halvings of a step after which it is taken for rounding: the change is then below 1e-9 of the first trial.
 HALVINGS = 30
 # The same where the surface can be doubled instead of creeping along triangles that are about to break.
@@ -43,8 +45,9 @@ class State:
 
     @property
     def largest(self) -> float:
-        """The largest residual, radians."""
-        return float(np.abs(self.residual).max(initial=0.0))
+        """The largest residual, radians; infinite where the scale is beyond double precision."""
+        largest = float(np.abs(self.residual).max(initial=0.0))
+        return largest if np.isfinite(largest) else np.inf
 
 
 def centred(log_scale: FloatArray) -> FloatArray:
@@ -198,6 +201,8 @@ def minimize(problem: ConformalProblem, log_scale: FloatArray, tolerance: float,
             step, is_exact = problem.direction(state)
         except MetricError:  # singular in double precision: the best so far has to do
             break
+        if best.largest > tolerance and np.abs(step).max() <= ROUNDING * np.abs(state.log_scale).max():
+            break
         halvings = 0
         if best.largest > tolerance:
             halvings = HALVINGS_BOUNDED if bounded else HALVINGS
@@ -225,7 +230,10 @@ def search_line(
         return None
     length = min(1.0, LARGEST_STEP / reach)
     for _ in range(halvings + 1):
-        trial = problem.evaluate(state.log_scale + length * step)
+        place = state.log_scale + length * step
+        if np.array_equal(place, state.log_scale):  # shorter than rounding
+            return None
+        trial = problem.evaluate(place)
         slope = -float(trial.residual @ step)
         if (slope <= 0 or trial.largest <= least / 2) and not (problem.is_bounded and trial.broken):
             return trial

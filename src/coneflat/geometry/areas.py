@@ -8,6 +8,11 @@ from .._arrays import FloatArray, IntArray
 from ..errors import OptionError
 from .triangles import double_areas
 
+# Of the largest: weights below count as this. Without any, the norm would not tell apart what only lies there.
+LEAST_WEIGHT = 1e-6
+# Numbers up to this, and down to its inverse, can be multiplied and summed up without a thought.
+LARGE = 1e100
+
 
 def vertex_areas(faces: IntArray, lengths: FloatArray, vertex_count: int) -> FloatArray:
     """Return (n,) a third of the area of the triangles at each vertex."""
@@ -27,7 +32,17 @@ def weighted_areas(areas: FloatArray, weights: FloatArray | None) -> FloatArray:
         return areas / areas.sum()
     if np.shape(weights) != areas.shape or not np.isfinite(weights).all() or (weights < 0).any():
         raise OptionError(f"importance weights must be {len(areas)} numbers that are finite and not negative")
-    share = areas * weights
-    if not share.sum() > 0:
+    if not weights.max() > 0:
         raise OptionError("importance weights are zero everywhere")
-    return share / share.sum()
+    share = areas * np.maximum(at_unit_scale(weights), LEAST_WEIGHT)
+    return np.asarray(share / share.sum())
+
+
+def at_unit_scale(values: FloatArray) -> FloatArray:
+    """Return values of 0 and more, not all 0, times the power of two that brings the largest to between 1/2 and 1."""
+    return np.ldexp(values, -np.frexp(values.max())[1])
+
+
+def at_safe_scale(values: FloatArray) -> FloatArray:
+    """Return values as they are where sums of their products with lengths are finite, else at unit scale."""
+    return values if 1 / LARGE < values.max(initial=1.0) < LARGE else at_unit_scale(values)

@@ -7,7 +7,7 @@ from .model import MeshFile
 from .npz import read_flattening
 from .polygons import is_polygon_side, triangulate
 from .raw import COLOURS
-from .read import INPUT_FORMATS, read_mesh
+from .read import INPUT_FORMATS, read_mesh, read_mesh_from
 from .write import OUTPUT_FORMATS, check_output, write_flattening
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "is_polygon_side",
     "read_flattening",
     "read_mesh",
+    "read_mesh_from",
     "triangulate",
     "write_flattening",
 ]

@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+import glob
 import os
 import secrets
 import shutil
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 from typing import IO, Any
 
 from ..errors import ConeflatError, MeshFileError, UnknownFormatError
+
+
+def as_path(path: object) -> Path:
+    """Return the path that text, bytes or a path object names.
+
+    Raises:
+        MeshFileError: it is something else.
+    """
+    try:
+        return Path(os.fsdecode(path))  # type: ignore[arg-type]
+    except TypeError as error:
+        raise MeshFileError(f"a file is named by text or a path, not by {type(path).__name__}") from error
 
 
 def known_ending(path: Path, endings: Collection[str], what: str) -> str:
@@ -36,7 +49,7 @@ def check_target(path: str | PathLike[str]) -> Path:
         MeshFileError: the folder is missing, or the path is something other than a file, or writing is not
             permitted.
     """
-    path = Path(path)
+    path = as_path(path)
     try:
         target = Path(os.path.realpath(path))
         folder = target.parent
@@ -88,7 +101,7 @@ def atomic_write(path: str | PathLike[str], mode: str = "wb") -> Iterator[IO[Any
         raise ValueError(f"mode must be 'w' or 'wb', not {mode!r}")
     target = check_target(path)
     # Created by open(), and not by tempfile, so that it has the permissions of any new file.
-    temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
+    temporary = target.with_name(_temporary(target.name, secrets.token_hex(6)))
     text = {} if mode == "wb" else {"encoding": "utf-8", "newline": ""}
     try:
         with open(temporary, mode.replace("w", "x"), **text) as stream:  # type: ignore[call-overload]
@@ -99,9 +112,21 @@ def atomic_write(path: str | PathLike[str], mode: str = "wb") -> Iterator[IO[Any
     except ConeflatError:
         raise
     except OSError as error:
-        raise _failure(Path(path), error) from error
+        raise _failure(as_path(path), error) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _temporary(name: str, mark: str) -> str:
+    return f".{name[:100]}.{mark}.tmp"
+
+
+def remove_unfinished(path: str | PathLike[str]) -> None:
+    """Remove what a process that was killed while it wrote a file has left of it."""
+    target = Path(os.path.realpath(path))
+    for left in target.parent.glob(_temporary(glob.escape(target.name[:100]), "?" * 12)):
+        with suppress(OSError):
+            left.unlink()
 
 
 def _failure(path: Path, error: Exception) -> MeshFileError:

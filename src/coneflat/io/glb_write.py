@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import struct
+from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import FloatArray, IntArray
 from ..errors import MeshFileError
+from .gltf_write import scene_with_uvs
+from .normals import corner_normals, vertex_normals
 from .texture import Texture
 from .uv_split import split_at_seams
 
@@ -32,37 +33,33 @@ _MATERIAL: dict[str, Any] = {
 }
 
 
-def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None = None) -> None:
-    """Write a result as GLB, with a two-sided material that is plain or has a texture.
+def write_glb(
+    result: Flattening, stream: IO[bytes], texture: Texture | None = None, folder: Path | None = None
+) -> None:
+    """Write a result as GLB.
 
-    Every vertex has its UV as TEXCOORD_0 (whose v points down, as glTF has it), a normal of the uncut
-    surface, and as _SOURCE_VERTEX the vertex of the input that it came from. All are 32-bit floats, the only
-    type that glTF has for them: source vertices are exact up to 2^24.
+    Of a mesh that was read from a glTF scene, that is the scene with new UVs. Else it has one mesh, with a two-sided
+    material that is plain or has a texture. Every vertex has its UV as TEXCOORD_0 (whose v points down, as glTF has
+    it), the input's normal or else one of the uncut surface, and as _SOURCE_VERTEX the vertex of the input that it
+    came from. All are 32-bit floats, the only type that glTF has for them: source vertices are exact up to 2^24.
 
     Args:
         result: what to write.
         stream: a binary file.
-        texture: the image of the material; None for a light grey.
+        texture: the image of the material; None for a light grey, or the scene's own materials.
+        folder: where the file will be, for paths of images that are not to be had; by default the current one.
 
     Raises:
         MeshFileError: it is larger than GLB can be.
     """
-    split = split_at_seams(result)
-    arrays: list[NDArray[Any]] = [split.faces.reshape(-1).astype("<u4")]
-    attributes = {
-        "POSITION": split.vertices,
-        "NORMAL": _normals(result.vertices, result.faces)[split.own],
-        "TEXCOORD_0": split.uv * [1, -1] + [0, 1],
-        "_SOURCE_VERTEX": split.origin,
-    }
-    arrays += [values.astype("<f4") for values in attributes.values()]
-    tree = _scene(arrays, list(attributes))
-    if texture is not None:
-        image = texture.content + bytes(-len(texture.content) % 4)
-        _add_image(tree, len(image), texture.kind)
-        arrays.append(np.frombuffer(image, dtype=np.uint8))
+    scene = None if result.source is None or result.face_corners is None else result.source.scene
+    if scene is None:
+        tree, pieces = _one_mesh(result, texture)
+    else:
+        look = None if texture is None else _look()
+        tree, pieces = scene_with_uvs(result, scene, Path() if folder is None else folder, look, texture)
     header = _as_text(tree)
-    size = sum(array.nbytes for array in arrays)
+    size = sum(map(len, pieces))
     total = 12 + 8 + len(header) + 8 + size
     if total > _MOST_BYTES:
         raise MeshFileError(
@@ -71,8 +68,30 @@ def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None = N
     stream.write(struct.pack("<4sII I4s", b"glTF", 2, total, len(header), b"JSON"))
     stream.write(header)
     stream.write(struct.pack("<I4s", size, b"BIN\0"))
-    for array in arrays:
-        stream.write(array.data)
+    stream.writelines(pieces)
+
+
+def _one_mesh(result: Flattening, texture: Texture | None) -> tuple[dict[str, Any], list[bytes]]:
+    """Return the JSON of a scene of one mesh, and its buffer in pieces."""
+    split = split_at_seams(result, corner_normals(result))
+    normals = split.normals
+    if normals is None:
+        normals = vertex_normals(result.vertices, result.faces)[split.own]
+    arrays: list[NDArray[Any]] = [split.faces.reshape(-1).astype("<u4")]
+    attributes = {
+        "POSITION": split.vertices,
+        "NORMAL": normals,
+        "TEXCOORD_0": split.uv * [1, -1] + [0, 1],
+        "_SOURCE_VERTEX": split.origin,
+    }
+    arrays += [values.astype("<f4") for values in attributes.values()]
+    tree = _scene(arrays, list(attributes))
+    pieces = [array.tobytes() for array in arrays]
+    if texture is not None:
+        image = texture.content + bytes(-len(texture.content) % 4)
+        _add_image(tree, len(image), texture)
+        pieces.append(image)
+    return tree, pieces
 
 
 def _scene(arrays: list[NDArray[Any]], names: list[str]) -> dict[str, Any]:
@@ -107,35 +126,23 @@ def _scene(arrays: list[NDArray[Any]], names: list[str]) -> dict[str, Any]:
     }
 
 
-def _add_image(tree: dict[str, Any], size: int, kind: str) -> None:
+def _add_image(tree: dict[str, Any], size: int, texture: Texture) -> None:
     """Give the material an image, that comes behind all else in the buffer."""
     start = tree["buffers"][0]["byteLength"]
     tree["bufferViews"].append({"buffer": 0, "byteOffset": start, "byteLength": size})
     tree["buffers"][0]["byteLength"] = start + size
-    tree["images"] = [{"bufferView": len(tree["bufferViews"]) - 1, "mimeType": kind}]
+    tree["images"] = [{"bufferView": len(tree["bufferViews"]) - 1, "mimeType": texture.kind}]
     tree["textures"] = [{"source": 0}]
-    look = _MATERIAL["pbrMetallicRoughness"] | {
-        "baseColorFactor": [1.0] * 4,
-        "baseColorTexture": {"index": 0},
-    }
-    tree["materials"] = [_MATERIAL | {"pbrMetallicRoughness": look}]
+    tree["materials"] = [_look()]
+
+
+def _look() -> dict[str, Any]:
+    """Return a material that shows an image, number 0 of the textures."""
+    shown = {"baseColorFactor": [1.0] * 4, "baseColorTexture": {"index": 0}}
+    return _MATERIAL | {"pbrMetallicRoughness": _MATERIAL["pbrMetallicRoughness"] | shown}
 
 
 def _as_text(tree: dict[str, Any]) -> bytes:
     """Return JSON, filled up with blanks to a multiple of 4."""
     text = json.dumps(tree, separators=(",", ":")).encode("ascii")
     return text + b" " * (-len(text) % 4)
-
-
-def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (n, 3) unit normals, each the mean of its triangles' by area; (0, 0, 1) where there is none."""
-    a, b, c = (np.take(vertices, faces[:, k], axis=0) for k in range(3))
-    by_face = np.cross(b - a, c - a)
-    total = np.stack(
-        [np.bincount(faces.reshape(-1), np.repeat(by_face[:, k], 3), len(vertices)) for k in range(3)], axis=1
-    )
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    flat = length[:, 0] == 0
-    normals = total / np.where(length == 0, 1, length)
-    normals[flat] = (0, 0, 1)
-    return np.asarray(normals)

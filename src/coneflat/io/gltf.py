@@ -1,69 +1,179 @@
-"""Reading glTF and GLB scenes, by trimesh's loader."""
+"""Reading glTF and GLB scenes."""
 
 from __future__ import annotations
 
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from ..errors import EmptyMeshError, MeshFileError
+from ..errors import EmptyMeshError
+from .gltf_data import GltfData
+from .gltf_names import check_names
+from .gltf_scene import DRACO, GltfScene, ScenePart, shown_nodes, triangle_corners
 from .raw import RawMesh, triangle_offsets
+from .weld import weld
+
+#: A scene may show its meshes so often that it has as many corners in all,
+MOST_CORNERS = 10_000_000
+#: or else as many for each byte of the file.
+MOST_CORNERS_PER_BYTE = 8
 
 
 def parse_gltf(path: Path, content: bytes) -> RawMesh:
     """Return all triangle meshes of the scene as one, in scene coordinates.
 
-    A mesh that several nodes show is there as often as it is shown. Lines and points are left out.
+    A mesh that several nodes show is there as often as it is shown. Lines and points are left out. What a skeleton or
+    a morph target would move stays where it is without.
 
     Raises:
         EmptyMeshError: the scene shows no triangle.
-        MeshFileError: its data are compressed in a way that cannot be decoded.
+        MeshFileError: the file is broken, or its data are compressed in a way that cannot be decoded.
     """
-    # trimesh takes about a second to import.
-    from trimesh.exchange.gltf import load_glb, load_gltf
-    from trimesh.resolvers import FilePathResolver
-
-    load = load_glb if content[:4] == b"glTF" else load_gltf
-    scene = load(BytesIO(content), resolver=FilePathResolver(str(path)), skip_materials=True)
-    nodes = {node["frame_to"]: node for node in scene["graph"]}
-
-    vertices: list[FloatArray] = [np.empty((0, 3))]
-    faces: list[IntArray] = [np.empty((0, 3), dtype=np.int64)]
-    count = 0
-    for frame, node in nodes.items():
-        shape = scene["geometry"].get(node.get("geometry"), {})
-        if "faces" not in shape:
-            continue
-        points = np.asarray(shape["vertices"], dtype=np.float64)
-        triangles = np.asarray(shape["faces"]).astype(np.int64)
-        if len(points) and not points.any():
-            # The loader gives zeros for sparse and compressed data.
-            raise MeshFileError(f"{path}: its positions cannot be decoded; save it without compression")
-        matrix = _placement(nodes, frame)
-        if np.linalg.det(matrix[:3, :3]) < 0:
-            # The glTF specification turns the winding under a mirroring node.
-            triangles = triangles[:, ::-1]
-        vertices.append(points @ matrix[:3, :3].T + matrix[:3, 3])
-        faces.append(triangles + count)
-        count += len(points)
-    joined = np.concatenate(faces)
-    if not len(joined):
-        raise EmptyMeshError(f"{path} has no faces")
-    corners = joined.reshape(-1)
-    # A vertex is repeated wherever its UVs differ.
-    texture = corners if b"TEXCOORD_0" in content else None
-    return RawMesh(np.concatenate(vertices), corners, triangle_offsets(len(joined)), texture=texture)
+    reading = _Reading(GltfData(path, content))
+    for node, matrix in shown_nodes(reading.data):
+        mesh = reading.data.item("nodes", node).get("mesh")
+        if mesh is not None:
+            reading.add_mesh(node, mesh, matrix)
+    check_names(reading.data)
+    return reading.done()
 
 
-def _placement(nodes: dict[str, dict[str, Any]], frame: str) -> FloatArray:
-    """Return (4, 4) the transform from a node to the scene."""
-    matrix: FloatArray = np.eye(4)
-    seen = set()
-    while frame in nodes and frame not in seen:
-        seen.add(frame)
-        matrix = np.asarray(nodes[frame].get("matrix", np.eye(4)), dtype=np.float64) @ matrix
-        frame = nodes[frame]["frame_from"]
-    return matrix
+class _Reading:
+    """The parts of a scene, one after the other."""
+
+    def __init__(self, data: GltfData) -> None:
+        self.data = data
+        self._most = max(MOST_CORNERS, MOST_CORNERS_PER_BYTE * data.total_bytes)
+        self._parts: list[ScenePart] = []
+        self._vertices: list[FloatArray] = [np.empty((0, 3))]
+        self._corners: list[IntArray] = [np.empty(0, np.int64)]
+        self._count = self._corner_count = 0
+        self._blocks = [0]
+        # Of each part's corners: the UVs and normals, None where the primitive has none.
+        self._uvs: list[FloatArray | None] = []
+        self._normals: list[FloatArray | None] = []
+
+    def add_mesh(self, node: int, mesh: Any, matrix: FloatArray) -> None:
+        """Add the triangles of a mesh that a node shows.
+
+        Raises:
+            MeshFileError: they are broken or compressed, or there are too many in all.
+        """
+        data = self.data
+        linear = matrix[:3, :3]
+        is_mirrored = bool(np.linalg.det(linear) < 0)
+        placed: dict[
+            Any, tuple[int, int]
+        ] = {}  # of each array of positions, the first vertex and their number
+        for index, primitive in enumerate(data.entry(data.item("meshes", mesh), "primitives", list, [])):
+            attributes = data.entry(primitive, "attributes", dict, {})
+            position = attributes.get("POSITION")
+            if position is None:
+                continue
+            self._refuse_packed(primitive, position)
+            corners = triangle_corners(data, primitive, data.accessor(position).length)
+            if not len(corners):
+                continue
+            if position not in placed:
+                points = data.values(position, 3)
+                self._take(len(points), 0)
+                placed[position] = (self._count, len(points))
+                self._vertices.append(points @ linear.T + matrix[:3, 3])
+                self._count += len(points)
+            first, count = placed[position]
+            self._check_copied(primitive, count)
+            self._take(0, len(corners))
+            if is_mirrored:
+                # The specification turns the winding under a mirroring node (Section 3.7.4).
+                corners = corners.reshape(-1, 3)[:, ::-1].reshape(-1)
+            self._parts.append(ScenePart(node, mesh, index, corners, is_mirrored))
+            self._corners.append(corners + first)
+            self._uvs.append(self._attribute(attributes, "TEXCOORD_0", 2, corners))
+            normals = self._attribute(attributes, "NORMAL", 3, corners)
+            self._normals.append(None if normals is None else normals @ _cofactors(linear).T)
+        if self._count > self._blocks[-1]:
+            self._blocks.append(self._count)
+
+    def done(self) -> RawMesh:
+        """Return the mesh.
+
+        Raises:
+            EmptyMeshError: there is no triangle.
+        """
+        corners = np.concatenate(self._corners)
+        if not len(corners):
+            raise EmptyMeshError(f"{self.data.path} has no faces: its scene shows no triangle")
+        uv, texture = _numbered(self._uvs, self._parts, 2)
+        normals, normal = _numbered(self._normals, self._parts, 3)
+        return RawMesh(
+            np.concatenate(self._vertices),
+            corners,
+            triangle_offsets(len(corners) // 3),
+            texture=texture,
+            # v points down in glTF.
+            uv=None if uv is None else uv * [1, -1] + [0, 1],
+            normals=normals,
+            normal=normal,
+            scene=GltfScene(self.data, tuple(self._parts)),
+            blocks=np.array(self._blocks),
+        )
+
+    def _attribute(
+        self, attributes: dict[str, Any], name: str, columns: int, corners: IntArray
+    ) -> FloatArray | None:
+        """Return (c, columns) an attribute at some corners."""
+        if name not in attributes:
+            return None
+        return self.data.values(attributes[name], columns)[corners]
+
+    def _check_copied(self, primitive: dict[str, Any], count: int) -> None:
+        """Refuse arrays that are there for some of the vertices only, or not at all."""
+        data = self.data
+        for each in (primitive["attributes"], *data.entry(primitive, "targets", list, [])):
+            for name, index in each.items():
+                if len(data.raw(index)) < count:
+                    data.fail(f"a primitive has {name} for {len(data.raw(index))} of its {count} vertices")
+
+    def _take(self, vertices: int, corners: int) -> None:
+        """Count what a part adds, before it is added."""
+        self._corner_count += corners + vertices
+        if self._corner_count > self._most:
+            self.data.fail(
+                f"its scene shows meshes so often that there are over {self._most:,} corners, many times what the "
+                "file holds; write each mesh once"
+            )
+
+    def _refuse_packed(self, primitive: dict[str, Any], position: Any) -> None:
+        packed = DRACO in self.data.entry(primitive, "extensions", dict, {})
+        item = self.data.item("accessors", position)
+        if item.get("bufferView") is None and (packed or item.get("sparse") is None):
+            how = (
+                f"are compressed ({DRACO}); save it without compression" if packed else "are not in the file"
+            )
+            self.data.fail(f"the positions of a mesh {how}")
+
+
+def _numbered(
+    values: list[FloatArray | None], parts: list[ScenePart], columns: int
+) -> tuple[FloatArray | None, IntArray | None]:
+    """Return the different rows of values at the corners of all parts, and (c,) the row of each, -1 for none."""
+    given = [one for one in values if one is not None]
+    if not given:
+        return None, None
+    rows = np.concatenate(given)
+    padded = np.zeros((len(rows), 3))
+    padded[:, :columns] = rows
+    kept, number = weld(padded)
+    numbers = np.full(sum(len(part.corners) for part in parts), -1, dtype=np.int64)
+    has_one = np.repeat([one is not None for one in values], [len(part.corners) for part in parts])
+    numbers[has_one] = number
+    return rows[kept], numbers
+
+
+def _cofactors(linear: FloatArray) -> FloatArray:
+    """Return what turns normals as a (3, 3) matrix turns positions: its inverse transpose times a positive number."""
+    a, b, c = linear.T
+    rows = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    return np.asarray(np.copysign(1.0, np.linalg.det(linear)) * rows)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from .._arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
+    from .gltf_scene import GltfScene
     from .obj import ObjText
 
 
@@ -31,6 +32,9 @@ class MeshFile:
             None if it gives none at all.
         uv: (u, 2) the UV points that `texture` numbers, v upwards, not checked: they may be NaN; None where the
             reader has none.
+        normals: (k, 3) the normals that the file gives, of any length, in the directions of its positions.
+        normal: (c,) index into `normals` of every corner, -1 where it has none; None where the file has none at all.
+        scene: what else there is in a glTF file, which a GLB written keeps.
     """
 
     path: Path
@@ -43,3 +47,6 @@ class MeshFile:
     properties: Mapping[str, FloatArray] = field(default_factory=dict)
     texture: IntArray | None = None
     uv: FloatArray | None = None
+    normals: FloatArray | None = None
+    normal: IntArray | None = None
+    scene: GltfScene | None = None

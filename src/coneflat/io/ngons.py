@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
@@ -9,6 +11,12 @@ from .._arrays import BoolArray, FloatArray, IntArray
 #: Part of a polygon's area below which a triangle in it counts as empty: above the rounding of collinear
 #: corners, below any triangle worth having.
 _EMPTY_TRIANGLE = 1e-9
+
+#: Corners that a fan is tried from: all of any usual polygon, and so few that no polygon takes long.
+_APEXES = 256
+
+#: Diagonals of a polygon looked at before the shapes reached so far are taken: seconds.
+_MOST_TRIALS = 200_000
 
 
 def triangulate_ngons(points: FloatArray) -> IntArray:
@@ -83,35 +91,45 @@ def _flipped(plane: FloatArray, triangles: IntArray) -> IntArray:
     """
     points = [complex(x, y) for x, y in plane.tolist()]
     faces = [tuple(face) for face in triangles.tolist()]
+    # Of each directed side, the triangle and the corner opposite.
+    across = {(face[k], face[k - 2]): (t, face[k - 1]) for t, face in enumerate(faces) for k in range(3)}
 
     def shape(*face: int) -> float:
         a, b, c = (points[i] for i in face)
         sides = abs(b - a) ** 2 + abs(c - b) ** 2 + abs(a - c) ** 2
         return ((b - a).conjugate() * (c - a)).imag / sides if sides else 0.0
 
-    # Every flip raises the sorted list of shapes, so this ends.
-    changed = {-1}
-    while changed:
-        changed = set()
-        across = {(face[k], face[k - 2]): (t, face[k - 1]) for t, face in enumerate(faces) for k in range(3)}
-        for (a, b), (t, c) in across.items():
-            if a < b and (b, a) in across:
-                s, d = across[b, a]
-                gain = min(shape(d, b, c), shape(a, d, c)) - min(shape(a, b, c), shape(b, a, d))
-                if gain > _EMPTY_TRIANGLE and not changed & {s, t}:
-                    faces[t], faces[s] = (d, b, c), (a, d, c)
-                    changed |= {s, t}
+    # Every flip raises the sorted list of shapes, so this ends; most diagonals are flipped once, if at all.
+    waiting = deque((a, b) for a, b in across if a < b and (b, a) in across)
+    for _ in range(_MOST_TRIALS):
+        if not waiting:
+            break
+        a, b = waiting.popleft()
+        if (a, b) not in across or (b, a) not in across:
+            continue
+        (t, c), (s, d) = across[a, b], across[b, a]
+        gain = min(shape(d, b, c), shape(a, d, c)) - min(shape(a, b, c), shape(b, a, d))
+        if gain > _EMPTY_TRIANGLE:
+            del across[a, b], across[b, a]
+            for number, face in ((t, (d, b, c)), (s, (a, d, c))):
+                faces[number] = face
+                across |= {(face[k], face[k - 2]): (number, face[k - 1]) for k in range(3)}
+            waiting += [
+                (min(side), max(side)) for side in ((a, d), (d, b), (b, c), (c, a)) if side[::-1] in across
+            ]
     return np.sort(np.array(faces, dtype=np.int64), axis=1)
 
 
 def _best_fan(plane: FloatArray) -> tuple[IntArray, float]:
     """Return the fan whose smallest triangle is largest, and that triangle's part of the polygon's area.
 
+    Of very large polygons, some of the corners are tried.
+
     The part is 0 where triangles are empty or turned over, or the fan is not one turn around its centre.
     """
     size = len(plane)
     best = (-np.inf, 0)
-    for apex in range(size):
+    for apex in range(0, size, -(-size // _APEXES)):
         local = np.roll(plane, -apex, axis=0)[1:] - plane[apex]
         areas = local[:-1, 0] * local[1:, 1] - local[:-1, 1] * local[1:, 0]
         best = max(best, (float(areas.min()), -apex))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import zipfile
 from dataclasses import fields
 from io import BytesIO
 from os import PathLike
@@ -10,15 +12,28 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
 from ..errors import ConeflatError, MeshFileError
+from .atomic import as_path
 from .raw import read_bytes
 
 if TYPE_CHECKING:
     from ..distortion import Distortion
     from ..result import Flattening
     from ..rotations import Rotations
+
+
+#: The arrays of a result.
+_NAMES = (
+    "uv", "uv_faces", "vertices", "faces", "cones", "curvatures", "log_scale", "curvature_residual", "seams",
+    "vertex_origin", "face_origin", "qc", "log_area_scale", "uv_scale", "report",
+)  # fmt: skip
+#: Archives of version 0.1.0 do not have these.
+_NEWER = ("prescribed",)
+#: Results are not packed; programs that pack them gain a factor of a few.
+_MOST_UNPACKED = 30
 
 
 def write_npz(result: Flattening, stream: IO[bytes]) -> None:
@@ -32,6 +47,7 @@ def write_npz(result: Flattening, stream: IO[bytes]) -> None:
         "cones": result.cones,
         "curvatures": result.curvatures,
         "log_scale": result.log_scale,
+        "prescribed": result.prescribed,
         "curvature_residual": result.curvature_residual,
         "seams": result.seams,
         "vertex_origin": np.arange(len(result.vertices)) if origin is None else origin,
@@ -50,12 +66,10 @@ def read_flattening(path: str | PathLike[str]) -> Flattening:
     Raises:
         MeshFileError: the file is not there, may not be read, or is not such a result.
     """
-    path = Path(path)
+    path = as_path(path)
     content = read_bytes(path)
     try:
-        with np.load(BytesIO(content), allow_pickle=False) as archive:
-            arrays = dict(archive)
-        return _flattening(path, arrays)
+        return _flattening(path, _arrays(path, content))
     except (ConeflatError, MemoryError):
         raise
     except Exception as error:
@@ -64,73 +78,172 @@ def read_flattening(path: str | PathLike[str]) -> Flattening:
         raise MeshFileError(f"{path} is not a readable NPZ file: {reason}") from error
 
 
-def _flattening(path: Path, arrays: dict[str, Any]) -> Flattening:
+def _arrays(path: Path, content: bytes) -> dict[str, NDArray[Any]]:
+    """Return the arrays that a result has, none of which is larger than it can be in a file of this size.
+
+    NumPy allocates what the header of an array asks for, and unpacks whatever an archive holds.
+    """
+    arrays: dict[str, NDArray[Any]] = {}
+    left = _MOST_UNPACKED * len(content)
+    with zipfile.ZipFile(BytesIO(content)) as archive:
+        for name in (*_NAMES, *_NEWER):
+            try:
+                member = archive.getinfo(f"{name}.npy")
+            except KeyError:
+                continue
+            left -= member.file_size
+            if left < 0:
+                raise MeshFileError(
+                    f"{path} unpacks to more than {_MOST_UNPACKED} times its size: it is no result"
+                )
+            with archive.open(member) as stream:
+                arrays[name] = _array(stream.read())
+    return arrays
+
+
+def _array(content: bytes) -> NDArray[Any]:
+    """Return the array that a .npy file holds."""
+    stream = BytesIO(content)
+    version = np.lib.format.read_magic(stream)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, is_fortran, kind = read(stream)
+    if kind.hasobject:
+        raise ValueError("it holds Python objects")
+    count = math.prod(shape)
+    if min(shape, default=0) < 0 or count * kind.itemsize != len(content) - stream.tell():
+        raise ValueError(f"an array of the shape {shape} is not as large as it should be")
+    values = np.frombuffer(content, kind, count, stream.tell()) if count else np.empty(0, kind)
+    return values.reshape(shape, order="F" if is_fortran else "C")
+
+
+def _flattening(path: Path, arrays: dict[str, NDArray[Any]]) -> Flattening:
     from ..figures import SolveFigures
     from ..result import Flattening
 
-    for name in ("uv", "uv_faces", "vertices", "faces", "cones", "curvatures", "seams", "report"):
+    for name in _NAMES:
         if name not in arrays:
             what = "UVs" if name.startswith("uv") else "result of coneflat"
             raise MeshFileError(
                 f"{path} holds no {what}: {name!r} is missing; write it by `coneflat flatten`"
             )
     report = json.loads(str(arrays["report"]))
-    vertices, uv = _floats(path, arrays, "vertices", 3), _floats(path, arrays, "uv", 2)
-    faces = _indices(path, arrays, "faces", 3, len(vertices))
-    uv_faces = _indices(path, arrays, "uv_faces", 3, len(uv))
-    cones = _indices(path, arrays, "cones", 0, len(vertices))
-    if len(uv_faces) != len(faces) or len(arrays["curvatures"]) != len(cones) or not len(faces):
-        counts = f"{len(faces)} faces, {len(uv_faces)} of them with UVs; {len(cones)} cones"
-        raise MeshFileError(f"{path} is no result of coneflat: it has {counts}")
+    arrays.setdefault("prescribed", np.full(len(arrays["vertices"]), np.nan))
+    _check_report(report)
+    reading = _Checked(path, arrays)
+    vertices, uv = reading.floats("vertices", (None, 3)), reading.floats("uv", (None, 2))
+    n, u = len(vertices), len(uv)
+    faces = reading.indices("faces", (None, 3), n)
+    m = len(faces)
+    uv_faces = reading.indices("uv_faces", (m, 3), u)
+    cones = reading.indices("cones", (None,), n)
+    if not m:
+        raise MeshFileError(f"{path} is no result of coneflat: it has no faces")
     if not (np.isfinite(vertices).all() and np.isfinite(uv).all()):
         raise MeshFileError(f"{path} is no result of coneflat: it has positions or UVs that are not finite")
+    uv_scale = float(reading.floats("uv_scale", ()))
+    if not (np.isfinite(uv_scale) and uv_scale > 0):
+        raise MeshFileError(f"{path} is no result of coneflat: its UV scale is {uv_scale:g}")
     return Flattening(
         vertices=vertices,
         faces=faces,
         uv=uv,
         uv_faces=uv_faces,
-        uv_scale=float(arrays["uv_scale"]),
+        uv_scale=uv_scale,
         cones=cones,
-        curvatures=_floats(path, arrays, "curvatures", 0),
-        log_scale=_floats(path, arrays, "log_scale", 0),
-        curvature_residual=_floats(path, arrays, "curvature_residual", 0),
-        seams=_indices(path, arrays, "seams", 2, len(vertices)),
-        packing_efficiency=report["packing_efficiency"],
-        distortion=_distortion(arrays, report),
+        curvatures=reading.floats("curvatures", (len(cones),)),
+        log_scale=reading.floats("log_scale", (n,)),
+        prescribed=reading.floats("prescribed", (n,)),
+        curvature_residual=reading.floats("curvature_residual", (n,)),
+        seams=reading.indices("seams", (None, 2), n),
+        packing_efficiency=_number(report["packing_efficiency"]),
+        distortion=_distortion(reading, report, m),
         seconds=report["seconds"],
         notes=tuple(report["notes"]),
         settings=report["settings"],
-        solve=SolveFigures(**{field.name: report[field.name] for field in fields(SolveFigures)}),
+        solve=SolveFigures(**{field.name: _number(report[field.name]) for field in fields(SolveFigures)}),
         solvers=tuple(report["solvers"]),
         rotations=_rotations(report),
-        vertex_origin=arrays["vertex_origin"],
-        face_origin=arrays["face_origin"],
+        # Vertices that a refinement added come from none.
+        vertex_origin=reading.indices("vertex_origin", (n,), None, least=-1),
+        face_origin=reading.indices("face_origin", (m,), None),
     )
 
 
-def _floats(path: Path, arrays: dict[str, Any], name: str, columns: int) -> FloatArray:
-    """Return an array of numbers, (k, columns) or, for 0 columns, (k,)."""
-    values = np.asarray(arrays[name])
-    if values.dtype.kind not in "iuf" or values.shape[1:] != ((columns,) if columns else ()):
-        raise MeshFileError(f"{path}: {name!r} has the shape {values.shape} and the type {values.dtype}")
-    return values.astype(np.float64)
+def _check_report(report: Any) -> None:
+    """Raise ValueError if what a report says in words or lists is none of these."""
+    kinds = {"seconds": dict, "settings": dict, "notes": list, "solvers": list}
+    for name, kind in kinds.items():
+        if not isinstance(report[name], kind):
+            raise ValueError(f"{name!r} of its report is a {type(report[name]).__name__}")
+    if not all(isinstance(one, str) for one in (*report["notes"], *report["solvers"])):
+        raise ValueError("its report has notes that are no text")
+    for value in (report["packing_efficiency"], *report["seconds"].values()):
+        _number(value)
 
 
-def _indices(path: Path, arrays: dict[str, Any], name: str, columns: int, bound: int) -> IntArray:
-    """Return an array of indices from 0 up to a bound."""
-    values = _floats(path, arrays, name, columns).astype(np.int64)
-    if values.size and (values.min() < 0 or values.max() >= bound):
-        raise MeshFileError(f"{path}: {name!r} has indices beyond the {bound} there are")
-    return values
+def _number(value: Any) -> Any:
+    """Return a number of a report; JSON has no NaN, for which it has None.
+
+    Raises:
+        ValueError: it is none.
+    """
+    if value is not None and not isinstance(value, (int, float)):
+        raise ValueError(f"its report has {str(value)[:20]!r} for a number")
+    return math.nan if value is None else value
 
 
-def _distortion(arrays: dict[str, Any], report: dict[str, Any]) -> Distortion:
+class _Checked:
+    """Arrays of an archive, each of which must be what a result has there."""
+
+    def __init__(self, path: Path, arrays: dict[str, NDArray[Any]]) -> None:
+        self._path, self._arrays = path, arrays
+
+    def floats(self, name: str, shape: tuple[int | None, ...]) -> FloatArray:
+        """Return an array of numbers of a shape; None stands for any length.
+
+        Raises:
+            MeshFileError: it has another shape, or is of no numbers.
+        """
+        values = self._arrays[name]
+        lengths = [
+            np.shape(values)[i : i + 1] == (length,) or length is None for i, length in enumerate(shape)
+        ]
+        if values.dtype.kind not in "iuf" or values.ndim != len(shape) or not all(lengths):
+            wanted = ", ".join("any" if length is None else f"{length}" for length in shape)
+            raise MeshFileError(
+                f"{self._path}: {name!r} has the shape {values.shape} and the type {values.dtype}, not the shape "
+                f"({wanted}) and a type of numbers"
+            )
+        return values.astype(np.float64)
+
+    def indices(
+        self, name: str, shape: tuple[int | None, ...], bound: int | None, least: int = 0
+    ) -> IntArray:
+        """Return an array of whole numbers from `least` up to a bound, or to what an index can be.
+
+        Raises:
+            MeshFileError: it has another shape, or numbers beyond.
+        """
+        values = self.floats(name, shape)
+        end = 2**53 if bound is None else bound
+        if values.size and not (
+            values.min() >= least and values.max() < end and np.all(values == np.floor(values))
+        ):
+            there = "indices can be" if bound is None else f"the {bound} there are"
+            raise MeshFileError(f"{self._path}: {name!r} has indices beyond {there}")
+        return values.astype(np.int64)
+
+
+def _distortion(reading: _Checked, report: dict[str, Any], count: int) -> Distortion:
     from ..distortion import Distortion
     from ..report import MEASURES
 
-    # JSON has no NaN: the report has None for it.
-    numbers: dict[str, Any] = {name: np.nan if report[name] is None else report[name] for name in MEASURES}
-    return Distortion(qc=arrays["qc"], log_area_scale=arrays["log_area_scale"], **numbers)
+    numbers: dict[str, Any] = {name: _number(report.get(name)) for name in MEASURES}
+    return Distortion(
+        qc=reading.floats("qc", (count,)),
+        log_area_scale=reading.floats("log_area_scale", (count,)),
+        **numbers,
+    )
 
 
 def _rotations(report: dict[str, Any]) -> Rotations | None:

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
-from ..errors import EmptyMeshError, FaceIndexError
+from ..errors import EmptyMeshError, FaceIndexError, MeshFileError
 from .growing import Growing
 from .raw import COLOURS, NO_UV, RawMesh, first_bad_corner, offsets_of
 from .text import TextBlock, newline_of, text_blocks
 
-_OTHER, _VERTEX, _FACE, _TEXTURE, _ELEMENT, _COMMENTED_FACE = range(6)
+_OTHER, _VERTEX, _FACE, _TEXTURE, _NORMAL, _ELEMENT, _COMMENTED_FACE = range(7)
 #: By the first two characters of a line, as a 16-bit number, what it is.
 _KINDS = np.full(1 << 16, _OTHER, np.uint8)
 for _head, _kind in (
@@ -30,6 +30,7 @@ for _head, _kind in (
     (b"l ", _ELEMENT),
     (b"p ", _ELEMENT),
     (b"vt", _TEXTURE),
+    (b"vn", _NORMAL),
 ):
     _KINDS[int.from_bytes(_head, "big")] = _kind
 #: Instead of the number of a UV point that counts back beyond the first.
@@ -65,8 +66,9 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
         FaceIndexError: a face names vertex 0, or a vertex or UV point that does not exist.
     """
     newline = newline_of(content)
-    vertices, colours, uv = Growing(np.float64, 3), Growing(np.float64, 3), Growing(np.float64, 2)
-    corners, textures, normals, sizes = (Growing(np.int64) for _ in range(4))
+    vertices, colours, directions = (Growing(np.float64, 3) for _ in range(3))
+    corners, textures, normals, shading, sizes = (Growing(np.int64) for _ in range(5))
+    uv = Growing(np.float64, 2)
     gaps: defaultdict[int, bytearray] = defaultdict(bytearray)
     for block in text_blocks(path, content, continued=True):
         kinds = _KINDS[block.heads()]
@@ -86,7 +88,12 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
             # A number that counts back beyond the first is no sign that there is none.
             texture = np.where(texture < 0, np.where(counted < 0, _NO_SUCH_UV, counted), texture - 1)
         uv.add(_uv_points(block, np.flatnonzero(kinds == _TEXTURE)))
-        for known, found, none in ((textures, texture, NO_UV), (normals, normal, 0)):
+        shade = normal
+        if normal is not None:
+            beyond = len(directions) + np.cumsum(kinds == _NORMAL)[kinds == _FACE]
+            shade = np.where(normal < 0, np.repeat(beyond, counts) + normal + 1, normal)
+        directions.add(_directions(block, np.flatnonzero(kinds == _NORMAL)))
+        for known, found, none in ((textures, texture, NO_UV), (normals, normal, 0), (shading, shade, 0)):
             if found is not None:
                 known.add(np.full(len(corners) - len(known), none))
                 known.add(found)
@@ -96,7 +103,7 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
         raise EmptyMeshError(f"{path} has no vertices")
     if not len(sizes):
         raise EmptyMeshError(f"{path} has no faces")
-    for known, none in ((textures, NO_UV), (normals, 0)):
+    for known, none in ((textures, NO_UV), (normals, 0), (shading, 0)):
         if len(known):
             known.add(np.full(len(corners) - len(known), none))
     has_colours = len(colours) == len(vertices)
@@ -113,6 +120,8 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
         texture=textures.done() if len(textures) else None,
         # Some programs number UV points that they do not write.
         uv=uv.done() if len(textures) and len(uv) else None,
+        normals=directions.done(),
+        normal=shading.done() - 1 if len(shading) else None,
     )
     _check_corners(path, content, mesh)
     return mesh
@@ -143,10 +152,18 @@ def _faces(
     return words.counts, *words.corners()
 
 
+def _directions(block: TextBlock, rows: IntArray) -> FloatArray:
+    """Return (r, 3) the normals in some lines; NaN if one of them is not of three numbers, which nothing hangs on."""
+    try:
+        return block.words(rows, first=1).points()[:, :3]
+    except MeshFileError:
+        return np.full((len(rows), 3), np.nan)
+
+
 def _texts(block: TextBlock, kinds: NDArray[np.uint8], newline: bytes) -> Iterator[tuple[int, bytes]]:
     """Yield what `ObjText.gaps` keeps of a block, in pieces, each with the polygons of the block before it."""
     polygons = np.cumsum(kinds == _FACE)
-    kinds = np.where(kinds == _VERTEX, _OTHER, kinds)
+    kinds = np.where((kinds == _VERTEX) | (kinds == _NORMAL), _OTHER, kinds)
     if b"#" in block.raw:
         marks = np.flatnonzero(np.frombuffer(block.raw, np.uint8) == ord("#"))
         rows = np.searchsorted(block.line_starts, marks, side="right") - 1

@@ -6,13 +6,14 @@ import os
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, NamedTuple
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
 from .._arrays import IntArray
 from .decimals import lines_of
 from .obj import ObjText
+from .pieces import find_pieces
 
 if TYPE_CHECKING:
     from ..result import Flattening
@@ -24,22 +25,15 @@ _MATERIALS = re.compile(rb"(?m)^([ \t]*mtllib[ \t]+)([^\r\n]*?)(?=[ \t]*\r?$)")
 _FACES = 1 << 15
 
 
-class _Faces(NamedTuple):
-    """The faces to write: `corners` of the source, `sizes` of them to a face, and the polygon each is of."""
-
-    corners: IntArray
-    sizes: IntArray
-    polygons: IntArray
-
-
 def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
     """Write a result as OBJ.
 
     If the mesh was read from an OBJ file, every line of that file stands in its place, but for its old
     texture coordinates: the new ones are put before the first face, and each face line names them beside the
     file's own vertex and normal numbers. Polygons stay polygons, those whose orientation was repaired run the
-    other way, and those that the repair dropped are left out; of a polygon that it dropped in part, the
-    remaining triangles are written. Paths of material libraries are made to fit `folder`.
+    other way, and those that the repair dropped are left out. A polygon that is not convex in the plane, is cut
+    by a seam, or was dropped in part, is written in convex pieces. Of another file, what is written are its
+    vertices, polygons and normals. Paths of material libraries are made to fit `folder`.
 
     Args:
         result: what to write.
@@ -48,21 +42,28 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
     """
     source, text = result.source, ObjText({}, None, b"\n")
     vertices, faces, face_corners = result.vertices, result.faces, result.face_corners
+    normals = None
     if source is not None and face_corners is not None:
-        vertices, offsets = source.vertices, source.offsets
-        numbers = (source.corners if source.unwelded is None else source.unwelded) + 1
-        text = text if source.obj is None else _relocated(source.obj, source.path.parent, folder)
+        vertices, offsets, numbers = source.vertices, source.offsets, source.corners + 1
+        if source.obj is not None:
+            # Its own vertices stand in the text, those that were merged as well.
+            numbers = numbers if source.unwelded is None else source.unwelded + 1
+            text = _relocated(source.obj, source.path.parent, folder)
+        elif source.normals is not None and source.normal is not None:
+            normals, text = source.normals, replace(text, normals=source.normal + 1)
     else:
         source, numbers = None, faces.reshape(-1) + 1
         offsets = np.arange(0, len(numbers) + 1, 3)
         face_corners = np.arange(len(numbers)).reshape(-1, 3)
-    uv_number = np.zeros(len(numbers), dtype=np.int64)
-    uv_number[face_corners] = result.uv_faces + 1
-    to_write = _faces_to_write(offsets, face_corners, uv_number)
-    columns = [numbers, uv_number] if text.normals is None else [numbers, uv_number, text.normals]
+    to_write = find_pieces(result.uv, result.uv_faces, offsets, face_corners)
+    columns = [numbers[to_write.corners], to_write.points + 1]
+    if text.normals is not None:
+        columns.append(text.normals[to_write.corners])
     newline, last = text.newline, len(offsets) - 1
     if source is None or source.obj is None:
         stream.writelines(lines_of(b"v", vertices, newline))
+    if normals is not None:
+        stream.writelines(lines_of(b"vn", normals, newline))
     before = sorted({0, last, *text.gaps})
     begins = np.searchsorted(to_write.polygons, before).tolist()
     starts = np.concatenate(([0], np.cumsum(to_write.sizes)))
@@ -72,8 +73,7 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
             stream.writelines(lines_of(b"vt", result.uv, newline))
         for first in range(begin, end, _FACES):
             stop = min(first + _FACES, end)
-            corners = to_write.corners[starts[first] : starts[stop]]
-            rows = np.stack([column[corners] for column in columns], axis=1)
+            rows = np.stack([column[starts[first] : starts[stop]] for column in columns], axis=1)
             stream.write(_face_lines(to_write.sizes[first:stop], rows, newline))
 
 
@@ -84,40 +84,6 @@ def _face_lines(sizes: IntArray, rows: IntArray, newline: bytes) -> bytes:
     letters = len(str(int(np.abs(rows).max(initial=0)))) + 2  # with a sign, and what stands before the number
     out = np.empty(rows.size * letters + len(sizes) * (1 + len(newline)), np.uint8)
     return out[: put_faces(sizes, rows, np.frombuffer(newline, np.uint8), out)].tobytes()
-
-
-def _faces_to_write(offsets: IntArray, face_corners: IntArray, uv_number: IntArray) -> _Faces:
-    """Return the polygons that have UVs at all corners, oriented as their triangles, and else triangles."""
-    sizes = np.diff(offsets)
-    corners, polygons = np.arange(len(uv_number)), np.arange(len(sizes))
-    # Corner positions of a triangle that runs the polygon's way ascend but for one step back.
-    a, b, c = face_corners.T
-    is_reversed = (b < a).astype(np.int8) + (c < b) + (a < c) == 2
-    complete = bool(uv_number.all())
-    if complete and not is_reversed.any():
-        return _Faces(corners, sizes, polygons)
-
-    polygon_of_corner = np.repeat(polygons, sizes)
-    polygon_of_face = polygon_of_corner[a]
-    turned = np.zeros(len(sizes), dtype=bool)
-    turned[polygon_of_face] = is_reversed
-    start, size = np.repeat(offsets[:-1], sizes), np.repeat(sizes, sizes)
-    corners = np.where(turned[polygon_of_corner], start + (size - (corners - start)) % size, corners)
-    if complete:
-        return _Faces(corners, sizes, polygons)
-
-    has_uv = np.bincount(polygon_of_corner, weights=uv_number > 0, minlength=len(sizes)) == sizes
-    loose = ~has_uv[polygon_of_face]
-    owners = np.concatenate((np.flatnonzero(has_uv), polygon_of_face[loose]))
-    order = np.argsort(owners, kind="stable")
-    kept = has_uv[polygon_of_corner]
-    corner_owners = np.concatenate((polygon_of_corner[kept], np.repeat(polygon_of_face[loose], 3)))
-    corners = np.concatenate((corners[kept], face_corners[loose].reshape(-1)))
-    return _Faces(
-        corners=corners[np.argsort(corner_owners, kind="stable")],
-        sizes=np.concatenate((sizes[has_uv], np.full(np.count_nonzero(loose), 3)))[order],
-        polygons=owners[order],
-    )
 
 
 def _ended(text: bytes, newline: bytes, is_last: bool) -> bytes:
@@ -131,22 +97,26 @@ def _relocated(text: ObjText, old: Path, new: Path) -> ObjText:
     if here == there:
         return text
 
-    def moved(name: bytes) -> bytes:
-        if os.path.isabs(name):
-            return name
-        full = os.path.join(os.fsencode(here), name)
-        try:
-            relative = os.path.relpath(full, os.fsencode(there))
-        except ValueError:
-            # On another drive nothing but the full path leads there.
-            relative = full
-        return relative.replace(os.fsencode(os.sep), b"/")
-
     def line(match: re.Match[bytes]) -> bytes:
         names = match[2]
         # Several names may stand on a line, and so may one name with blanks; the folder tells.
         is_one = os.path.exists(os.path.join(os.fsencode(here), names))
-        return match[1] + b" ".join(map(moved, [names] if is_one else names.split()))
+        return match[1] + b" ".join(
+            moved_path(name, here, there) for name in ([names] if is_one else names.split())
+        )
 
     gaps = {i: _MATERIALS.sub(line, gap) if b"mtllib" in gap else gap for i, gap in text.gaps.items()}
     return replace(text, gaps=gaps)
+
+
+def moved_path(name: bytes, here: str, there: str) -> bytes:
+    """Return a path relative to another folder that leads where one relative to the first did; slashes part it."""
+    if os.path.isabs(name):
+        return name
+    full = os.path.join(os.fsencode(here), name)
+    try:
+        relative = os.path.relpath(full, os.fsencode(there))
+    except ValueError:
+        # On another drive nothing but the full path leads there.
+        relative = full
+    return relative.replace(os.fsencode(os.sep), b"/")

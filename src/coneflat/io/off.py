@@ -14,10 +14,15 @@ from .growing import Growing
 from .raw import RawMesh, offsets_of
 from .text import TextBlock, text_blocks
 
-# Texture coordinates, colours and normals follow the position, so that they can be passed over; "4" and
-# "n" change what the position itself is.
+# Normals follow the position, then colours and texture coordinates, so that these can be passed over; "4" and "n"
+# change what the position itself is.
 _HEADER = re.compile(rb"(ST)?(C)?(N)?(4)?(n)?OFF\b", re.IGNORECASE)
 _LINE = re.compile(rb"([^\r\n]*)(?:\r\n|[\r\n]|\Z)")
+
+
+def is_off(content: bytes) -> bool:
+    """Return whether a file begins as one of OFF does that has its keyword."""
+    return _HEADER.match(next((line for _, line, _ in _filled_lines(content[:4096])), b"")) is not None
 
 
 def parse_off(path: Path, content: bytes) -> RawMesh:
@@ -26,7 +31,8 @@ def parse_off(path: Path, content: bytes) -> RawMesh:
     Raises:
         MeshFileError: the file is not OFF, is shorter than its header promises, or has text for a number.
     """
-    vertex_count, face_count, begin = _header(path, content)
+    vertex_count, face_count, begin, has_normals = _header(path, content)
+    normals = Growing(np.float64, 3)
     vertices, sizes, corners = Growing(np.float64, 3), Growing(np.int64), Growing(np.int64)
     lines = 0
     for block in text_blocks(path, content, begin):
@@ -34,7 +40,10 @@ def parse_off(path: Path, content: bytes) -> RawMesh:
         of_vertices, of_faces = np.clip(
             [vertex_count - lines, vertex_count + face_count - lines], 0, len(rows)
         )
-        vertices.add(block.words(rows[:of_vertices]).points()[:, :3])
+        points = block.words(rows[:of_vertices]).points()
+        vertices.add(points[:, :3])
+        if has_normals and points.shape[1] >= 6:
+            normals.add(points[:, 3:6])
         for whole, new in zip((sizes, corners), _polygons(block, rows[of_vertices:of_faces]), strict=True):
             whole.add(new)
         lines += len(rows)
@@ -43,7 +52,10 @@ def parse_off(path: Path, content: bytes) -> RawMesh:
     if lines < vertex_count + face_count:
         held = lines - vertex_count
         raise MeshFileError(f"{path} ends after {held} of the {face_count} faces it promises")
-    return RawMesh(vertices.done(), corners.done(), offsets_of(sizes.done()))
+    mesh = RawMesh(vertices.done(), corners.done(), offsets_of(sizes.done()))
+    if len(normals) < vertex_count or not vertex_count:
+        return mesh
+    return mesh._replace(normals=normals.done(), normal=mesh.corners)
 
 
 def _polygons(block: TextBlock, rows: IntArray) -> tuple[IntArray, IntArray]:
@@ -62,8 +74,8 @@ def _polygons(block: TextBlock, rows: IntArray) -> tuple[IntArray, IntArray]:
     return sizes, corners
 
 
-def _header(path: Path, content: bytes) -> tuple[int, int, int]:
-    """Return the counts of vertices and faces, and where the lines behind them begin."""
+def _header(path: Path, content: bytes) -> tuple[int, int, int, bool]:
+    """Return the counts of vertices and faces, where the lines behind them begin, and if vertices have normals."""
     lines = _filled_lines(content)
     number, first, end = next(lines, (0, b"", 0))
     if not first:
@@ -86,7 +98,7 @@ def _header(path: Path, content: bytes) -> tuple[int, int, int]:
         ) from None
     if vertex_count < 0 or face_count < 0:
         raise MeshFileError(f"{path}, line {number}: a number of vertices or faces is negative")
-    return vertex_count, face_count, end
+    return vertex_count, face_count, end, keyword is not None and keyword.group(3) is not None
 
 
 def _filled_lines(content: bytes) -> Iterator[tuple[int, bytes, int]]:

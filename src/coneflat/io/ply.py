@@ -28,6 +28,7 @@ _STRUCT = {
     "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
     "f4": "f", "f8": "d",
 }  # fmt: skip
+_NORMAL = ("nx", "ny", "nz")
 _CORNERS = ("vertex_indices", "vertex_index")
 #: What programs call a vertex's UV point, and the list of those of a face's corners: u, v, u, v, ...
 _VERTEX_UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("u0", "v0"))
@@ -89,7 +90,17 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
         raise EmptyMeshError(f"{path} has no vertices")
     if polygons is None or not len(polygons[0]):
         raise EmptyMeshError(f"{path} has no faces")
-    mesh = RawMesh(vertices, polygons[1], offsets_of(polygons[0]), None, properties)
+    normals = None
+    if all(name in properties for name in _NORMAL):
+        normals = np.stack([properties[name] for name in _NORMAL], axis=1)
+    mesh = RawMesh(
+        vertices,
+        polygons[1],
+        offsets_of(polygons[0]),
+        properties=properties,
+        normals=normals,
+        normal=None if normals is None else polygons[1],
+    )
     if corner_uv is not None and len(corner_uv[1]):
         return mesh._replace(texture=corner_uv[0], uv=corner_uv[1])
     for pair in _VERTEX_UV:

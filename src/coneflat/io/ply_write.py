@@ -6,12 +6,12 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
+from .normals import corner_normals
 from .uv_split import split_at_seams
 
 if TYPE_CHECKING:
     from ..result import Flattening
 
-_VERTEX = np.dtype([("position", "<f8", 3), ("uv", "<f8", 2), ("source_vertex", "<i4")])
 _FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
 
 
@@ -19,16 +19,21 @@ def write_ply(result: Flattening, stream: IO[bytes]) -> None:
     """Write a result as binary little-endian PLY, coordinates as doubles.
 
     Every vertex has its UV as `s` and `t`, and as `source_vertex` the vertex of the input that it came from;
-    where the mesh was cut there are several of the same. Vertices without a face are left out.
+    where the mesh was cut there are several of the same. If the input has normals, so have they. Vertices without
+    a face are left out.
 
     Args:
         result: what to write.
         stream: a binary file.
     """
-    mesh = split_at_seams(result)
-    vertices = np.empty(len(mesh.vertices), _VERTEX)
-    vertices["position"] = mesh.vertices
-    vertices["uv"] = mesh.uv
+    mesh = split_at_seams(result, corner_normals(result))
+    doubles = {"x y z": mesh.vertices}
+    if mesh.normals is not None:
+        doubles["nx ny nz"] = mesh.normals
+    doubles["s t"] = mesh.uv
+    names = " ".join(doubles).split()
+    vertices = np.empty(len(mesh.vertices), [("doubles", "<f8", len(names)), ("source_vertex", "<i4")])
+    vertices["doubles"] = np.concatenate(list(doubles.values()), axis=1)
     vertices["source_vertex"] = mesh.origin
     faces = np.empty(len(mesh.faces), _FACE)
     faces["count"] = 3
@@ -38,7 +43,7 @@ def write_ply(result: Flattening, stream: IO[bytes]) -> None:
         "format binary_little_endian 1.0",
         "comment flattened by coneflat",
         f"element vertex {len(vertices)}",
-        *(f"property double {name}" for name in ("x", "y", "z", "s", "t")),
+        *(f"property double {name}" for name in names),
         "property int source_vertex",
         f"element face {len(faces)}",
         "property list uchar int vertex_indices",

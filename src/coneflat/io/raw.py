@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -11,9 +12,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from ..errors import EmptyMeshError, FaceIndexError, MeshFileError
+from ..errors import ConeflatError, EmptyMeshError, FaceIndexError, MeshFileError
 
 if TYPE_CHECKING:
+    from .gltf_scene import GltfScene
     from .obj import ObjText
 
 
@@ -25,10 +27,9 @@ NO_UV = -1
 
 
 class RawMesh(NamedTuple):
-    """The content of a mesh file: (n, 3) vertices, (c,) corners, (p + 1,) offsets, and what else it has.
+    """The content of a mesh file: (n, 3) vertices, (c,) corners, (p + 1,) offsets, and what else `MeshFile` has of it.
 
-    That is an OBJ file's text, numbers that it gives each vertex, by name, (c,) a number for each corner's UV
-    point, NO_UV where there is none, and (u, 2) these points.
+    blocks: (b + 1,) where blocks of vertices begin and the last ends; only within a block may they be merged.
     """
 
     vertices: FloatArray
@@ -38,6 +39,10 @@ class RawMesh(NamedTuple):
     properties: Mapping[str, FloatArray] = MappingProxyType({})
     texture: IntArray | None = None
     uv: FloatArray | None = None
+    normals: FloatArray | None = None
+    normal: IntArray | None = None
+    scene: GltfScene | None = None
+    blocks: IntArray | None = None
 
 
 def read_bytes(path: Path) -> bytes:
@@ -48,7 +53,14 @@ def read_bytes(path: Path) -> bytes:
         EmptyMeshError: the file is empty.
     """
     try:
+        # Devices, pipes and sockets may never end, or never begin: opening a pipe waits for who writes to it.
+        if not stat.S_ISREG(mode := path.stat().st_mode) and not stat.S_ISDIR(mode):
+            raise MeshFileError(
+                f"{path} is not a file but a device, a pipe or a socket; give - to read from a pipe"
+            )
         content = path.read_bytes()
+    except ConeflatError:
+        raise
     except FileNotFoundError as error:
         raise MeshFileError(f"{path}: there is no such file") from error
     except IsADirectoryError as error:

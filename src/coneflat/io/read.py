@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 
-from ..errors import ConeflatError, MeshFileError
-from .atomic import known_ending
+import numpy as np
+
+from ..errors import ConeflatError, EmptyMeshError, MeshFileError, UnknownFormatError
+from .atomic import as_path, known_ending
 from .gltf import parse_gltf
 from .model import MeshFile
+from .normals import usable_normals
 from .obj import parse_obj
-from .off import parse_off
+from .off import is_off, parse_off
 from .ply import parse_ply
 from .raw import RawMesh, check_corners, read_bytes
-from .stl import parse_stl
+from .stl import is_stl, parse_stl
 from .weld import weld as weld_vertices
 
 _READERS: dict[str, Callable[[Path, bytes], RawMesh]] = {
@@ -53,9 +57,34 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
         EmptyMeshError: it has no vertex or no face.
         FaceIndexError: a face names a vertex that does not exist.
     """
-    path = Path(path)
+    path = as_path(path)
     ending = known_ending(path, INPUT_FORMATS, "meshes are read from")
-    content = read_bytes(path)
+    return read_mesh_from(read_bytes(path), path, weld, ending)
+
+
+def read_mesh_from(
+    content: bytes, name: str | PathLike[str], weld: bool | None = None, ending: str | None = None
+) -> MeshFile:
+    """Return the mesh that the content of a file is; see `read_mesh`.
+
+    Args:
+        content: the whole file.
+        name: what to call it. A glTF's buffers and images are sought beside it, an OBJ's materials left there.
+        weld: as of `read_mesh`.
+        ending: one of `INPUT_FORMATS`, which tells the format; by default the content does.
+
+    Raises:
+        UnknownFormatError: the ending is not one of `INPUT_FORMATS`.
+        MeshFileError, EmptyMeshError, FaceIndexError: as of `read_mesh`.
+    """
+    path = Path(name)
+    if not content or content.isspace():
+        raise EmptyMeshError(f"{path} is empty")
+    ending = format_of(content) if ending is None else ending.lower()
+    if ending not in _READERS:
+        raise UnknownFormatError(
+            f"{ending!r} is no format that meshes are read from: {', '.join(INPUT_FORMATS)}"
+        )
     try:
         mesh = _READERS[ending](path, content)
         check_corners(path, mesh)
@@ -67,6 +96,9 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
         raise MeshFileError(
             f"{path} is not a readable {ending[1:].upper()} file: {reason or type(error).__name__}"
         ) from error
+    normal = None
+    if mesh.normals is not None and mesh.normal is not None:
+        normal = usable_normals(mesh.normals, mesh.normal)
     whole = MeshFile(
         path,
         mesh.vertices,
@@ -76,20 +108,45 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
         properties=mesh.properties,
         texture=mesh.texture,
         uv=mesh.uv,
+        normals=None if normal is None else mesh.normals,
+        normal=normal,
+        scene=mesh.scene,
     )
-    return _welded(whole) if (ending in _WELDED_BY_DEFAULT if weld is None else weld) else whole
+    if not (ending in _WELDED_BY_DEFAULT if weld is None else weld):
+        return whole
+    return _welded(whole, [0, len(whole.vertices)] if mesh.blocks is None else mesh.blocks.tolist())
 
 
-def _welded(mesh: MeshFile) -> MeshFile:
-    """Return a mesh with vertices at the same position merged."""
-    kept, merged = weld_vertices(mesh.vertices)
-    if len(kept) == len(mesh.vertices):
+def format_of(content: bytes) -> str:
+    """Return the ending that files of such content have: one of `INPUT_FORMATS`; .obj of what is nothing else."""
+    head = content[:512].removeprefix(b"\xef\xbb\xbf").lstrip()
+    if content.startswith(b"glTF"):
+        return ".glb"
+    if head.startswith(b"{"):
+        return ".gltf"
+    if content.startswith(b"ply"):
+        return ".ply"
+    if is_stl(content):
+        return ".stl"
+    return ".off" if is_off(content) else ".obj"
+
+
+def _welded(mesh: MeshFile, blocks: list[int]) -> MeshFile:
+    """Return a mesh with vertices at the same position merged, of each block for itself."""
+    kept, merged, count = [], [], 0
+    for begin, end in pairwise(blocks):
+        first, number = weld_vertices(mesh.vertices[begin:end])
+        kept.append(first + begin)
+        merged.append(number + count)
+        count += len(first)
+    if count == len(mesh.vertices):
         return mesh
+    every = np.concatenate(kept)
     return replace(
         mesh,
-        vertices=mesh.vertices[kept],
-        corners=merged[mesh.corners],
-        welded=len(mesh.vertices) - len(kept),
+        vertices=mesh.vertices[every],
+        corners=np.concatenate(merged)[mesh.corners],
+        welded=len(mesh.vertices) - count,
         unwelded=mesh.corners,
-        properties={name: values[kept] for name, values in mesh.properties.items()},
+        properties={name: values[every] for name, values in mesh.properties.items()},
     )

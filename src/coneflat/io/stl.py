@@ -17,6 +17,14 @@ _HEADER_BYTES = 84
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
+def is_stl(content: bytes) -> bool:
+    """Return whether a file is one of STL, by its first word or by a length that is just that of its triangles."""
+    if re.match(rb"\s*solid\s", content, re.IGNORECASE):
+        return True
+    promised = int.from_bytes(content[80:84], "little")
+    return len(content) == _HEADER_BYTES + promised * _TRIANGLE.itemsize
+
+
 def parse_stl(path: Path, content: bytes) -> RawMesh:
     """Return the triangles of an STL file, three vertices each.
 

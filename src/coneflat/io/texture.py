@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from io import BytesIO
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..checker import DARK_CELL, LIGHT_CELL, cell_side
 from ..errors import MeshFileError, OptionError
+from .atomic import as_path
 from .raw import read_bytes
 
 if TYPE_CHECKING:
@@ -50,9 +50,9 @@ def find_texture(texture: str | PathLike[str], result: Flattening | None = None)
         from PIL import Image
     except ImportError as error:
         raise OptionError('textures need Pillow: pip install "coneflat[figures]"') from error
-    if texture == CHECKER:
+    if isinstance(texture, str) and texture == CHECKER:
         return None if result is None else _checkerboard(result, Image)
-    path = Path(texture)
+    path = as_path(texture)
     content = read_bytes(path)
     try:
         with Image.open(BytesIO(content)) as image:

@@ -1,4 +1,4 @@
-"""Splitting vertices along UV seams, for formats with one UV per vertex."""
+"""Splitting vertices along UV seams and creases, for formats with one UV and one normal per vertex."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
+from .normals import CornerNormals
 
 if TYPE_CHECKING:
     from ..result import Flattening
 
 
 class SplitMesh(NamedTuple):
-    """A mesh with one vertex for each pair of vertex and UV point that a triangle has.
+    """A mesh with one vertex for each vertex, UV point and normal that a triangle has together.
 
     Attributes:
         vertices: (k, 3) positions.
@@ -21,6 +22,7 @@ class SplitMesh(NamedTuple):
         faces: (m, 3) triangles.
         own: (k,) the vertex of the result.
         origin: (k,) the vertex of the input.
+        normals: (k, 3) normals, if some were given.
     """
 
     vertices: FloatArray
@@ -28,13 +30,22 @@ class SplitMesh(NamedTuple):
     faces: IntArray
     own: IntArray
     origin: IntArray
+    normals: FloatArray | None = None
 
 
-def split_at_seams(result: Flattening) -> SplitMesh:
-    """Return the mesh of a result, split; in the order of its vertices, those without a face left out."""
+def split_at_seams(result: Flattening, normals: CornerNormals | None = None) -> SplitMesh:
+    """Return the mesh of a result, split; in the order of its vertices, those without a face left out.
+
+    normals: those at which it is to be split, too.
+    """
     own, point, faces = _pairs(result.faces.reshape(-1), result.uv_faces.reshape(-1), len(result.uv))
+    shading = None
+    if normals is not None:
+        corners = normals.corners.reshape(-1)
+        pair, normal, faces = _pairs(faces, corners, len(normals.normals))
+        own, point, shading = own[pair], point[pair], normals.normals[normal]
     origin = own if result.vertex_origin is None else result.vertex_origin[own]
-    return SplitMesh(result.vertices[own], result.uv[point], faces.reshape(-1, 3), own, origin)
+    return SplitMesh(result.vertices[own], result.uv[point], faces.reshape(-1, 3), own, origin, shading)
 
 
 def _pairs(vertices: IntArray, points: IntArray, point_count: int) -> tuple[IntArray, IntArray, IntArray]:

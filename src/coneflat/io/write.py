@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from ..errors import OptionError
-from .atomic import atomic_write, check_target, known_ending
+from .atomic import as_path, atomic_write, check_target, known_ending
 from .glb_write import write_glb
 from .npz import write_npz
 from .obj_write import write_obj
 from .ply_write import write_ply
 from .texture import find_texture
+from .written import as_written
 
 if TYPE_CHECKING:
     from ..result import Flattening
@@ -34,7 +35,7 @@ def check_output(path: str | PathLike[str], texture: str | PathLike[str] | None 
             image that can be read.
         OptionError: files of this ending carry no texture, or Pillow is not installed.
     """
-    path = Path(path)
+    path = as_path(path)
     ending = known_ending(path, OUTPUT_FORMATS, "results are written as")
     check_target(path)
     if texture is not None:
@@ -50,8 +51,9 @@ def write_flattening(
     """Write a flattened mesh, in full or not at all, and return the path.
 
     The format follows the path's ending, in any case. An .obj keeps the polygons, groups, materials and
-    comments of the OBJ the mesh was read from. A .ply and a .glb hold the triangles, with a vertex for every
-    pair of vertex and UV point and the input's vertex as an attribute. An .npz holds all arrays of the result
+    comments of the OBJ the mesh was read from. A .glb keeps the scene of the glTF or GLB that the mesh was read from.
+    Of other meshes, a .ply and a .glb hold the triangles, with a vertex for every pair of vertex and UV point, the
+    input's normals, and the input's vertex as an attribute. An .npz holds all arrays of the result
     and its report as JSON.
 
     Args:
@@ -64,14 +66,32 @@ def write_flattening(
         MeshFileError: the file cannot be written, or the texture cannot be read.
         OptionError: files of this ending carry no texture, or Pillow is not installed.
     """
+    return _write(result, path, texture)[0]
+
+
+def write_measured(
+    result: Flattening, path: str | PathLike[str], texture: str | PathLike[str] | None = None
+) -> Flattening:
+    """Write a flattened mesh as `write_flattening` does, and return it as the file holds it; see `as_written`."""
+    written, stored = _write(result, path, texture)
+    return as_written(stored, written.suffix.lower())
+
+
+def _write(
+    result: Flattening, path: str | PathLike[str], texture: str | PathLike[str] | None
+) -> tuple[Path, Flattening]:
+    """Write a flattened mesh, and return the path and the arrays that were written."""
     path = check_output(path, texture)
     image = None if texture is None else find_texture(texture, result)
+    ending = path.suffix.lower()
+    # A .glb holds fewer digits, at which triangles are to be upright and apart, too.
+    stored = as_written(result, ending) if ending == ".glb" else result
     writers: dict[str, Callable[[IO[bytes]], None]] = {
-        ".obj": lambda stream: write_obj(result, stream, path.parent),
-        ".ply": lambda stream: write_ply(result, stream),
-        ".glb": lambda stream: write_glb(result, stream, image),
-        ".npz": lambda stream: write_npz(result, stream),
+        ".obj": lambda stream: write_obj(stored, stream, path.parent),
+        ".ply": lambda stream: write_ply(stored, stream),
+        ".glb": lambda stream: write_glb(stored, stream, image, path.parent),
+        ".npz": lambda stream: write_npz(stored, stream),
     }
     with atomic_write(path) as stream:
-        writers[path.suffix.lower()](stream)
-    return path
+        writers[ending](stream)
+    return path, stored

@@ -17,7 +17,7 @@ from ..geometry import corner_angles
 from ..layout.least_squares import fit_shapes, shapes_of_angles
 from ..mesh import TriangleMesh
 from ..text import plural
-from .base import LaidOut, failure_notes
+from .base import LaidOut, failure_notes, off_by
 from .measured import laid_out_at
 
 #: What is asked of the angles around cones: to sum to what is prescribed, with lengths that match across seams; or
@@ -116,6 +116,6 @@ def _find(
     if not found.converged:
         failure = (
             f"angle based flattening did not converge: after {plural(found.steps, 'step')} the conditions on angles "
-            f"are off by {found.residual:.2g}"
+            f"are {off_by(found.residual, '')}"
         )
     return found, failure_notes(failure, best_effort and bool(np.isfinite(found.angles).all()))

@@ -10,9 +10,13 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..errors import ConvergenceError
 from ..figures import SolveFigures
-from ..geometry import double_areas, edge_lengths
-from ..mesh import TriangleMesh
-from ..rotations import Rotations
+from ..geometry import angle_defect, double_areas, edge_lengths
+from ..geometry.planar import signed_angles
+from ..mesh import NEXT, PREVIOUS, TriangleMesh
+
+# Height over longest side below which a triangle counts as flat, neither upright nor upside down: coordinates are
+# good to about 1e-12 of an edge.
+FLAT = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +37,6 @@ class LaidOut:
         target, curvature: (n,) curvature wanted and reached, radians.
         figures: how it was found.
         notes: what falls short, one sentence each.
-        rotations: those of its seams, where they matter.
     """
 
     mesh: TriangleMesh
@@ -48,7 +51,6 @@ class LaidOut:
     figures: SolveFigures
     chart: IntArray | None = None
     notes: tuple[str, ...] = ()
-    rotations: Rotations | None = None
 
     @property
     def area(self) -> float:
@@ -69,9 +71,30 @@ class FlatMetric(Protocol):
         ...
 
 
+def laid_out_curvature(mesh: TriangleMesh, corners: FloatArray) -> FloatArray:
+    """Return (n,) the curvature of triangles with given corners (m, 3, 2): a full or half turn less their angles.
+
+    Those of triangles that are upside down count as negative. Where triangles wind around a vertex twice, the
+    curvature is a full turn less than it seems.
+    """
+    places = np.ascontiguousarray(corners[:, PREVIOUS] - corners[:, NEXT]).view(np.complex128)[..., 0]
+    angles = signed_angles(places)
+    doubled = (np.conj(places[:, 0]) * places[:, 1]).imag
+    is_flat = np.abs(doubled) < FLAT * (np.abs(places) ** 2).max(axis=1)
+    angles[is_flat] = np.abs(angles[is_flat])
+    return angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+
+
 def all_faces(mesh: TriangleMesh) -> IntArray:
     """Return (m,) the numbers of a mesh's faces, which are their own origin."""
     return np.arange(len(mesh.faces))
+
+
+def off_by(residual: float, unit: str = " rad") -> str:
+    """Return the part of a message that says by how much something is missed."""
+    if not np.isfinite(residual):
+        return "off by more than double precision can hold"
+    return f"off by {residual:.2g}{unit}"
 
 
 def failure_notes(

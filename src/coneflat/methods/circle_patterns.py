@@ -16,7 +16,7 @@ from ..geometry.intrinsic import IntrinsicTriangulation, intrinsic_triangulation
 from ..geometry.proper import make_proper
 from ..mesh import TriangleMesh
 from ..text import plural
-from .base import failure_notes
+from .base import failure_notes, off_by
 from .exact import ExactFlatMetric, at_own_area
 
 # Largest curvature error of a metric that has converged, radians.
@@ -54,14 +54,14 @@ def circle_patterns(
     if not coherent.converged:
         failure = (
             f"no circle pattern on these triangles has the curvatures: after {plural(coherent.steps, 'step')} their "
-            f"angles are off by {coherent.residual:.2g} rad"
+            f"angles are {off_by(coherent.residual)}"
         )
     notes = failure_notes(failure, best_effort)
     solved = _solved(triangulation, coherent, flips, target, border)
     if failure is None and not solved.converged:
         failure = (
-            f"the circle pattern did not converge: after {plural(solved.steps, 'step')} the curvature is off by "
-            f"{solved.residual:.2g} rad"
+            f"the circle pattern did not converge: after {plural(solved.steps, 'step')} the curvature is "
+            f"{off_by(solved.residual)}"
         )
         notes = failure_notes(failure, best_effort)
     return at_own_area(mesh, lengths, solution, solved, notes)
@@ -100,7 +100,7 @@ def _solved(
     areas = [vertex_areas(faces, sides, len(border)) for sides in (before, after)]
     triangulation.length = pattern.lengths
     return ExactMetric(
-        log_scale=np.log(areas[1] / areas[0]) / 2,
+        log_scale=np.log(np.maximum(areas[1] / areas[0], np.finfo(float).tiny)) / 2,
         curvature=curvature,
         triangulation=triangulation,
         flips=flips,

@@ -11,14 +11,14 @@ from ..cones import ConeSolution
 from ..conformal.boundary import BoundaryCurvature
 from ..conformal.exact import ExactMetric, exact_metric
 from ..figures import SolveFigures
-from ..geometry import angle_defect, double_areas
-from ..geometry.planar import signed_angles
+from ..geometry import double_areas
 from ..layout.straighten import FlatTriangles, straight_triangles
 from ..layout.unfold import unfold
 from ..layout.untangle import untangle
 from ..mesh import TriangleMesh
 from ..seams import cut_open
-from .base import LaidOut, all_faces, failure_notes
+from ..text import plural
+from .base import LaidOut, all_faces, failure_notes, laid_out_curvature, off_by
 
 # The curvature of a round boundary is found from the metric it leads to, over and over: rounds at most, and the
 # largest relative change at a vertex at which to stop. What is solved for in the end is exact in any case.
@@ -26,6 +26,13 @@ ROUNDS, ROUND_CHANGE = 40, 1e-3
 # How much of the change is made in each round on holes. The m-th harmonic of the change answers with -1/m there, so
 # that the first would go back and forth for ever; on the outer loop the answer is 1/m.
 HOLE_STEP = 0.5
+# Relative errors of lengths that rounding cannot make.
+LENGTH_TOLERANCE = 1e-9
+# Curvature, radians, at a vertex of a round boundary that is no part of a circle any more but a corner too sharp to be
+# one: the sides beside it are nearly all of the boundary. Then the round before has to do.
+TOO_SHARP = 0.99 * np.pi
+# Radians by which the curvature of a round boundary may be off a circle's before it is said.
+NOT_ROUND = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +42,8 @@ class ExactChoices:
     Attributes:
         scale_at_cones: phi = 0 at the cones, whose curvatures come out; else their curvatures are prescribed.
         boundary: curvature wanted on the boundary; None leaves it free, phi = 0 there.
+        kept: (n,) boundary vertices between which lengths are kept: phi = 0 there whatever is wanted, and
+            untangling does not move them. None for none.
         keep_area: scale the metric to the area of the input; else phi stays 0 on a free boundary, whose
             lengths are then kept.
         best_effort: return a metric that did not converge.
@@ -44,10 +53,23 @@ class ExactChoices:
 
     scale_at_cones: bool = True
     boundary: BoundaryCurvature | None = None
+    kept: BoolArray | None = None
     keep_area: bool = True
     best_effort: bool = False
     refine: bool = False
     names: IntArray | None = None
+
+    def is_open(self, mesh: TriangleMesh) -> BoolArray:
+        """(n,) boundary vertices whose curvature comes out, as phi = 0 there."""
+        if self.boundary is None:
+            return mesh.is_boundary_vertex.copy()
+        return np.zeros(len(mesh.vertices), dtype=bool) if self.kept is None else self.kept.copy()
+
+    def is_held(self, mesh: TriangleMesh) -> BoolArray:
+        """(n,) boundary vertices that must stay where the metric has them."""
+        if self.boundary is not None:
+            return mesh.is_boundary_vertex.copy()
+        return np.zeros(len(mesh.vertices), dtype=bool) if self.kept is None else self.kept.copy()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +80,7 @@ class ExactFlatMetric:
         mesh: the mesh.
         cones: (s,) cone vertices.
         target: (n,) curvature that was prescribed, or came out where the scale was.
+        is_open, is_held: (n,) boundary vertices whose curvature may come out as it will, and those that must stay.
         solved: the metric.
         shrink: factor that brings it to the wanted size.
         refine: lay out the common subdivision.
@@ -67,6 +90,8 @@ class ExactFlatMetric:
     mesh: TriangleMesh
     cones: IntArray
     target: FloatArray
+    is_open: BoolArray
+    is_held: BoolArray
     solved: ExactMetric
     shrink: float
     refine: bool
@@ -91,20 +116,25 @@ class ExactFlatMetric:
         flat = self.straight()
         cut = mesh.is_boundary_edge.copy()
         cut[seams] = True
-        pinned, on_seam = np.zeros((2, len(mesh.vertices)), dtype=bool)
+        on_boundary = mesh.is_boundary_vertex
+        pinned, on_seam = self.is_held.copy(), np.zeros(len(mesh.vertices), dtype=bool)
         pinned[self.cones] = True
         on_seam[mesh.edges[seams]] = True
-        untangled = untangle(flat, mesh.faces, pinned, on_seam, mesh.is_boundary_vertex)
+        angles = np.where(on_boundary, np.pi, 2 * np.pi) - self.target
+        untangled = untangle(flat, mesh.faces, angles, pinned, on_seam, on_boundary)
+        points = unfold(untangled.flat, disk.faces, cut[mesh.halfedge_edges]) * self.shrink
+        curvature = laid_out_curvature(mesh, points[disk.faces])
         return LaidOut(
             mesh=mesh,
             face_origin=all_faces(mesh),
-            points=unfold(untangled.flat, disk.faces, cut[mesh.halfedge_edges]) * self.shrink,
+            points=points,
             corners=disk.faces,
             cones=self.cones,
             seams=mesh.edges[seams],
             log_scale=solved.log_scale + np.log(self.shrink),
-            target=self.target,
-            curvature=curvature_on(mesh, untangled.flat),
+            # Where the boundary is free, what comes out is what was wanted.
+            target=np.where(self.is_open, curvature, self.target),
+            curvature=curvature,
             figures=replace(
                 self.figures,
                 untangled_triangles=int(flat.is_inverted.sum()),
@@ -126,24 +156,20 @@ class ExactFlatMetric:
         disk = cut_open(mesh, edges).mesh
         cut = mesh.is_boundary_edge.copy()
         cut[edges] = True
+        points = unfold(refined.flat, disk.faces, cut[mesh.halfedge_edges]) * self.shrink
         return LaidOut(
             mesh=mesh,
             face_origin=refined.face_origin,
-            points=unfold(refined.flat, disk.faces, cut[mesh.halfedge_edges]) * self.shrink,
+            points=points,
             corners=disk.faces,
             cones=self.cones,
             seams=mesh.edges[edges],
             log_scale=refined.log_scale + np.log(self.shrink),
             target=np.concatenate([self.target, np.zeros(len(mesh.vertices) - len(self.target))]),
-            curvature=curvature_on(mesh, refined.flat),
+            curvature=laid_out_curvature(mesh, points[disk.faces]),
             figures=replace(self.figures, refined_triangles=len(mesh.faces) - len(self.mesh.faces)),
             notes=self.notes,
         )
-
-
-def curvature_on(mesh: TriangleMesh, flat: FlatTriangles) -> FloatArray:
-    """Return (n,) the curvature of flat triangles as they are laid out; the angles of inverted ones are negative."""
-    return angle_defect(mesh.faces, signed_angles(flat.sides.reshape(-1, 3)), mesh.is_boundary_vertex)
 
 
 def exact_flattening(
@@ -164,20 +190,47 @@ def exact_flattening(
     fixed = np.zeros(len(mesh.vertices), dtype=bool)
     if choices.scale_at_cones:
         fixed[solution.cones] = True
-    if choices.boundary is None:
-        fixed |= mesh.is_boundary_vertex
+    is_open = choices.is_open(mesh)
+    fixed |= is_open
     solved, target = _solve(mesh, lengths, solution, choices, fixed)
     failure = None
     if not solved.converged:
         worst = solved.worst_vertex if choices.names is None else choices.names[solved.worst_vertex]
         failure = (
-            f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is off "
-            f"by {solved.residual:.2g} rad"
+            f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is "
+            f"{off_by(solved.residual)}"
         )
-    notes = failure_notes(failure, choices.best_effort, "--method linear needs no convergence")
+    notes = failure_notes(
+        failure,
+        choices.best_effort and bool(np.isfinite(solved.residual)),
+        "--method linear needs no convergence",
+    )
+    notes += _missed_roundness(lengths, solved, choices, target)
+    notes += _lengths_missed(mesh, lengths, solved, choices)
     shrink = area_factor(lengths, solved) if choices.keep_area else 1.0
     target = np.where(fixed, solved.curvature, target)
-    return ExactFlatMetric(mesh, solution.cones, target, solved, shrink, choices.refine, notes)
+    return ExactFlatMetric(
+        mesh, solution.cones, target, is_open, choices.is_held(mesh), solved, shrink, choices.refine, notes
+    )
+
+
+def _lengths_missed(
+    mesh: TriangleMesh, lengths: FloatArray, solved: ExactMetric, choices: ExactChoices
+) -> tuple[str, ...]:
+    """Return how many lengths on the boundary could not be kept, if so: flipped edges are none of the metric."""
+    if choices.kept is None or not solved.doubled:
+        return ()
+    sides = mesh.edge_halfedges[mesh.is_boundary_edge & choices.kept[mesh.edges].all(axis=1), 0]
+    flat = straight_triangles(solved.triangulation, solved.flips, len(mesh.faces))
+    off = np.abs(np.abs(flat.sides[sides]) / lengths.ravel()[sides] - 1)
+    missed = int(np.count_nonzero(off > LENGTH_TOLERANCE))
+    if not missed:
+        return ()
+    return (
+        f"{plural(missed, 'edge')} of {len(sides):,} on the boundary or on marked seams could not keep their lengths, "
+        f"which are off by up to {off.max():.2g} of them: triangles are too coarse there for the curvature around. "
+        "Remesh there, or allow more cones.",
+    )
 
 
 def area_factor(lengths: FloatArray, solved: ExactMetric) -> float:
@@ -204,7 +257,9 @@ def at_own_area(
         notes: how it fell short.
     """
     target = np.where(mesh.is_boundary_vertex, solved.curvature, solution.target)
-    return ExactFlatMetric(mesh, solution.cones, target, solved, area_factor(lengths, solved), False, notes)
+    is_open, is_held = mesh.is_boundary_vertex, np.zeros(len(mesh.vertices), dtype=bool)
+    shrink = area_factor(lengths, solved)
+    return ExactFlatMetric(mesh, solution.cones, target, is_open, is_held, solved, shrink, False, notes)
 
 
 def _solve(
@@ -232,12 +287,44 @@ def _solve(
     if boundary is None:
         return solve(inside, solution.log_scale), inside
     wanted = boundary.target(lengths, solution.log_scale)
+    if _is_too_sharp(boundary, wanted):
+        # By the linear scale one side of the boundary is nearly all of it, as on a field of spikes.
+        wanted = boundary.target(lengths, np.zeros_like(solution.log_scale))
     solved = solve(inside + wanted, solution.log_scale)
     step = np.where(wanted < 0, HOLE_STEP, 1.0)
     for _ in range(ROUNDS if boundary.has_round_loops else 0):
         change = boundary.target(lengths, solved.log_scale) - wanted
         if not solved.converged or not (np.abs(change) > ROUND_CHANGE * np.abs(wanted)).any():
             break
-        wanted = wanted + step * change
-        solved = solve(inside + wanted, solved.log_scale)
+        rounder = wanted + step * change
+        if _is_too_sharp(boundary, rounder):
+            break
+        again = solve(inside + rounder, solved.log_scale)
+        if not again.converged:
+            break
+        wanted, solved = rounder, again
     return solved, inside + wanted
+
+
+def _is_too_sharp(boundary: BoundaryCurvature, wanted: FloatArray) -> bool:
+    """Whether a round boundary would have a corner; those that the user gives do not count."""
+    return boundary.has_round_loops and bool((wanted[boundary.corners == 0] >= TOO_SHARP).any())
+
+
+def _missed_roundness(
+    lengths: FloatArray, solved: ExactMetric, choices: ExactChoices, target: FloatArray
+) -> tuple[str, ...]:
+    """Return that a round boundary is none, if so."""
+    if choices.boundary is None or not choices.boundary.has_round_loops:
+        return ()
+    even = choices.boundary.target(lengths, solved.log_scale)
+    on_round = choices.boundary.mesh.is_boundary_vertex & (choices.boundary.corners == 0)
+    off = np.where(on_round, np.abs(even - target), 0.0)
+    worst = int(np.argmax(off))
+    if not off[worst] > NOT_ROUND:
+        return ()
+    name = worst if choices.names is None else choices.names[worst]
+    return (
+        f"The boundary is not quite round: at vertex {name} it turns by {target[worst]:.3g} rad, a circle "
+        f"by {even[worst]:.3g}.",
+    )

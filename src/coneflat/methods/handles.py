@@ -54,7 +54,7 @@ def corrected_flattening(
     mesh = turning.mesh
     metric = exact_flattening(mesh, lengths, solution, choices)
     off = off_multiple(turning.of_flat(metric.straight()), quantum)
-    fixed = mesh.is_boundary_vertex & (choices.boundary is None)
+    fixed = choices.is_open(mesh)
     changes = None
     for _ in range(STEPS):
         if np.abs(off).max() <= TOLERANCE:

@@ -7,10 +7,10 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..cones import ConeSolution
 from ..figures import SolveFigures
-from ..geometry import angle_defect, double_areas, edge_lengths
-from ..geometry.planar import signed_angles, signed_double_areas
-from ..mesh import NEXT, PREVIOUS, TriangleMesh
-from .base import LaidOut, all_faces
+from ..geometry import double_areas, edge_lengths
+from ..geometry.planar import signed_double_areas
+from ..mesh import TriangleMesh
+from .base import LaidOut, all_faces, laid_out_curvature
 
 # Areas below so much of the mean are taken as so much, where a logarithm is wanted.
 TINY = 1e-12
@@ -37,11 +37,9 @@ def laid_out_at(
     """
     corners = points[disk.faces]
     doubles = np.abs(signed_double_areas(corners))
-    sides = corners[:, PREVIOUS] - corners[:, NEXT]
     before = double_areas(edge_lengths(mesh.vertices, mesh.faces))
     factor = float(np.sqrt(before.sum() / doubles.sum()))
-    angles = signed_angles(sides[..., 0] + 1j * sides[..., 1])
-    curvature = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+    curvature = laid_out_curvature(mesh, corners)
     return LaidOut(
         mesh=mesh,
         face_origin=all_faces(mesh),

@@ -11,7 +11,7 @@ from ..conformal.packing import FixedPackingProblem, PackingProblem
 from ..geometry import is_broken
 from ..mesh import TriangleMesh
 from ..text import plural
-from .base import failure_notes
+from .base import failure_notes, off_by
 from .exact import ExactFlatMetric, at_own_area
 
 
@@ -55,7 +55,13 @@ def ricci_flow(
     if not solved.converged:
         broken = int(is_broken(solved.triangulation.length.reshape(-1, 3)).sum())
         failure = (
-            f"the Ricci flow did not converge: after {plural(solved.steps, 'step')} the curvature is off by "
-            f"{solved.residual:.2g} rad, and {plural(broken, 'triangle')} broke the triangle inequality"
+            f"the Ricci flow did not converge: after {plural(solved.steps, 'step')} the curvature is "
+            f"{off_by(solved.residual)}, and {plural(broken, 'triangle')} broke the triangle inequality"
         )
-    return at_own_area(mesh, lengths, solution, solved, failure_notes(failure, best_effort))
+    return at_own_area(
+        mesh,
+        lengths,
+        solution,
+        solved,
+        failure_notes(failure, best_effort and bool(np.isfinite(solved.residual))),
+    )

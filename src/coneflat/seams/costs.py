@@ -7,9 +7,11 @@ from numpy.typing import ArrayLike
 
 from .._arrays import FloatArray
 from ..errors import OptionError
+from ..geometry.areas import at_safe_scale
 from ..geometry.dihedral import dihedral_angles
 from ..geometry.visibility import visible_share
 from ..mesh import TriangleMesh
+from ..options import MOST_PREFERENCE
 
 # Radians: edges that bend less are no creases, those that bend more are full ones.
 SMOOTH, SHARP = np.radians(20), np.radians(60)
@@ -47,8 +49,8 @@ def edge_costs(
         OptionError: a number makes no sense.
     """
     for name, strength in (("creases", creases), ("hiding", hiding)):
-        if not 0 <= strength < np.inf:
-            raise OptionError(f"{name} must be a number from 0 up, not {strength:g}")
+        if not 0 <= strength <= MOST_PREFERENCE:
+            raise OptionError(f"{name} must be a number from 0 to {MOST_PREFERENCE:g}, not {strength:g}")
     costs = np.array(lengths, dtype=np.float64)
     angles = dihedral_angles(mesh) if creases or hiding else np.zeros(len(costs))
     if creases:
@@ -92,4 +94,5 @@ def _checked(weights: ArrayLike, count: int, noun: str) -> FloatArray:
             f"{noun} weights of seams must be finite, 0 and up, not all 0; they are {values.min():g} to "
             f"{values.max():g}"
         )
+    values = at_safe_scale(values)
     return np.maximum(values, LEAST_WEIGHT * values.max())

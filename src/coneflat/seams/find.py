@@ -11,6 +11,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import OptionError, SeamError
+from ..geometry.areas import at_safe_scale
 from ..geometry.ties import tie_key
 from ..mesh import TriangleMesh
 from ..text import plural
@@ -56,7 +57,7 @@ def find_seams(
 
     Raises:
         SeamError: every set of seams needs forbidden edges; or edges are both required and forbidden.
-        OptionError: `bending` is none.
+        OptionError: `bending` is none, or costs are no positive numbers.
     """
     if not 0 <= bending <= MOST_BENDING:
         raise OptionError(f"bending must be a number from 0 to {MOST_BENDING:g}, not {bending:g}")
@@ -66,7 +67,7 @@ def find_seams(
     is_forbidden[forbidden] = True
     _refuse(is_required & is_forbidden, "both required and forbidden as seams")
     key = tie_key(mesh.vertices)
-    costs = edge_costs * (1 + TIE_BREAK * key[mesh.edges].sum(axis=1))
+    costs = _checked(edge_costs, len(mesh.edges)) * (1 + TIE_BREAK * key[mesh.edges].sum(axis=1))
     for dear in (is_avoided, is_forbidden):
         if dear is not None and dear.any():
             costs = np.where(dear, costs + costs.sum(), costs)
@@ -81,6 +82,13 @@ def find_seams(
     seams = _as_slit(mesh, costs, work.cut[mesh.edge_halfedges[:, 0]] & ~mesh.is_boundary_edge)
     _refuse(seams & is_forbidden, "needed to open the mesh, but forbidden as seams")
     return np.flatnonzero(seams)
+
+
+def _checked(costs: FloatArray, count: int) -> FloatArray:
+    """Return (e,) costs, brought to a size at which their sums are finite where they are not."""
+    if np.shape(costs) != (count,) or not (np.isfinite(costs).all() and (costs > 0).all()):
+        raise OptionError(f"costs of edges must be {count:,} positive numbers")
+    return at_safe_scale(np.asarray(costs, dtype=np.float64))
 
 
 def _refuse(edges: BoolArray, what: str) -> None:

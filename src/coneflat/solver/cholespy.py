@@ -16,6 +16,9 @@ class CholespyFactor:
     worth = 60
 
     def __init__(self, matrix: csc_matrix) -> None:
+        if not (matrix.diagonal() > 0).all():
+            # CHOLMOD finds out, too, and says so on standard output.
+            raise NotPositiveDefinite("the diagonal is not positive")
         try:
             self._solver = CholeskySolverD(
                 matrix.shape[0],

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import OptionError
-from ..io.atomic import atomic_write, check_target, known_ending
+from ..io.atomic import as_path, atomic_write, check_target, known_ending
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,7 +52,7 @@ def check_figure_target(path: str | PathLike[str]) -> Path:
         UnknownFormatError: the ending is not one of `FIGURE_FORMATS`.
         MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
     """
-    path = Path(path)
+    path = as_path(path)
     known_ending(path, FIGURE_FORMATS, "figures are written as")
     check_target(path)
     return path
@@ -70,4 +70,4 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
     ending = known_ending(check_figure_target(path), FIGURE_FORMATS, "figures are written as")
     with rc_context(_SETTINGS), atomic_write(path, "wb") as stream:
         figure.savefig(stream, format=ending[1:], dpi=figure.dpi, metadata=_METADATA[ending])
-    return Path(path)
+    return as_path(path)

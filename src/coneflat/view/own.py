@@ -62,6 +62,7 @@ def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
         cones=np.empty(0, dtype=np.int64),
         curvatures=np.empty(0),
         log_scale=np.full(len(mesh.vertices), np.nan),
+        prescribed=np.full(len(mesh.vertices), np.nan),
         curvature_residual=-_flat_curvature(mesh, uv[uv_faces]),
         seams=mesh.edges[seams_of(mesh, measured.corner_uv)],
         distortion=measured.distortion,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from os import PathLike
-from pathlib import Path
 
 from ..errors import MeshFileError
+from ..io.atomic import as_path
 from ..io.raw import read_bytes
 from ..io.texture import Texture
 
@@ -21,7 +21,7 @@ def read_picture(path: str | PathLike[str]) -> Texture:
     Raises:
         MeshFileError: it cannot be read, is no such picture, or is too large.
     """
-    path = Path(path)
+    path = as_path(path)
     content = read_bytes(path)
     kind = next((kind for beginning, kind in _BEGINNINGS if content.startswith(beginning)), None)
     if content[:4] == b"RIFF" and content[8:12] == b"WEBP":

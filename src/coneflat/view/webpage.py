@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import OptionError
-from ..io.atomic import atomic_write, check_target, known_ending
+from ..io.atomic import as_path, atomic_write, check_target, known_ending
 from .content import content_of
 from .payload import payload_of
 from .picture import read_picture
@@ -87,7 +87,7 @@ def check_page(path: str | PathLike[str]) -> Path:
         UnknownFormatError: it does not end with .html or .htm.
         MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
     """
-    path = Path(path)
+    path = as_path(path)
     known_ending(path, ENDINGS, "pages are written as")
     check_target(path)
     return path

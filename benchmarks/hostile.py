@@ -1,0 +1,163 @@
+"""What becomes of hostile input: `python benchmarks/hostile.py --cases 10000 --jobs 2` tries 10,000 cases from seeds.
+
+A case is a kind and a seed: `--case mesh:17` runs one alone in this process and tells all about it.
+
+- mesh: small meshes of all kinds, many of them bad, under options of all kinds;
+- file: mesh files of all formats, whole or damaged, read, flattened, written, and read back by other software;
+- argument: public functions with odd arguments;
+- command: odd command lines.
+
+Each runs in a worker with limits of time and memory. Of every result all promises are measured anew, by plain code of
+this benchmark's own (`trials/promises.py`): finite points in the texture, nothing upside down, no overlaps in an atlas,
+angles around inner vertices and cones, equal sides of seams, prescribed boundaries, rotations by quanta, and a report
+that says what was measured. What is not kept and not named by a note is a breach; so are errors that are not the
+package's own, messages of several lines, crashes, hangs, and too much memory. The exit code is 1 if there is any.
+
+Options: --cases 10000, --jobs 2, --seed 0 (the first), --kinds mesh,file,argument,command, --out FILE.json (all
+outcomes), --again FILE.json (only the breaches in such a file).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import sys
+import tempfile
+import time
+from collections import Counter, defaultdict
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+for folder in ("src", "tests", "benchmarks"):
+    sys.path.insert(0, str(ROOT / folder))
+
+from trials.cases import KINDS, SHARES, cases, run_case  # noqa: E402
+from trials.outcome import Outcome  # noqa: E402
+from trials.workers import run_all  # noqa: E402
+
+STATES = ("ok", "noted", "refused", "breach")
+
+
+def summary(outcomes: list[Outcome]) -> str:
+    """Return counts by kind, times and memory, and what was broken, most frequent first."""
+    lines = [
+        f"{'kind':10}{'cases':>8}"
+        + "".join(f"{state:>9}" for state in STATES)
+        + "   median    99%   worst   peak"
+    ]
+    for kind in (*KINDS, "all"):
+        own = [one for one in outcomes if kind in (one.kind, "all")]
+        if not own:
+            continue
+        count = Counter(one.status for one in own)
+        seconds = np.array([one.seconds for one in own])
+        times = f"{np.median(seconds):7.2f} s {np.quantile(seconds, 0.99):4.1f} s {seconds.max():5.1f} s"
+        peak = max(one.memory for one in own)
+        row = "".join(f"{count[state]:9,}" for state in STATES)
+        lines.append(f"{kind:10}{len(own):8,}{row} {times} {peak:4.0f} MB")
+    for title, groups in (
+        ("breaches", _breaches(outcomes)),
+        ("noted", _noted(outcomes)),
+        ("refusals", _refusals(outcomes)),
+    ):
+        lines += ["", f"{title}:"] if groups else []
+        ranked = sorted(groups.items(), key=lambda item: -len(item[1]))
+        for cause, found in ranked if title == "breaches" else ranked[:25]:
+            first = ", ".join(f"{one.kind}:{one.seed}" for one, _ in found[:4])
+            lines.append(f"{len(found):6,}  {cause}  [{first}]")
+            if title == "breaches":
+                lines.append(f"        {found[0][0].recipe[:300]}: {found[0][1][:300]}")
+    return "\n".join(lines)
+
+
+Groups = dict[str, list[tuple[Outcome, str]]]
+
+
+def _breaches(outcomes: list[Outcome]) -> Groups:
+    groups: Groups = defaultdict(list)
+    for one in outcomes:
+        for cause, details in one.breaches:
+            groups[cause].append((one, details))
+    return groups
+
+
+def _noted(outcomes: list[Outcome]) -> Groups:
+    groups: Groups = defaultdict(list)
+    for one in outcomes:
+        for promise in dict.fromkeys(one.noted):
+            groups[promise].append((one, ""))
+    return groups
+
+
+def _refusals(outcomes: list[Outcome]) -> Groups:
+    """Return refusals by their message with numbers left out."""
+    groups: Groups = defaultdict(list)
+    for one in outcomes:
+        if one.status == "refused":
+            groups[re.sub(r"[-+]?\d[\d,.e+-]*", "#", one.message)[:140]].append((one, ""))
+    return groups
+
+
+def run_alone(case: str) -> int:
+    """Run one case here, tell what came of it, and return the exit code."""
+    kind, _, seed = case.partition(":")
+    os.environ["MPLBACKEND"] = "Agg"
+    with tempfile.TemporaryDirectory() as home:
+        before = Path.cwd()
+        os.chdir(home)
+        try:
+            outcome = run_case(kind, int(seed))
+        finally:
+            os.chdir(before)
+    print(f"{case}: {outcome.status} in {outcome.seconds:.2f} s, {outcome.memory:.0f} MB\n{outcome.recipe}")
+    print(outcome.message or "no refusal")
+    for promise in outcome.noted:
+        print(f"noted: {promise}")
+    for cause, details in outcome.breaches:
+        print(f"breach: {cause}\n  {details}")
+    return int(outcome.status == "breach")
+
+
+def main() -> int:
+    """Run the cases, print the summary, and return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=10_000)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--kinds", default=",".join(SHARES))
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--again", type=Path, help="only the breaches of a file that --out wrote")
+    parser.add_argument("--case", metavar="KIND:SEED")
+    chosen = parser.parse_args()
+    if chosen.case:
+        return run_alone(chosen.case)
+    outcomes: list[Outcome] = []
+    began = time.perf_counter()
+
+    def say(outcome: Outcome, done: int) -> None:
+        outcomes.append(outcome)
+        for cause, _ in outcome.breaches:
+            print(f"breach {outcome.kind}:{outcome.seed}  {cause}", flush=True)
+        if done % 500 == 0:
+            print(f"{done:,} cases, {time.perf_counter() - began:.0f} s", flush=True)
+
+    todo = cases(chosen.cases, chosen.seed, tuple(chosen.kinds.split(",")))
+    if chosen.again:
+        todo = [(one["kind"], one["seed"]) for one in json.loads(chosen.again.read_text()) if one["breaches"]]
+    try:
+        run_all(todo, chosen.jobs, say)
+    except KeyboardInterrupt:
+        print("interrupted")
+    text = summary(outcomes)
+    print(f"\n{text}\n\n{len(outcomes):,} cases in {time.perf_counter() - began:.0f} s")
+    if chosen.out:
+        chosen.out.write_text(json.dumps([one.__dict__ for one in outcomes], indent=1))
+    return int(any(one.breaches for one in outcomes))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,255 @@
+"""One case: a kind and a seed, run in this process."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import shutil
+import signal
+import tempfile
+import time
+import warnings
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .arguments import DOORS, Calls
+from .choices import in_short, make_options
+from .commands import make_command, run_command
+from .files import make_file
+from .meshes import make_mesh
+from .outcome import LONGEST_MESSAGE, Outcome
+from .promises import check
+from .written import READERS, check_file
+
+Random = np.random.Generator
+
+#: Faces of a file's mesh at most that are flattened: a damaged one may have many.
+LARGEST_FILE = 5_000
+
+
+def run_case(kind: str, seed: int) -> Outcome:
+    """Return what came of a case; every file it writes is gone afterwards."""
+    outcome = Outcome(kind, seed)
+    rng = np.random.default_rng([zlib.crc32(kind.encode()), seed])
+    home, folder = Path.cwd(), Path(tempfile.mkdtemp(prefix="case", dir="."))
+    before = _resident("VmRSS")
+    began = time.perf_counter()
+    try:
+        os.chdir(folder)
+        with outcome.guarded("harness or package: "):
+            KINDS[kind](rng, outcome)
+    finally:
+        os.chdir(home)
+        shutil.rmtree(folder, ignore_errors=True)
+    outcome.seconds = time.perf_counter() - began
+    outcome.memory = max(0.0, _resident("VmHWM") - before)
+    return outcome
+
+
+def warm_up() -> None:
+    """Load and compile what cases need, so that no case's time has it."""
+    import shapes
+
+    import coneflat
+
+    for charts in ("one", "atlas"):
+        for mesh in (shapes.hill(6, 5), shapes.sphere(1), shapes.torus(8, 5)):
+            coneflat.flatten(*mesh, charts=charts, quantum=np.pi / 2 if charts == "one" else None)
+
+
+def _resident(name: str) -> float:
+    """Return the process's resident memory, or its peak since it was last asked for, MB; 0 where it cannot be told."""
+    try:
+        found = re.search(rf"{name}:\s+(\d+) kB", Path("/proc/self/status").read_text())
+        Path("/proc/self/clear_refs").write_text("5")
+    except OSError:
+        return 0.0
+    return int(found[1]) / 1e3 if found else 0.0
+
+
+def _mesh(rng: Random, outcome: Outcome) -> None:
+    """A mesh of any kind under options of any kind; one in three results is written, too."""
+    import coneflat
+
+    vertices, faces, made = make_mesh(rng)
+    options = make_options(rng, vertices, faces)
+    outcome.recipe = f"{made}; {in_short(options)}"
+    _flatten(rng, outcome, lambda: coneflat.flatten(vertices, faces, **options), options, (vertices, faces))
+
+
+def _flatten(
+    rng: Random,
+    outcome: Outcome,
+    flatten: Callable[[], Any],
+    options: dict[str, Any],
+    mesh: tuple[np.ndarray, np.ndarray],
+) -> None:
+    result = None
+    with outcome.guarded(
+        expects_nan=not np.isfinite(mesh[0]).all() or bool(re.search(r"\b(nan|inf)\b", in_short(options)))
+    ):
+        result = flatten()
+    if result is None:
+        return
+    check(outcome, result, options, *mesh)
+    if outcome.kind == "file" or rng.random() < 0.3:
+        path = Path(f"out{rng.choice(list(READERS))}")
+        outcome.recipe += f"; written as {path}"
+        with outcome.guarded("writing: "):
+            result.save(path)
+        if path.exists():
+            check_file(outcome, result, path)
+
+
+def _file(rng: Random, outcome: Outcome) -> None:
+    """A file, whole or damaged, read and flattened from Python, or by the command line."""
+    import coneflat
+
+    path, what = make_file(rng, Path())
+    outcome.recipe = what
+    weld = [None, None, True, False][int(rng.integers(4))]
+    repair = bool(rng.random() < 0.7)
+    if path.suffix == ".npz":
+        result = None
+        with outcome.guarded():
+            result = coneflat.read_flattening(path)
+        if result is not None and "damaged" not in what:
+            check(outcome, result, {}, result.vertices, result.faces[np.argsort(result.face_origin)])
+        if result is not None:
+            again = Path("again.obj")
+            with outcome.guarded("writing: "):
+                result.save(again)
+        return
+    if rng.random() < 0.35:
+        _file_by_command(rng, outcome, path, weld, repair)
+        return
+    options = {"charts": str(rng.choice(["atlas", "atlas", "one"])), "repair": repair, "max_cones": 12}
+    if rng.random() < 0.2:
+        options["up"] = (0, 0, 1)
+    mesh = None
+    with outcome.guarded(expects_nan=True):
+        mesh = coneflat.read_mesh(path, weld=weld)
+    if mesh is None or len(mesh.corners) > 3 * LARGEST_FILE:
+        return
+    outcome.recipe += f"; weld={weld}; {in_short(options)}"
+    faces = None
+    with outcome.guarded(expects_nan=True):
+        faces = coneflat.io.triangulate(mesh.vertices, mesh.corners, mesh.offsets)[0]
+    if faces is not None:
+        _flatten(rng, outcome, lambda: coneflat.flatten(mesh, **options), options, (mesh.vertices, faces))
+
+
+def _file_by_command(rng: Random, outcome: Outcome, path: Path, weld: bool | None, repair: bool) -> None:
+    line = [
+        "flatten",
+        str(path),
+        "-o",
+        f"out{rng.choice(['.obj', '.glb', '.ply'])}",
+        "--report",
+        "report.json",
+    ]
+    line += ["--repair"] if repair else []
+    line += {None: [], True: ["--weld"], False: ["--no-weld"]}[weld]
+    _run(outcome, line)
+    report = Path("report.json")
+    if outcome.status == "ok" and report.exists():
+        json.loads(report.read_text(), parse_constant=lambda word: outcome.breach("report: not JSON", word))
+        if not Path(line[3]).exists():
+            outcome.breach("command: nothing written", line)
+
+
+def _argument(rng: Random, outcome: Outcome) -> None:
+    """A public function with odd arguments; of blocks to build with any error will do, but no crash or hang."""
+    global _calls
+    if _calls is None:
+        _calls = Calls(Path(tempfile.mkdtemp()))
+    name, arguments, outcome.recipe = _calls.make(rng)
+    result = None
+    if name not in DOORS:
+        with contextlib.suppress(Exception), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            _calls.function(name)(**arguments)
+        return
+    with outcome.guarded(expects_nan=True):
+        result = _calls.function(name)(**arguments)
+    if name == "flatten" and result is not None and arguments["faces"] is _calls.good["flatten"]["faces"]:
+        given = {key: value for key, value in arguments.items() if key not in ("mesh", "faces")}
+        with outcome.guarded("checking: "):
+            check(outcome, result, _plain(given), arguments["mesh"], arguments["faces"])
+
+
+_calls: Calls | None = None
+
+
+def _plain(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options that the checks take as they are; what is odder was used up or is not of one type."""
+    plain = {
+        name: value
+        for name, value in options.items()
+        if isinstance(value, (bool, int, float, str, list, dict))
+    }
+    lists = ("cones", "boundary", "required_cones", "forbidden_cones", "allowed_cones")
+    return {
+        name: value for name, value in plain.items() if name not in lists or isinstance(value, (list, dict))
+    }
+
+
+def _command(rng: Random, outcome: Outcome) -> None:
+    """A command line with odd options."""
+    _run(outcome, make_command(rng, Path()))
+
+
+def _run(outcome: Outcome, line: list[str]) -> None:
+    """Run a command; it must end well, or with one line on stderr and a nonzero exit code."""
+    outcome.recipe += f"; coneflat {' '.join(map(repr, line))}"
+    code, _, err = run_command(line)
+    if "Traceback" in err or "internal error" in err:
+        cause = re.search(r"internal error, please report it: (\w+)", err)
+        outcome.breach(f"command: {'traceback' if cause is None else cause[1]}", err[-LONGEST_MESSAGE:])
+    if code == 0:
+        return
+    errors = [text for text in err.splitlines() if "error" in text.lower()]
+    if code not in (1, 2):
+        outcome.breach(f"command: exit code {code}", err)
+    if line and not errors and "Usage" not in err:
+        outcome.breach("command: fails without a message", err)
+    outcome.refuse(errors[-1] if errors else "usage", expects_nan=True)
+
+
+def _crash(rng: Random, outcome: Outcome) -> None:
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def _hang(rng: Random, outcome: Outcome) -> None:
+    while True:
+        pass
+
+
+def _swell(rng: Random, outcome: Outcome) -> None:
+    np.ones(200_000_000)
+
+
+#: The kinds of cases, and how many of twenty are of each. The last three put the workers to the test.
+KINDS: dict[str, Callable[[Random, Outcome], None]] = {
+    "mesh": _mesh,
+    "file": _file,
+    "argument": _argument,
+    "command": _command,
+    "crash": _crash,
+    "hang": _hang,
+    "swell": _swell,
+}
+SHARES = {"mesh": 12, "file": 4, "argument": 2, "command": 2}
+
+
+def cases(count: int, first: int, kinds: tuple[str, ...] = tuple(SHARES)) -> list[tuple[str, int]]:
+    """Return so many cases, of the kinds named in fixed shares, with seeds from the first on."""
+    cycle = [kind for kind in kinds for _ in range(SHARES[kind])]
+    order = np.random.default_rng(0).permutation(len(cycle))
+    return [(cycle[order[seed % len(cycle)]], seed) for seed in range(first, first + count)]

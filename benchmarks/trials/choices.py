@@ -1,0 +1,206 @@
+"""Random options of `coneflat.flatten` that fit a mesh, most of them valid."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from .topology import Topology
+
+Random = np.random.Generator
+
+METHODS = (
+    "linear",
+    "circle-patterns",
+    "circle-patterns/fixed",
+    "ricci",
+    "linear-abf",
+    "linear-abf/free",
+    "abf++",
+    "abf++/free",
+    "lscm",
+    "spectral",
+    "bff",
+)
+#: What the exact method alone has, and what a search for cones alone has.
+OF_EXACT = ("boundary", "at_cones", "refine", "correct_handles")
+OF_SEARCH = (
+    "cone_count",
+    "positive_only",
+    "weights",
+    "required_cones",
+    "forbidden_cones",
+    "allowed_cones",
+    "quantum",
+    "correct_handles",
+)
+INVALID = (None, -1, 0, 1e308, 1e-300, math.nan, math.inf, "abc", "", [], (), {}, [1], [[0, 1]], True, 2**70)
+
+
+def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[str, Any]:
+    """Return keyword arguments for a mesh."""
+    size = len(vertices)
+    usable = len(faces) > 0 and faces.min() >= 0 and faces.max() < size
+    topology = Topology.of(faces if usable else np.zeros((1, 3), dtype=np.int64), max(size, 1))
+    inside = np.flatnonzero(topology.is_used & ~topology.is_border)
+    border = np.flatnonzero(topology.is_border)
+    options: dict[str, Any] = {}
+
+    def maybe(chance: float, name: str, *values: Any) -> None:
+        if rng.random() < chance:
+            options[name] = values[int(rng.integers(len(values)))]
+
+    def some(pool: np.ndarray, most: int) -> list[int]:
+        count = min(len(pool), int(rng.integers(1, most + 1)))
+        return rng.choice(pool, count, replace=False).tolist() if count else []
+
+    maybe(0.75, "charts", "atlas", "atlas", "one")
+    maybe(0.25, "method", *METHODS)
+    maybe(0.25, "cones", "pursuit", "pursuit", "greedy", "none", "auto", some(inside, 4), some(inside, 4))
+    if rng.random() < 0.06:
+        options["cones"] = _given_curvatures(rng, inside, topology, faces if usable else faces[:0])
+    maybe(0.2, "distortion", 0.02, 0.1, 0.5, 2.0)
+    maybe(0.12, "cone_count", *range(0, 12))
+    maybe(0.08, "max_cones", 0, 1, 2, 5, 40)
+    maybe(0.06, "min_cone_angle", math.pi / 6, 1.0, 3.0, 5.0)
+    maybe(0.06, "max_cone_angle", None, 7.0, 9.0, 20.0)
+    maybe(0.06, "positive_only", True)
+    maybe(0.05, "weights", rng.random(size), 10 ** rng.uniform(-9, 9, size), np.eye(1, max(size, 1))[0])
+    maybe(0.05, "required_cones", some(inside, 3))
+    maybe(0.05, "forbidden_cones", some(np.arange(size), max(1, size // 2)))
+    maybe(0.05, "allowed_cones", some(inside, max(1, size // 2)))
+    maybe(
+        0.16,
+        "quantum",
+        math.pi / 2,
+        math.pi / 2,
+        math.pi / 3,
+        math.pi,
+        2 * math.pi,
+        0.1,
+        rng.uniform(1e-3, 6),
+    )
+    maybe(0.3 if "quantum" in options else 0, "correct_handles", True)
+    maybe(0.03, "epsilon", 0.1, 1e-3, 10.0)
+    maybe(0.02, "length_rule", "mean")
+    maybe(0.08, "at_cones", "scale", "curvature")
+    if len(border):
+        maybe(0.3, "boundary", "lengths", "lengths", "disk", "disk", "straight", "straight", some(border, 6))
+        if rng.random() < 0.05:
+            corners = some(border, 6)
+            turns = rng.dirichlet(np.ones(len(corners))) * 2 * math.pi if corners else []
+            options["boundary"] = {v: float(k) for v, k in zip(corners, turns, strict=True)}
+    else:
+        maybe(0.03, "boundary", "lengths", "disk", "straight")
+    maybe(0.1, "best_effort", True)
+    maybe(0.12, "refine", True)
+    maybe(0.35, "repair", True)
+    maybe(0.04, "strict", True)
+    maybe(0.1, "solver", "scipy", "cholespy", "auto", "amg", "pardiso", "scikit-sparse")
+    if len(topology.inner):
+        edges = topology.edges[topology.inner]
+        if rng.random() < 0.06:
+            options["seams"] = edges[rng.random(len(edges)) < rng.choice([0.03, 0.3, 1.0])]
+        if rng.random() < 0.06:
+            options["seams"] = _walk(rng, edges)
+        if rng.random() < 0.04:
+            options["forbidden_seams"] = edges[rng.random(len(edges)) < rng.choice([0.03, 0.3, 0.9])]
+    maybe(0.1, "sharp_angle", 0.3, 0.7, 1.2, 3.0)
+    maybe(0.05, "creases", 1.0, 100.0, 1e9)
+    maybe(0.04, "hide_seams", 1.0, 30.0)
+    maybe(0.05, "seam_weights", rng.random(size), 10 ** rng.uniform(-9, 9, size), np.ones(size) * 1e308)
+    maybe(0.08, "resolution", 1, 16, 64, 4096)
+    maybe(0.08, "padding", 0.0, 0.2, 8.0)
+    maybe(0.05, "tiles", 2, 3, 12)
+    maybe(0.12, "up", (0, 0, 1), (0, 1, 0), (1, 1e-9, -3), (0.0, -2.0, 0.0))
+    _drop_clashes(rng, options)
+    if rng.random() < 0.03:
+        names = (
+            "distortion",
+            "quantum",
+            "cones",
+            "boundary",
+            "seams",
+            "weights",
+            "up",
+            "tiles",
+            "charts",
+            "method",
+        )
+        options[names[int(rng.integers(len(names)))]] = INVALID[int(rng.integers(len(INVALID)))]
+    return options
+
+
+def _given_curvatures(
+    rng: Random, inside: np.ndarray, topology: Topology, faces: np.ndarray
+) -> dict[int, float]:
+    """Return cones whose curvatures fit a surface in one piece, if there are inner vertices."""
+    count = min(len(inside), int(rng.integers(1, 8)))
+    if not count or not len(faces):
+        return {}
+    chosen = rng.choice(inside, count, replace=False)
+    total = 2 * math.pi * topology.euler(faces, int(topology.component[chosen[0]]))
+    if topology.is_border.any():
+        values = rng.uniform(-2, 3, count)
+    else:
+        values = rng.uniform(-1, 1, count) if rng.random() < 0.5 else np.zeros(count)
+        values += (total - values.sum()) / count
+    return {int(v): float(k) for v, k in zip(chosen, values, strict=True)}
+
+
+def _walk(rng: Random, edges: np.ndarray) -> np.ndarray:
+    """Return edges along a random path, as a person would mark them."""
+    at: dict[int, list[int]] = {}
+    for number, (a, b) in enumerate(edges.tolist()):
+        at.setdefault(a, []).append(number)
+        at.setdefault(b, []).append(number)
+    here, taken = int(edges[rng.integers(len(edges)), 0]), []
+    for _ in range(int(rng.integers(2, 12))):
+        number = at[here][int(rng.integers(len(at[here])))]
+        taken.append(number)
+        here = int(edges[number].sum()) - here
+    return edges[np.unique(taken)]
+
+
+def _drop_clashes(rng: Random, options: dict[str, Any]) -> None:
+    """Leave out, nearly always, what is refused beside other options, so that most cases come to a result."""
+    if rng.random() < 0.04:
+        return
+    if options.get("method", "exact") != "exact":
+        for name in OF_EXACT:
+            options.pop(name, None)
+        if options["method"] not in (
+            "circle-patterns",
+            "circle-patterns/fixed",
+            "ricci",
+            "abf++",
+            "abf++/free",
+        ):
+            options.pop("best_effort", None)
+    if not isinstance(options.get("cones", "auto"), str) or options.get("cones") in ("greedy", "none"):
+        for name in OF_SEARCH:
+            options.pop(name, None)
+        if options.get("boundary") == "straight":
+            del options["boundary"]
+    if options.get("at_cones") == "scale" and (
+        isinstance(options.get("cones"), dict) or options.get("boundary", "free") not in ("free", "lengths")
+    ):
+        del options["at_cones"]
+    if options.get("padding", 2.0) >= options.get("resolution", 1024) / 4:
+        options["padding"] = 0.0
+    if "allowed_cones" in options and "forbidden_cones" in options:
+        del options["forbidden_cones"]
+
+
+def in_short(options: dict[str, Any]) -> str:
+    """Return options as one line, long ones cut."""
+    return ", ".join(f"{name}={_short(value)}" for name, value in options.items())
+
+
+def _short(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        return f"<{value.dtype} {value.shape}>"
+    text = " ".join(repr(value).split())
+    return text if len(text) < 100 else f"{text[:97]}..."

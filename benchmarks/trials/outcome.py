@@ -1,0 +1,99 @@
+"""What came of a case."""
+
+from __future__ import annotations
+
+import json
+import re
+import traceback
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parents[2] / "src" / "coneflat"
+#: Characters of a message at most that is still one line to read.
+LONGEST_MESSAGE = 900
+
+
+@dataclass
+class Outcome:
+    """What came of a case.
+
+    Attributes:
+        kind, seed: the case.
+        status: "ok", "noted" (a promise is not kept and a note says so), "refused" or "breach".
+        recipe: what was done, in words.
+        message: of a refusal.
+        breaches: (cause, details) of each promise broken.
+        noted: promises not kept that a note names.
+        seconds, memory: wall time; peak of resident memory above that before, MB.
+    """
+
+    kind: str
+    seed: int
+    status: str = "ok"
+    recipe: str = ""
+    message: str = ""
+    breaches: list[tuple[str, str]] = field(default_factory=list)
+    noted: list[str] = field(default_factory=list)
+    seconds: float = 0.0
+    memory: float = 0.0
+
+    def breach(self, cause: str, details: object = "") -> None:
+        """Add a broken promise; one of each cause will do."""
+        self.status = "breach"
+        if cause not in dict(self.breaches):
+            self.breaches.append((cause, " ".join(str(details).split())[:600]))
+
+    def excuse(self, promise: str) -> None:
+        """Add a promise not kept that a note names."""
+        self.noted.append(promise)
+        if self.status == "ok":
+            self.status = "noted"
+
+    def refuse(self, message: str, expects_nan: bool = False) -> None:
+        """Take an error of the package's own, whose message must be one readable line."""
+        if self.status != "breach":
+            self.status = "refused"
+        self.message = message
+        if not message.strip() or "\n" in message.strip() or len(message) > LONGEST_MESSAGE:
+            self.breach("message: not one line", message)
+        if not expects_nan and re.search(r"\b(nan|inf)\b", message):
+            self.breach("message: speaks of nan", message)
+        if "Traceback" in message or "internal error" in message:
+            self.breach("message: internal error", message)
+
+    @contextmanager
+    def guarded(self, what: str = "", expects_nan: bool = False) -> Iterator[None]:
+        """Run what may be refused by an error of the package's own; any other is a breach, and so is a warning."""
+        from coneflat.errors import ConeflatError
+
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                yield
+            except ConeflatError as error:
+                self.refuse(str(error), expects_nan)
+            except Exception as error:
+                self.breach(f"{what}{where(error)}", f"{type(error).__name__}: {error}")
+        for each in caught:
+            if issubclass(each.category, RuntimeWarning) and str(PACKAGE) in each.filename:
+                place = f"{Path(each.filename).relative_to(PACKAGE)}:{each.lineno}"
+                self.breach(f"warning: {each.message} at {place}")
+
+    def as_json(self) -> str:
+        return json.dumps(self.__dict__)
+
+
+def where(error: BaseException) -> str:
+    """Return the kind of an error and the innermost function of the package that it went through."""
+    frames = [
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if Path(frame.filename).is_relative_to(PACKAGE)
+    ]
+    if not frames:
+        return f"{type(error).__name__} outside the package"
+    at = frames[-1]
+    return f"{type(error).__name__} in {Path(at.filename).relative_to(PACKAGE)} {at.name}"

@@ -1,0 +1,399 @@
+"""What a flattening promises, measured anew on the arrays that came out."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import numpy as np
+
+from . import plane
+from .outcome import Outcome
+from .topology import Topology
+
+TURN = 2 * np.pi
+#: Radians that angles may be off, and, relatively, the sides of a seam; beside what rounding of the points makes.
+ANGLE, SIDES = 1e-6, 1e-8
+#: A round boundary is found in rounds, each of which changes curvatures by less than the one before.
+ROUND = 0.02
+#: Largest mesh whose overlaps are found by all pairs, too.
+ALL_PAIRS = 700
+EPS = np.finfo(np.float64).eps
+#: Methods that promise curvatures on the layout.
+FLAT = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci")
+
+#: What a note must say where a promise is not kept.
+WORDS = {
+    "flipped": r"turned over|upside down|flipped|inverted|collapsed|without area",
+    "overlap": r"overlap|upside down|turned over",
+    "angle": r"angle|wide|curvature|converge|wind|upside down|turned over",
+    "sides": r"seam|sides|converge",
+    "boundary": r"boundary|straight|border|round|converge|curvature|angle|length",
+    "rotation": r"rotation|quant|multiple|handle|converge",
+    "cones": r"cone",
+}
+
+
+class Trial:
+    """A result on trial: its arrays, and what was asked for."""
+
+    def __init__(
+        self, outcome: Outcome, result: Any, options: dict[str, Any], vertices: Any, faces: Any
+    ) -> None:
+        self.outcome, self.result, self.options = outcome, result, options
+        self.given = np.asarray(vertices, dtype=np.float64), np.asarray(faces)
+        self.corners = result.uv[result.uv_faces]
+        self.topology = Topology.of(result.faces, len(result.vertices))
+        self.method = options.get("method", "exact")
+        self.boundary = options.get("boundary", "free")
+        self.is_marked = options.get("seams") is not None or options.get("sharp_angle") is not None
+        self.sides = plane.side_lengths(self.corners)
+
+    def broken(self, promise: str, cause: str, details: object) -> None:
+        """Take a promise that is not kept: a breach unless a note says so."""
+        if any(re.search(WORDS[promise], note, re.IGNORECASE) for note in self.result.notes):
+            self.outcome.excuse(cause)
+        else:
+            self.outcome.breach(cause, f"{details}; notes {list(self.result.notes)}")
+
+
+def check(outcome: Outcome, result: Any, options: dict[str, Any], vertices: Any, faces: Any) -> None:
+    """Hold a result against all promises; what is broken goes to the outcome."""
+    if not _sound(outcome, result):
+        return
+    trial = Trial(outcome, result, options, vertices, faces)
+    _check_origin(trial)
+    _check_place(trial)
+    _check_orientation(trial)
+    _check_overlap(trial)
+    _check_angles(trial)
+    _check_sides(trial)
+    _check_boundary(trial)
+    _check_rotations(trial)
+    _check_cones(trial)
+    _check_report(trial)
+
+
+def _sound(outcome: Outcome, result: Any) -> bool:
+    """Whether arrays have the shapes and ranges to go on with."""
+    for name, array in (("faces", result.faces), ("uv_faces", result.uv_faces)):
+        bound = len(result.vertices) if name == "faces" else len(result.uv)
+        if array.shape != (len(result.faces), 3) or array.min() < 0 or array.max() >= bound:
+            outcome.breach(f"arrays: {name} out of range", array.shape)
+            return False
+    if not np.isfinite(result.uv).all():
+        outcome.breach("arrays: uv not finite", f"{(~np.isfinite(result.uv)).sum()} of {result.uv.size}")
+        return False
+    if not np.isfinite(result.curvatures).all() or len(result.curvatures) != len(result.cones):
+        outcome.breach("arrays: curvatures not finite", result.curvatures)
+    return True
+
+
+def _check_origin(trial: Trial) -> None:
+    """Vertices and faces are those of the input."""
+    result, (vertices, faces) = trial.result, trial.given
+    known = result.vertex_origin >= 0
+    if not np.array_equal(result.vertices[known], vertices[result.vertex_origin[known]], equal_nan=True):
+        trial.outcome.breach("origin: vertices are not the input's", "")
+    if result.solve.refined_triangles == 0 and not result.settings.get("refine"):
+        named = np.sort(result.vertex_origin[result.faces], axis=1)
+        if not np.array_equal(named, np.sort(faces[result.face_origin], axis=1)):
+            trial.outcome.breach("origin: faces are not the input's", "")
+    if (trial.topology.count > 2).any():
+        trial.outcome.breach("origin: the result is no manifold", "")
+
+
+def _check_place(trial: Trial) -> None:
+    """Points lie in the unit square, or in the tiles."""
+    uv, tiles = trial.result.uv, int(trial.options.get("tiles", 1))
+    low, high = uv.min(axis=0), uv.max(axis=0)
+    most = np.array([min(tiles, 10), (tiles + 9) // 10])
+    if (low < 0).any() or (high > most).any():
+        trial.outcome.breach("place: outside the texture", f"{low} to {high}")
+
+
+def _check_orientation(trial: Trial) -> None:
+    """No triangle is upside down or collapsed, and the report counts those that are."""
+    chart = plane.charts_of(trial.result.uv_faces)
+    against = int(plane.flipped(trial.corners, chart).sum())
+    told = trial.result.distortion
+    if against != told.flipped:
+        trial.outcome.breach("flipped: report differs", f"{told.flipped} reported, {against} measured")
+    if against:
+        trial.broken("flipped", f"triangles upside down, {_method(trial)}", f"{against} triangles")
+    if told.degenerate:
+        trial.broken("flipped", f"triangles collapsed, {_method(trial)}", f"{told.degenerate} triangles")
+
+
+def _check_overlap(trial: Trial) -> None:
+    """Nothing overlaps in an atlas, and the report counts what does."""
+    from coneflat.atlas.overlap import find_overlaps
+
+    found = find_overlaps(trial.corners)
+    told = trial.result.distortion
+    if len(found.pairs) != told.overlapping_pairs:
+        trial.outcome.breach(
+            "overlap: report differs", f"{told.overlapping_pairs} reported, {len(found.pairs)} measured"
+        )
+    if len(trial.corners) <= ALL_PAIRS:
+        depth = plane.overlap_depths(trial.corners)
+        extent = float(np.ptp(trial.result.uv, axis=0).max())
+        is_found = np.zeros(depth.shape, dtype=bool)
+        is_found[tuple(found.pairs.T)] = True
+        # The normals of shorter sides are not known well enough, nor is the orientation of what has hardly an area.
+        short = trial.sides.min(axis=1) < plane.SHORT * extent
+        short |= np.abs(plane.double_areas(trial.corners)) < plane.NO_AREA * extent**2
+        depth[short], depth[:, short], is_found[short], is_found[:, short] = -1.0, -1.0, False, False
+        if ((np.triu(depth, 1) > plane.DEEP * extent) & ~is_found).any():
+            trial.outcome.breach("overlap: missed by find_overlaps", "")
+        if (is_found & (depth < -plane.DEEP * extent)).any():
+            trial.outcome.breach("overlap: invented by find_overlaps", "")
+    if len(found.pairs) and trial.options.get("charts") == "atlas":
+        trial.broken("overlap", f"overlap in an atlas, {_method(trial)}", f"{len(found.pairs)} pairs")
+
+
+def _check_angles(trial: Trial) -> None:
+    """Angles around inner vertices sum to a full turn, at cones less their curvature."""
+    if trial.method not in FLAT:
+        return
+    result, topology = trial.result, trial.topology
+    error = np.abs(_angle_sums(trial) - TURN + _spread(trial, result.cones, result.curvatures))
+    error = np.maximum(error - _angle_rounding(trial), 0.0)
+    at = topology.is_used & ~topology.is_border
+    if trial.is_marked:  # the sides of a marked seam are a boundary
+        at[topology.edges[topology.inner[_is_seam(trial)]]] = False
+        at[result.cones] = True
+    off = np.flatnonzero(at & (error > ANGLE))
+    if len(off):
+        worst = off[np.argmax(error[off])]
+        kind = "a full turn" if error[worst] > 6 else "less than a full turn"
+        trial.broken(
+            "angle",
+            f"angle off by {kind}, {_method(trial)}",
+            f"{len(off)} of {at.sum()} vertices, {worst} by {error[worst]:.3g} rad",
+        )
+    worst = error[at].max(initial=0.0)
+    told = result.distortion.curvature_error_max * np.pi
+    if worst > ANGLE and not told > worst / 2:
+        trial.outcome.breach("curvature error understated", f"{told:.3g} rad reported, {worst:.3g} measured")
+
+
+def _check_sides(trial: Trial) -> None:
+    """The two sides of every seam are equally long."""
+    if trial.method not in FLAT:
+        return
+    one, two = trial.sides.ravel()[trial.topology.sides].T
+    slack = SIDES + 8 * EPS / np.maximum(np.minimum(one, two), EPS)
+    off = np.abs(one - two) / np.maximum(np.maximum(one, two), EPS)
+    bad = off > slack
+    if bad.any():
+        cause = f"sides of seams differ, {_method(trial)}{', marked' if trial.is_marked else ''}"
+        trial.broken("sides", cause, f"{bad.sum()} edges, by up to {off[bad].max():.3g}")
+
+
+def _check_boundary(trial: Trial) -> None:
+    """A prescribed boundary is what it was to be."""
+    if trial.method != "exact" or trial.is_marked or not trial.topology.is_border.any():
+        return
+    if trial.boundary == "lengths":
+        _check_boundary_lengths(trial)
+    elif trial.boundary in ("disk", "straight") or not isinstance(trial.boundary, str):
+        _check_boundary_turns(trial)
+
+
+def _check_boundary_lengths(trial: Trial) -> None:
+    at = trial.result.vertices[trial.result.faces]
+    space, flat = plane.side_lengths(at).ravel(), trial.sides.ravel()
+    border = np.isin(_edge_of_halfedge(trial), np.flatnonzero(trial.topology.count == 1))
+    wanted = space[border] * trial.result.uv_scale
+    coarse = EPS * np.abs(at).max() / np.maximum(space[border], np.finfo(float).tiny)
+    off = np.abs(flat[border] - wanted) / np.maximum(wanted, np.finfo(float).tiny)
+    off -= 1e-7 + 8 * coarse + 8 * EPS / np.maximum(wanted, EPS)
+    if off.max() > 0:
+        trial.broken(
+            "boundary", "boundary lengths not kept", f"{(off > 0).sum()} edges, by up to {off.max():.3g}"
+        )
+
+
+def _check_boundary_turns(trial: Trial) -> None:
+    """Curvature on the boundary: equal on round loops, none along straight sides."""
+    result, topology = trial.result, trial.topology
+    curvature = np.pi - _angle_sums(trial)
+    slack = ANGLE + _angle_rounding(trial)
+    if trial.boundary == "straight":
+        quantum = trial.options.get("quantum")
+        corners = topology.is_border & (np.abs(curvature) > slack)
+        if corners.sum() > max(40, 0.5 * topology.is_border.sum()) and quantum is None:
+            trial.broken("boundary", "boundary not straight", f"{corners.sum()} corners")
+        if quantum is not None:
+            off = _off_multiple(curvature, quantum) - slack
+            if (off[topology.is_border] > 0).any():
+                trial.broken(
+                    "boundary", "corners are no multiples", f"by {off[topology.is_border].max():.3g} rad"
+                )
+        return
+    named = dict.fromkeys(trial.boundary) if not isinstance(trial.boundary, (str, dict)) else trial.boundary
+    corner_at = np.flatnonzero(np.isin(result.vertex_origin, list(named) if isinstance(named, dict) else []))
+    share = np.zeros(len(curvature))
+    edge_at = topology.edges[topology.count == 1]
+    length = trial.sides.ravel()[_halfedge_of_edge(trial)[topology.count == 1]]
+    np.add.at(share, edge_at.ravel(), np.repeat(length / 2, 2))
+    for loop in topology.border_loops():
+        if np.isin(corner_at, loop).any():
+            sides = np.setdiff1d(loop, corner_at)
+            off = np.abs(curvature[sides]) - slack[sides]
+            cause = "straight sides not held"
+        else:
+            wanted = curvature[loop].sum() * share[loop] / share[loop].sum()
+            off = np.abs(curvature[loop] - wanted) - slack[loop] - ROUND * np.abs(wanted)
+            cause = "round boundary not held"
+        if off.max(initial=-1) > 0:
+            trial.broken(
+                "boundary", cause, f"by {off.max():.3g} rad at {(off > 0).sum()} of {len(loop)} vertices"
+            )
+    if isinstance(named, dict) and any(k is not None for k in named.values()):
+        wanted = np.array([named[v] for v in result.vertex_origin[corner_at]], dtype=np.float64)
+        off = np.abs(curvature[corner_at] - wanted) - slack[corner_at] - 1e-6
+        if off.max(initial=-1) > 0:
+            trial.broken("boundary", "corners not held", f"by {off.max():.3g} rad")
+
+
+def _check_rotations(trial: Trial) -> None:
+    """With a quantum the sides of seams are turned by multiples of it; the report says by how much they are off."""
+    quantum = trial.options.get("quantum")
+    if quantum is None:
+        return
+    here, there = trial.topology.sides.T
+    points = trial.corners[..., 0] + 1j * trial.corners[..., 1]
+    steps = (np.roll(points, -1, axis=1) - points).ravel()
+    lengths = np.minimum(np.abs(steps[here]), np.abs(steps[there]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turn = np.angle(-steps[there] / steps[here])
+    slack = ANGLE + 16 * EPS / np.maximum(lengths, EPS)
+    known = lengths > 1e-12
+    off = _off_multiple(turn[known], quantum)
+    worst = float(off.max(initial=0.0))
+    told = None if trial.result.rotations is None else trial.result.rotations.worst
+    rounding = 2 * slack[known].max(initial=0.0)
+    # Across a marked seam nothing says how the sides are turned, and whether it counts is a matter of taste.
+    if told is None or told > worst + rounding or (told < worst - rounding and not trial.is_marked):
+        trial.outcome.breach("rotations: report differs", f"{told} reported, {worst:.3g} rad measured")
+    if (off > slack[known]).any() and trial.method == "exact" and _must_turn_by_quanta(trial):
+        trial.broken("rotation", "rotations are no multiples", f"off by {worst:.3g} rad")
+
+
+def _must_turn_by_quanta(trial: Trial) -> bool:
+    """Whether cones alone say how seams are turned: no handles, no second boundary, nothing marked or given."""
+    if trial.is_marked or not isinstance(trial.options.get("cones", "auto"), str):
+        return False
+    topology, faces = trial.topology, trial.result.faces
+    loops = [int(topology.component[loop[0]]) for loop in topology.border_loops()]
+    return all(
+        topology.euler(faces, one) == 2 - loops.count(one)
+        and loops.count(one) <= (0 if trial.boundary == "straight" else 1)
+        for one in np.unique(topology.component[topology.is_used]).tolist()
+    )
+
+
+def _check_cones(trial: Trial) -> None:
+    """Cones are those that were asked for, and their curvatures sum to what the surface has."""
+    result, options, topology = trial.result, trial.options, trial.topology
+    cones, curvatures = result.cones, result.curvatures
+    names = result.vertex_origin[cones].tolist()
+    if len(set(cones.tolist())) != len(cones):
+        trial.outcome.breach("cones: one twice", cones)
+    for one in np.unique(topology.component[topology.is_used]).tolist():
+        own = topology.component == one
+        if trial.method in FLAT and not trial.is_marked and not (own & topology.is_border).any():
+            wanted, found = TURN * topology.euler(result.faces, one), curvatures[own[cones]].sum()
+            if abs(found - wanted) > ANGLE * max(1, len(cones)):
+                trial.broken("cones", "cones: sum of curvatures", f"{found:.6g} instead of {wanted:.6g}")
+    if not isinstance(options.get("cones", "auto"), str):
+        wanted = options["cones"]
+        if set(names) != {int(v) for v in wanted}:
+            trial.broken("cones", "cones: not those given", f"{names} instead of {list(wanted)}")
+        elif isinstance(wanted, dict):
+            off = max((abs(wanted[v] - k) for v, k in zip(names, curvatures, strict=True)), default=0)
+            if off > ANGLE:
+                trial.broken("cones", "cones: not the curvatures given", f"off by {off:.3g}")
+        return
+    missing = set(options.get("required_cones") or ()) - set(names)
+    forbidden = set(options.get("forbidden_cones") or ()) & set(names)
+    allowed = options.get("allowed_cones")
+    strange = (
+        set(names) - set(allowed) - set(options.get("required_cones") or ()) if allowed is not None else set()
+    )
+    if missing or forbidden or strange:
+        trial.broken(
+            "cones", "cones: wishes", f"missing {missing}, forbidden {forbidden}, not allowed {strange}"
+        )
+    count = options.get("cone_count")
+    is_one = len(np.unique(topology.component[topology.is_used])) == 1 and not trial.is_marked
+    if count is not None and is_one and len(cones) != count and trial.boundary != "straight":
+        inside = int((topology.is_used & ~topology.is_border).sum())
+        why = ", few inner vertices" if inside < count else ""
+        why = why if trial.boundary in ("free", "lengths") else ", prescribed boundary"
+        trial.broken("cones", f"cones: not so many{why}", f"{len(cones)} instead of {count}")
+    if options.get("positive_only") and (curvatures < -ANGLE).any():
+        trial.broken("cones", "cones: negative", curvatures.min())
+    quantum = options.get("quantum")
+    if quantum is not None and len(cones) and _off_multiple(curvatures, quantum).max() > ANGLE:
+        trial.broken("cones", "cones: no multiples", _off_multiple(curvatures, quantum).max())
+
+
+def _check_report(trial: Trial) -> None:
+    """The report is JSON without NaN, and what is said of it is readable."""
+    from coneflat.report import as_rows
+
+    json.dumps(trial.result.report(), allow_nan=False)
+    repr(trial.result)
+    for text in (*trial.result.notes, *(value for _, value, _ in as_rows(trial.result))):
+        if re.search(r"\bnan\b", text):
+            trial.outcome.breach("report: speaks of nan", text)
+
+
+def _method(trial: Trial) -> str:
+    kind = trial.method + (" refined" if trial.options.get("refine") else "")
+    if isinstance(trial.boundary, str):
+        return kind + ("" if trial.boundary == "free" else f", {trial.boundary}")
+    return f"{kind}, polygon"
+
+
+def _is_seam(trial: Trial) -> np.ndarray:
+    """Return (k,) whether the sides of each inner edge have different points."""
+    uv_faces = trial.result.uv_faces
+    tails, heads = uv_faces.ravel(), np.roll(uv_faces, -1, axis=1).ravel()
+    here, there = trial.topology.sides.T
+    return (tails[here] != heads[there]) | (heads[here] != tails[there])
+
+
+def _angle_sums(trial: Trial) -> np.ndarray:
+    return _spread(trial, trial.result.faces.ravel(), plane.angles(trial.corners).ravel())
+
+
+def _angle_rounding(trial: Trial) -> np.ndarray:
+    """Return (n,) by how much rounded points change the sum of angles at a vertex."""
+    shorter = np.minimum(trial.sides, np.roll(trial.sides, 1, axis=1))
+    return _spread(trial, trial.result.faces.ravel(), 4 * EPS / np.maximum(shorter.ravel(), EPS))
+
+
+def _spread(trial: Trial, at: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.bincount(at, values, minlength=len(trial.result.vertices))
+
+
+def _edge_of_halfedge(trial: Trial) -> np.ndarray:
+    size = len(trial.result.vertices)
+    tails, heads = trial.result.faces.ravel(), np.roll(trial.result.faces, -1, axis=1).ravel()
+    keys = trial.topology.edges[:, 0] * size + trial.topology.edges[:, 1]
+    return np.searchsorted(keys, np.minimum(tails, heads) * size + np.maximum(tails, heads))
+
+
+def _halfedge_of_edge(trial: Trial) -> np.ndarray:
+    found = np.empty(len(trial.topology.edges), dtype=np.int64)
+    found[_edge_of_halfedge(trial)] = np.arange(trial.result.faces.size)
+    return found
+
+
+def _off_multiple(angle: np.ndarray, quantum: float) -> np.ndarray:
+    return np.abs(angle - quantum * np.round(angle / quantum))

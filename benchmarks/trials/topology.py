@@ -1,0 +1,61 @@
+"""The topology of a triangle mesh in plain numpy, independent of the package that is on trial."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+
+@dataclass(frozen=True, eq=False)
+class Topology:
+    """Edges of a mesh and what lies on its boundary.
+
+    Attributes:
+        edges: (e, 2) vertices, the smaller first.
+        count: (e,) faces at each edge.
+        inner: (k,) edges of two faces.
+        sides: (k, 2) their two half-edges; half-edge 3 f + i runs from corner i to corner i + 1 of face f.
+        is_border: (n,) vertices on an edge of one face.
+        is_used: (n,) vertices of a face.
+        component: (n,) connected component of each vertex.
+    """
+
+    edges: np.ndarray
+    count: np.ndarray
+    inner: np.ndarray
+    sides: np.ndarray
+    is_border: np.ndarray
+    is_used: np.ndarray
+    component: np.ndarray
+
+    @classmethod
+    def of(cls, faces: np.ndarray, vertices: int) -> Topology:
+        tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+        low, high = np.minimum(tails, heads), np.maximum(tails, heads)
+        _, first, count = np.unique(low * vertices + high, return_index=True, return_counts=True)
+        order = np.argsort(low * vertices + high, kind="stable")
+        start = np.cumsum(count) - count
+        inner = np.flatnonzero(count == 2)
+        sides = np.stack([order[start[inner]], order[start[inner] + 1]], axis=1)
+        edges = np.stack([low[first], high[first]], axis=1)
+        is_border, is_used = np.zeros((2, vertices), dtype=bool)
+        is_border[edges[count == 1]] = True
+        is_used[faces] = True
+        graph = coo_matrix((np.ones(len(edges)), edges.T), shape=(vertices, vertices))
+        return cls(edges, count, inner, sides, is_border, is_used, connected_components(graph, False)[1])
+
+    def euler(self, faces: np.ndarray, component: int) -> int:
+        """Return V - E + F of a component."""
+        own = self.component == component
+        return int((own & self.is_used).sum() - own[self.edges[:, 0]].sum() + own[faces[:, 0]].sum())
+
+    def border_loops(self) -> list[np.ndarray]:
+        """Return the vertices of each loop of the boundary, in no order."""
+        border = self.edges[self.count == 1]
+        size = len(self.is_border)
+        graph = coo_matrix((np.ones(len(border)), border.T), shape=(size, size))
+        label = connected_components(graph, False)[1]
+        return [np.flatnonzero((label == one) & self.is_border) for one in np.unique(label[self.is_border])]

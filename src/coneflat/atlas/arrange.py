@@ -1,0 +1,92 @@
+"""Charts of components brought into a texture."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import FloatArray, IntArray
+from ..geometry.planar import signed_double_areas
+from .charts import Charts, read_charts
+from .orient import mean_rise, orient_charts, straight_angles
+from .pack import MOST_TURNS, Packed, pack_charts
+
+# Of a turn: by how much a multiple of a quantum may miss it.
+WHOLE = 1e-9
+
+
+def arrange_charts(
+    corner_uv: FloatArray,
+    chart: IntArray,
+    component: IntArray,
+    space: FloatArray,
+    *,
+    resolution: int,
+    padding: float,
+    tiles: int,
+    up: tuple[float, float, float] | None = None,
+    quantum: float | None = None,
+) -> Packed:
+    """Return charts packed into a texture.
+
+    Args:
+        corner_uv: (m, 3, 2) points of the triangle corners; those of a component are in one frame.
+        chart: (m,) the chart of each triangle, from 0.
+        component: (k,) the component of each chart.
+        space: (m, 3, 3) the triangles' corners on the model.
+        resolution, padding, tiles: see `pack_charts`.
+        up: direction in space that is to be v; None to fill the texture best.
+        quantum: the charts of a component are turned against each other by multiples of this angle only, so that the
+            rotations between the sides of seams stay such multiples; None for any angle.
+    """
+    flat = _upright(corner_uv, chart)
+    rotate: str | int = "any" if up is None else "none"
+    if quantum is not None and len(component) > 1:
+        turns = whole_turns(quantum)
+        flat = _turned_together(read_charts(flat, chart), component, turns, space, up)
+        rotate = turns if up is None else "none"
+    elif up is not None:
+        flat = orient_charts(flat, chart, corners=space, up=up)
+    return pack_charts(flat, chart, rotate=rotate, resolution=resolution, padding=padding, tiles=tiles)
+
+
+def whole_turns(quantum: float) -> int:
+    """Return into how many equal parts a full turn can be divided, few enough to be tried, by multiples of an angle."""
+    parts = 2 * np.pi / quantum
+    if abs(parts - round(parts)) > WHOLE * parts:
+        return 1
+    return max(turns for turns in range(1, MOST_TURNS + 1) if round(parts) % turns == 0)
+
+
+def _turned_together(
+    charts: Charts, component: IntArray, turns: int, space: FloatArray, up: tuple[float, float, float] | None
+) -> FloatArray:
+    """Return (m, 3, 2) the charts, the largest of each component straight, and the others turned as far as it.
+
+    With an up direction each chart is then turned by that number of equal turns which brings it up best.
+    """
+    angles, areas = straight_angles(charts, charts.outlines()), np.abs(charts.sums(charts.areas))
+    order = np.lexsort((-areas, component))
+    _, first = np.unique(component[order], return_index=True)
+    largest = order[first][np.unique(component, return_inverse=True)[1]]
+    if up is not None:
+        rise = mean_rise(charts, space, up)
+        angles += _nearest(rise * np.exp(1j * angles), 4)
+        angles = angles[largest]
+        return charts.moved(np.exp(1j * (angles + _nearest(rise * np.exp(1j * angles), turns))))
+    return charts.moved(np.exp(1j * angles[largest]))
+
+
+def _nearest(rise: NDArray[np.complex128], turns: int) -> FloatArray:
+    """Return (k,) the multiple of a part of a turn that brings each direction next to v."""
+    step = 2 * np.pi / turns
+    angles: FloatArray = step * np.round((np.pi / 2 - np.angle(rise)) / step)
+    return angles
+
+
+def _upright(flat: FloatArray, chart: IntArray) -> FloatArray:
+    """Return (m, 3, 2) charts, those turned over of which more area is upside down than not."""
+    is_mirrored = np.bincount(chart, weights=signed_double_areas(flat)) < 0
+    if not is_mirrored.any():
+        return flat
+    return np.where(is_mirrored[chart][:, None, None], flat * [1.0, -1.0], flat)

@@ -1,0 +1,164 @@
+"""What a file holds of a result: its numbers as they are stored, and measures of these."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .._arrays import FloatArray, IntArray
+from ..atlas.overlap import Overlaps
+from ..atlas.snap import snap_apart
+from ..distortion import measure_at_any_size
+from ..errors import MeshFileError
+from ..mesh import TriangleMesh
+from ..promises import DOUBLE, SINGLE, broken_promises
+from ..rotations import Rotations, seam_rotations
+from ..text import plural
+from .gltf_write import scene_losses
+from .pieces import find_pieces
+
+if TYPE_CHECKING:
+    from ..result import Flattening
+
+
+# Binary digits of 32-bit numbers.
+DIGITS = 24
+# Sizes of models whose coordinates are 32-bit numbers with all their digits, and so are those of their details.
+SMALLEST, LARGEST = 1e-30, 3e38
+
+
+def as_written(result: Flattening, ending: str) -> Flattening:
+    """Return a result as a file of a format holds it, measured on that.
+
+    A .glb has 32-bit numbers, v from the top down; what rounding made of touching triangles is parted. An .obj has
+    polygons, which are measured as the fans of triangles that others read. A .ply and an .npz hold what there is.
+
+    Args:
+        result: what is written.
+        ending: ".glb" and so on.
+
+    Raises:
+        MeshFileError: the file cannot hold numbers so large.
+    """
+    if ending == ".glb":
+        stored = _in_single_precision(result)
+        lost = [note for note in scene_losses(stored) if note not in stored.notes]
+        return replace(stored, notes=(*stored.notes, *lost)) if lost else stored
+    if ending == ".obj" and result.source is not None and result.face_corners is not None:
+        return _in_fans(result, result.source.offsets, result.face_corners)
+    return result
+
+
+def _in_single_precision(result: Flattening) -> Flattening:
+    """Return the result with 32-bit positions and UVs."""
+    keeps_scene = result.source is not None and result.source.scene is not None
+    vertices = result.vertices if keeps_scene else _positions_in_glb(result.vertices)
+    is_stored = np.array_equal(stored_in_glb(result.uv), result.uv)
+    if is_stored and np.array_equal(vertices, result.vertices):
+        return result
+    uv, overlaps = snap_apart(result.uv, result.uv_faces, stored_in_glb)
+    return _measured(result, replace(result, vertices=vertices, uv=uv), SINGLE, overlaps=overlaps)
+
+
+def _positions_in_glb(vertices: FloatArray) -> FloatArray:
+    """Return (n, 3) positions as 32-bit numbers.
+
+    Raises:
+        MeshFileError: the largest is beyond them, or so small that they have hardly a digit for it.
+    """
+    with np.errstate(over="ignore"):
+        stored = vertices.astype(np.float32).astype(np.float64)
+    largest = float(np.abs(vertices).max())
+    if not SMALLEST < largest < LARGEST:
+        raise MeshFileError(
+            f"positions of up to {largest:.3g} are beyond the 32-bit numbers of .glb, which are good for sizes from "
+            f"{SMALLEST:.0e} to {LARGEST:.0e}: scale the mesh, or write .ply"
+        )
+    return stored
+
+
+def stored_in_glb(uv: FloatArray) -> FloatArray:
+    """Return (u, 2) the points that are read where these are written: 32-bit numbers, the second from the top down.
+
+    Both v and 1 - v are such numbers then, lest a reader that turns v around in 32 bits rounds once more.
+    """
+    u = uv[:, 0].astype(np.float32).astype(np.float64)
+    largest = np.maximum(np.maximum(np.abs(uv[:, 1]), np.abs(1 - uv[:, 1])), 1.0)
+    step = 2.0 ** (np.ceil(np.log2(largest)) - DIGITS)
+    return np.stack([u, np.round(uv[:, 1] / step) * step], axis=1)
+
+
+def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> Flattening:
+    """Return the result with polygons in fans, as most programs read them."""
+    if np.all(np.diff(offsets) == 3):
+        return result
+    assert result.source is not None
+    pieces = find_pieces(result.uv, result.uv_faces, offsets, face_corners)
+    corners, uv_faces = pieces.fans()
+    vertex = np.full(int(offsets[-1]), -1, dtype=np.int64)
+    vertex[face_corners] = result.faces
+    polygon = np.searchsorted(offsets, face_corners[:, 0], side="right") - 1
+    order = np.argsort(polygon, kind="stable")
+    face_origin = np.arange(len(order)) if result.face_origin is None else result.face_origin
+    notes: tuple[str, ...] = ()
+    if len(pieces.split):
+        names = plural(len(pieces.split), "polygon is", "polygons are")
+        notes = (
+            f"{names} written in convex pieces, as others would read triangles upside down: they are not convex in "
+            f"the plane (the first is {pieces.split[0]}).",
+        )
+    fans = replace(
+        result,
+        faces=vertex[corners],
+        uv_faces=uv_faces,
+        face_corners=corners,
+        face_origin=face_origin[order],
+    )
+    return _measured(result, fans, DOUBLE, notes)
+
+
+def _measured(
+    result: Flattening,
+    changed: Flattening,
+    unit: float,
+    notes: tuple[str, ...] = (),
+    overlaps: Overlaps | None = None,
+) -> Flattening:
+    """Return a changed result, measured anew, with the notes that it then has.
+
+    Args:
+        result: before the change.
+        changed: with the measures and notes of that.
+        unit: rounding of its coordinates.
+        notes: more of them.
+        overlaps: of its triangles, if they are known.
+    """
+    told = broken_promises(result)
+    old = result.distortion
+    distortion = measure_at_any_size(
+        TriangleMesh(changed.vertices, changed.faces),
+        changed.corner_uv,
+        (old.curvature_error, old.curvature_error_max),
+        changed.cones,
+        changed.prescribed,
+        overlaps,
+    )
+    changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
+    kept = tuple(note for note in result.notes if note not in told)
+    return replace(changed, notes=(*kept, *broken_promises(changed, unit), *notes))
+
+
+def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
+    """Return the rotations of seams after points were moved a little: the worst of them is measured anew."""
+    before = result.rotations
+    if before is None:
+        return None
+    off, after = (
+        seam_rotations(each.vertices, each.faces, each.corner_uv, before.quantum)
+        for each in (result, changed)
+    )
+    # Seams that were marked, or are between components, turn freely.
+    bound = off <= before.worst * (1 + 1e-6) + 1e-12
+    return replace(before, worst=float(after[bound].max(initial=0.0)))

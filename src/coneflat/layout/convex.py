@@ -1,0 +1,179 @@
+"""Polygons of the input made convex in the plane.
+
+Meshes of polygons are flattened as triangles, along diagonals of our choice. Others that read the polygons choose their
+own: what they see is upright, too, only where the polygon is convex.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..mesh import TriangleMesh
+
+# Twice the area of a triangle over the square of its longest side, from which on it is safely upright: rounding in the
+# plane is 1e-16 of the extent, and the finest edges are some 1e-6 of it.
+UPRIGHT = 1e-8
+# The same, as it is wanted of corners that are to become convex: as much of it as there is room for.
+WANTED = (0.1, 0.03, 0.01, 1e-3)
+# Sine of the angle up to which a corner on the model is straight but for rounding.
+STRAIGHT = 1e-6
+# Times all points of the polygons that are not convex are moved in turn.
+ROUNDS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Polygons:
+    """The polygons that triangles make up.
+
+    Attributes:
+        offsets: (p + 1,) the corners of polygon i are numbered from offsets[i] to offsets[i + 1].
+        corners: (m, 3) the polygon's corner at each triangle corner.
+    """
+
+    offsets: IntArray
+    corners: IntArray
+
+    @property
+    def sizes(self) -> IntArray:
+        """(p,) corners of each polygon."""
+        return np.diff(self.offsets)
+
+    @property
+    def owner(self) -> IntArray:
+        """(m,) the polygon of each triangle."""
+        owner: IntArray = np.searchsorted(self.offsets, self.corners[:, 0], side="right") - 1
+        return owner
+
+    @property
+    def is_reversed(self) -> BoolArray:
+        """(p,) True for polygons whose triangles run the other way."""
+        a, b, c = self.corners.T
+        reversed_ = np.zeros(len(self.offsets) - 1, dtype=bool)
+        # Corners of a triangle that runs the polygon's way ascend but for one step back.
+        reversed_[self.owner] = (b < a).astype(np.int8) + (c < b) + (a < c) == 2
+        return reversed_
+
+    def loops(self) -> IntArray:
+        """Return (c,) the corners of each polygon, from its first on, in the order in which its triangles run."""
+        sizes = self.sizes
+        start, size = np.repeat(self.offsets[:-1], sizes), np.repeat(sizes, sizes)
+        step = np.arange(len(start)) - start
+        loops: IntArray = start + np.where(np.repeat(self.is_reversed, sizes), (size - step) % size, step)
+        return loops
+
+    def points(self, uv_faces: IntArray) -> IntArray:
+        """Return (c,) the point at each polygon corner; -1 where triangles have several there, or where there is none.
+
+        uv_faces: (m, 3) the point of each triangle corner.
+        """
+        points = np.full(int(self.offsets[-1]), -1, dtype=np.int64)
+        points[self.corners] = uv_faces
+        points[self.corners[points[self.corners] != uv_faces]] = -1
+        return points
+
+    def are_whole(self, points: IntArray) -> BoolArray:
+        """Return (p,) whether all triangles of a polygon are there, and none is cut off in the plane.
+
+        points: (c,) what `points` returns.
+        """
+        counts = np.bincount(self.owner, minlength=len(self.sizes))
+        whole: BoolArray = (counts == self.sizes - 2) & np.logical_and.reduceat(
+            points >= 0, self.offsets[:-1]
+        )
+        return whole
+
+    def corner_triples(self, points: IntArray) -> tuple[IntArray, IntArray]:
+        """Return (k, 3) the points before, at and after each corner of whole polygons of four corners and more.
+
+        Triples run as the triangles do. Also (k,) the polygon of each.
+
+        points: (c,) what `points` returns.
+        """
+        sizes, loops = self.sizes, self.loops()
+        polygon = np.repeat(np.arange(len(sizes)), sizes)
+        place = np.flatnonzero((self.are_whole(points) & (sizes > 3))[polygon])
+        polygon = polygon[place]
+        start, size = self.offsets[polygon], sizes[polygon]
+        before, after = start + (place - start - 1) % size, start + (place - start + 1) % size
+        return points[loops[np.stack([before, place, after], axis=1)]], polygon
+
+
+def heights(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """Return (t,) twice the area of triangles over the square of their longest sides, negative if upside down."""
+    corners = points[triangles]
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    longest = np.max([(one**2).sum(axis=1), (two**2).sum(axis=1), ((two - one) ** 2).sum(axis=1)], axis=0)
+    area: FloatArray = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    return area / np.maximum(longest, np.finfo(float).tiny)
+
+
+def make_convex(
+    points: FloatArray, uv_faces: IntArray, polygons: Polygons, positions: FloatArray
+) -> FloatArray:
+    """Return points at which as many polygons as can be are convex.
+
+    Points inside charts move, as little as they must; outlines of charts, and so seams and what they promise, stay.
+    Polygons that are not convex on the model either are left alone.
+
+    Args:
+        points: (u, 2) of the plane.
+        uv_faces: (m, 3) the point of each triangle corner.
+        polygons: what the triangles are parts of.
+        positions: (m, 3, 3) the triangle corners on the model.
+    """
+    triples, owner = polygons.corner_triples(polygons.points(uv_faces))
+    bad = heights(points, triples) <= UPRIGHT
+    if not bad.any():
+        return points
+    bad &= ~_concave_in_space(polygons, positions)[owner]
+    chosen = np.unique(owner[bad])
+    mesh = TriangleMesh(points, uv_faces)
+    movable = ~mesh.is_boundary_vertex
+    wished = np.unique(triples[np.isin(owner, chosen)])
+    wished = wished[movable[wished]]
+    if not len(wished):
+        return points
+    # What is concave in space may be so in the plane; it must not stand in the way of others.
+    hopeless = np.isin(owner, np.setdiff1d(np.unique(owner[heights(points, triples) <= UPRIGHT]), chosen))
+    return _moved(points, np.concatenate([uv_faces, triples[~hopeless]]), wished)
+
+
+def _moved(points: FloatArray, triangles: IntArray, moving: IntArray) -> FloatArray:
+    """Return the points, some of them moved so that triangles (t, 3) at them are upright, where that can be."""
+    from .convex_kernel import move_points
+
+    rank = np.full(len(points), -1, dtype=np.int64)
+    rank[moving] = np.arange(len(moving))
+    near = triangles[(rank[triangles] >= 0).any(axis=1)]
+    corner, row = np.nonzero(rank[near].T >= 0)
+    order = np.argsort(rank[near[row, corner]], kind="stable")
+    row, corner = row[order], corner[order]
+    sides = np.stack([near[row, (corner + 1) % 3], near[row, (corner + 2) % 3]], axis=1)
+    first = np.searchsorted(rank[near[row, corner]], np.arange(len(moving) + 1))
+    moved, stayed = points.copy(), np.zeros(len(moving), dtype=bool)
+    for _ in range(ROUNDS):
+        if not move_points(moved, moving, first, sides, np.array(WANTED), UPRIGHT, stayed):
+            break
+    return moved
+
+
+def _concave_in_space(polygons: Polygons, positions: FloatArray) -> BoolArray:
+    """Return (p,) whether a polygon has a corner that turns the other way on the model, seen along its normal."""
+    count = len(polygons.offsets) - 1
+    place = np.zeros((int(polygons.offsets[-1]), 3))
+    place[polygons.corners] = positions
+    owner = polygons.owner
+    normals = np.cross(positions[:, 1] - positions[:, 0], positions[:, 2] - positions[:, 0])
+    normal = np.stack([np.bincount(owner, normals[:, k], count) for k in range(3)], axis=1)
+    known = polygons.points(polygons.corners)
+    triples, polygon = polygons.corner_triples(known)
+    before, at, after = (place[triples[:, k]] for k in range(3))
+    turn = np.einsum("ij,ij->i", np.cross(at - before, after - at), normal[polygon])
+    size = np.linalg.norm(at - before, axis=1) * np.linalg.norm(after - at, axis=1)
+    size *= np.linalg.norm(normal[polygon], axis=1)
+    concave = np.zeros(count, dtype=bool)
+    concave[polygon[turn < -STRAIGHT * size]] = True
+    return concave

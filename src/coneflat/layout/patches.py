@@ -1,0 +1,263 @@
+"""Patches of a flat surface whose vertices move until their triangles are upright."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.sparse import bsr_matrix
+
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ..errors import MetricError
+from ..mesh import label_components
+from ..solver.superlu import SuperLUFactor
+from .straighten import FlatTriangles
+
+# Height over longest side up to which a triangle counts as degenerate: coordinates in the plane are good to
+# about 1e-12 of an edge, and a triangle must stay upright when they are rounded.
+DEGENERATE = 1e-8
+# A patch counts as done when every triangle has this part of the area it is asked to get.
+ENOUGH = 0.1
+# Regularisation of the determinant: its floor, and its size relative to the worst determinant of the patch
+# (Garanzha et al. 2021, Section 4).
+FLOOR, RELATIVE = 1e-3, 0.2
+# Newton steps after which a patch is given up, to be tried again with more of its surroundings; or sooner, where the
+# gap to what is enough has not shrunk to this part of itself in so many steps. Those that succeed take 4 at the median.
+STEPS, PATIENCE, SHRUNK = 60, 4, 0.9
+# Part of the slope that a step must gain at least, and halvings after which a patch is stuck.
+ARMIJO, HALVINGS = 1e-4, 20
+# Part of the largest entry that is added to the diagonal: patches that nothing holds may shift as a whole.
+RIDGE = 1e-10
+# Patches at rest are left out of the equations when they make up this part of them.
+AT_REST = 0.25
+# Parts of the way found that are tried in the end, so that no vertex moves further than it need.
+PARTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+
+
+def heights(sides: ComplexArray) -> FloatArray:
+    """Return (m,) height over longest side of triangles with sides (m, 3); negative for inverted ones."""
+    doubled = (np.conj(sides[:, 0]) * sides[:, 1]).imag
+    ratio: FloatArray = doubled / (np.abs(sides) ** 2).max(axis=1)
+    return ratio
+
+
+class Patches:
+    """The triangles around movable vertices, as functions of how far these move.
+
+    The map of a triangle from the shape it should have to the one it has is z -> a z + b conj(z); a and b are
+    linear in the shifts of its corners. Its determinant is |a|^2 - |b|^2.
+    Shifts are in units of the mean length of the edges at the vertex.
+
+    Attributes:
+        vertices: (k,) those that move.
+        faces: (f,) triangles with such a vertex.
+        count: the number of patches, which have no movable vertex in common.
+        patch, face_patch: (k,), (f,) the patch of each.
+        work: the number of times that a triangle's derivatives were computed.
+    """
+
+    def __init__(
+        self,
+        flat: FlatTriangles,
+        faces: IntArray,
+        sides: ComplexArray,
+        movable: BoolArray,
+        wanted: Callable[[ComplexArray], ComplexArray],
+    ) -> None:
+        self.vertices = np.flatnonzero(movable)
+        self.faces = np.flatnonzero(movable[faces].any(axis=1))
+        self.sides = sides[self.faces]
+        local = np.full(len(movable), -1)
+        local[self.vertices] = np.arange(len(self.vertices))
+        self.corners = local[faces[self.faces]]
+        is_loose = self.corners >= 0
+        lengths = np.abs(self.sides)
+        around = (lengths.sum(axis=1, keepdims=True) - lengths)[is_loose] / 2
+        size = np.bincount(self.corners[is_loose], around) / np.bincount(self.corners[is_loose])
+        frames = _corner_frames(flat, faces, movable)[self.faces]
+        self.shift = np.where(is_loose, frames * size[self.corners], 0)
+        self._find_maps(wanted(self.sides))
+        ends = self.corners[:, [1, 2, 0]].ravel(), self.corners[:, [2, 0, 1]].ravel()
+        joined = (ends[0] >= 0) & (ends[1] >= 0)
+        self.count, self.patch = label_components(len(self.vertices), ends[0][joined], ends[1][joined])
+        self.face_patch = self.patch[self.corners.max(axis=1)]
+        self.work = 0
+
+    def _find_maps(self, wanted: ComplexArray) -> None:
+        """Set a and b as they are, and their derivatives by the shifts of the corners."""
+        r0, r1 = wanted[:, 0], wanted[:, 1]
+        area = r0 * np.conj(r1) - np.conj(r0) * r1
+        found = []
+        for c0, c1 in ((np.conj(r1) / area, -np.conj(r0) / area), (-r1 / area, r0 / area)):
+            # Side 0 runs from corner 1 to corner 2, side 1 from corner 2 to corner 0.
+            found.append(c0 * self.sides[:, 0] + c1 * self.sides[:, 1])
+            found.append(np.stack([c1, -c0, c0 - c1], axis=1) * self.shift)
+        self.a, self.a_of, self.b, self.b_of = found
+
+    def fingerprints(self) -> list[bytes]:
+        """Return for each patch what tells it, as it is, from any other."""
+        vertices, faces = (
+            np.split(
+                np.argsort(label, kind="stable"), np.cumsum(np.bincount(label, minlength=self.count))[:-1]
+            )
+            for label in (self.patch, self.face_patch)
+        )
+        return [
+            b"".join(array.tobytes() for array in (self.vertices[v], self.a[f], self.b[f]))
+            for v, f in zip(vertices, faces, strict=True)
+        ]
+
+    def solve(self, most_work: float) -> ComplexArray:
+        """Return shifts (k,) that make the determinants positive, where this succeeds within so much work.
+
+        Newton's method with the Hessian made positive triangle by triangle. Every patch has its own
+        regularisation and step length, and rests as soon as it is done or stuck.
+        """
+        from .untangle_kernel import fill_energies
+
+        shifts = np.zeros(len(self.vertices), dtype=np.complex128)
+        active = np.ones(self.count, dtype=bool)
+        gap = np.full(self.count, np.inf)
+        equations = None
+        for taken in range(STEPS):
+            worst = self.worst(shifts)
+            active &= worst < ENOUGH
+            if taken % PATIENCE == 0:
+                active &= ENOUGH - worst <= SHRUNK * gap
+                gap = ENOUGH - worst
+            if not active.any() or self.work >= most_work:
+                break
+            if equations is None or np.count_nonzero(active[equations.face_patch]) < (1 - AT_REST) * len(
+                equations.rows
+            ):
+                equations = _Equations(self, active)
+            e = equations
+            a, b = self._maps_at(shifts)
+            a, b = a[e.rows], b[e.rows]
+            epsilon = np.hypot(FLOOR, RELATIVE * np.minimum(worst, 0.0))[e.face_patch]
+            step, slope = e.newton_step(a, b, epsilon)
+            self.work += len(e.rows)
+            step[~active[self.patch]] = 0.0
+            slopes = np.bincount(self.patch, slope, self.count)
+            a_step, b_step = self._changes(step)
+            a_step, b_step = a_step[e.rows], b_step[e.rows]
+            energy = np.empty(len(a))
+            fill_energies(a, b, epsilon, energy)
+            before = np.bincount(e.face_patch, energy, self.count)
+            length = np.ones(self.count)
+            for _ in range(HALVINGS):
+                t = length[e.face_patch]
+                fill_energies(a + t * a_step, b + t * b_step, epsilon, energy)
+                after = np.bincount(e.face_patch, energy, self.count)
+                gained = ~active | (after <= before + ARMIJO * length * slopes)
+                if gained.all():
+                    break
+                length[~gained] /= 2
+            active &= gained
+            shifts += np.where(active, length, 0.0)[self.patch] * step
+        return self._shorten(shifts)
+
+    def moved(self, shifts: ComplexArray) -> ComplexArray:
+        """Return (f, 3) the sides of the triangles with their vertices shifted."""
+        moved = np.where(self.corners >= 0, self.shift * shifts[self.corners], 0)
+        sides: ComplexArray = self.sides + moved[:, [2, 0, 1]] - moved[:, [1, 2, 0]]
+        return sides
+
+    def worst(self, shifts: ComplexArray) -> FloatArray:
+        """Return (count,) the least determinant of each patch."""
+        a, b = self._maps_at(shifts)
+        worst = np.full(self.count, np.inf)
+        np.minimum.at(worst, self.face_patch, np.abs(a) ** 2 - np.abs(b) ** 2)
+        return worst
+
+    def _maps_at(self, shifts: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        a, b = self._changes(shifts)
+        return self.a + a, self.b + b
+
+    def _changes(self, shifts: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        at = shifts[self.corners]
+        return (self.a_of * at).sum(axis=1), (self.b_of * at).sum(axis=1)
+
+    def _shorten(self, shifts: ComplexArray) -> ComplexArray:
+        """Return the shifts of each patch, cut down to the least part of them that is as good."""
+        part = np.ones(self.count)
+        wanted = np.minimum(self.worst(shifts), ENOUGH)
+        for fraction in PARTS:
+            enough = self.worst(fraction * shifts) >= wanted
+            part[enough] = np.minimum(part[enough], fraction)
+        shortened: ComplexArray = part[self.patch] * shifts
+        return shortened
+
+
+class _Equations:
+    """Newton's equations of some of the patches.
+
+    Attributes:
+        rows: (r,) the triangles, of those of all patches.
+        face_patch: (r,) the patch of each.
+    """
+
+    def __init__(self, patches: Patches, active: BoolArray) -> None:
+        self.rows = np.flatnonzero(active[patches.face_patch])
+        self.face_patch = patches.face_patch[self.rows]
+        self.vertices = np.flatnonzero(active[patches.patch])
+        self.all = len(patches.vertices)
+        local = np.full(self.all + 1, -1)
+        local[self.vertices] = np.arange(len(self.vertices))
+        self.corners = local[patches.corners[self.rows]]
+        self.a_of, self.b_of = patches.a_of[self.rows], patches.b_of[self.rows]
+        k = len(self.vertices)
+        keys = self.corners[:, :, None] * k + self.corners[:, None, :]
+        is_block = (self.corners[:, :, None] >= 0) & (self.corners[:, None, :] >= 0)
+        blocks, slots = np.unique(keys[is_block], return_inverse=True)
+        self.slots = np.full(keys.shape, -1)
+        self.slots[is_block] = slots.ravel()
+        self.columns = blocks % k
+        self.starts = np.searchsorted(blocks // k, np.arange(k + 1))
+
+    def newton_step(
+        self, a: ComplexArray, b: ComplexArray, epsilon: FloatArray
+    ) -> tuple[ComplexArray, FloatArray]:
+        """Return the step of each vertex of all patches, and what it adds to the slope of the energy."""
+        from .untangle_kernel import add_derivatives
+
+        k = len(self.vertices)
+        gradient, values = np.zeros(2 * k), np.zeros(4 * len(self.columns))
+        add_derivatives(a, b, epsilon, self.a_of, self.b_of, self.corners, self.slots, gradient, values)
+        blocks = values.reshape(-1, 2, 2)
+        matrix = bsr_matrix((blocks, self.columns, self.starts), shape=(2 * k, 2 * k)).tocsc()
+        matrix.setdiag(matrix.diagonal() * (1 + RIDGE) + RIDGE * matrix.diagonal().max())
+        try:
+            found = SuperLUFactor(matrix).solve(-gradient)
+        except MetricError:
+            found = np.full(2 * k, np.nan)
+        if not np.isfinite(found).all():
+            found = np.zeros(2 * k)  # no step: all are stuck
+        step, slope = np.zeros(self.all, dtype=np.complex128), np.zeros(self.all)
+        step[self.vertices] = found[0::2] + 1j * found[1::2]
+        slope[self.vertices] = (found * gradient).reshape(-1, 2).sum(axis=1)
+        return step, slope
+
+
+def _corner_frames(flat: FlatTriangles, faces: IntArray, movable: BoolArray) -> ComplexArray:
+    """Return (m, 3) unit numbers that take a shift of a movable vertex to the frame of the triangle there.
+
+    All corners of a vertex are reached by turning around it from a first one, the same for all.
+    """
+    tails = faces[:, [1, 2, 0]].ravel()
+    frames = np.zeros(faces.shape, dtype=np.complex128)
+    leaving = np.flatnonzero(movable[tails])
+    # Where the fan of a boundary vertex begins there is a half-edge without twin; it must come last to stay.
+    leaving = leaving[np.argsort(flat.twin[leaving] < 0, kind="stable")]
+    first = np.full(len(movable), -1)
+    first[tails[leaving]] = leaving
+    at = first[movable]
+    start = at.copy()
+    turn = np.ones(len(at), dtype=np.complex128)
+    while len(at):
+        frames[at // 3, (at % 3 + 1) % 3] = turn
+        over = flat.twin[at - at % 3 + (at + 2) % 3]
+        on = (over >= 0) & (over != start)
+        at, start = over[on], start[on]
+        turn = turn[on] * flat.turns[at]
+    return frames

@@ -1,0 +1,138 @@
+"""What a flattening promises, held against what it is: a note on everything that is not kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .distortion import angle_sum_errors
+from .mesh import TriangleMesh
+from .options import UNFOLDED
+from .text import plural
+
+if TYPE_CHECKING:
+    from .result import Flattening
+
+# Of a double, and of the 32-bit numbers of GLB files, relative to 1.
+DOUBLE, SINGLE = 2.0**-53, 2.0**-24
+# Points are off by so many roundings: of the coordinates, and of what turned, moved and scaled them.
+ROUNDINGS = 8
+# Radians, or parts of a length, that a layout may be off by beside rounding. Metrics are solved to about 1e-11.
+EXACT = 1e-6
+# Radians for methods that have no exact angles: a vertex that triangles go around twice is off by 2 pi.
+WINDING = 1.0
+# Means of QC beyond which a layout is unfit for most uses, though every triangle is upright.
+EXTREME_QC = 1.2
+
+
+def broken_promises(result: Flattening, unit: float = DOUBLE) -> tuple[str, ...]:
+    """Return what a result does not keep of what its options promise, one sentence each.
+
+    Args:
+        result: with its measures.
+        unit: rounding of the coordinates, relative to 1.
+    """
+    return (
+        *_upright(result),
+        *_apart(result),
+        *_angle_sums(result, unit),
+        *_equal_sides(result, unit),
+        *_boundary_lengths(result, unit),
+        *_whole_turns(result, unit),
+        *_distortion(result),
+    )
+
+
+def _is_exact(result: Flattening) -> bool:
+    """Whether angles and seams are those of a flat metric, for which no least squares stand in."""
+    return result.settings.get("method") in UNFOLDED
+
+
+def _upright(result: Flattening) -> Iterator[str]:
+    measures = result.distortion
+    parts = [
+        plural(count, f"triangle {what}", f"triangles {what}")
+        for count, what in (
+            (measures.flipped, "upside down in the plane"),
+            (measures.degenerate, "without area there"),
+        )
+        if count
+    ]
+    if parts:
+        advice = (
+            "refine (--refine), which cannot invert any" if _is_exact(result) else "--method exact has fewest"
+        )
+        yield f"There {'is' if parts[0].startswith('1 ') else 'are'} {' and '.join(parts)}: {advice}."
+
+
+def _apart(result: Flattening) -> Iterator[str]:
+    measures = result.distortion
+    if result.settings.get("charts") == "atlas" and measures.overlapping_pairs:
+        pairs = plural(measures.overlapping_pairs, "pair")
+        yield f"{pairs} of triangles overlap in the atlas, {measures.overlap:.2g} of the area that it covers."
+
+
+def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
+    largest = result.distortion.angle_sum_error
+    most = EXACT if _is_exact(result) else WINDING
+    if not largest > most:
+        return
+    mesh = TriangleMesh(result.vertices, result.faces)
+    errors, change = angle_sum_errors(mesh, result.corner_uv, result.prescribed)
+    with np.errstate(invalid="ignore"):
+        off = np.flatnonzero(np.abs(errors) > most + ROUNDINGS * unit * change)
+    if len(off):
+        worst = off[np.argmax(np.abs(errors[off]))]
+        yield (
+            f"Around {plural(len(off), 'vertex', 'vertices')} the angles do not sum to what they are to be: vertex "
+            f"{worst} is the worst, {errors[worst]:+.3g} rad off."
+        )
+
+
+def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
+    worst = result.distortion.seam_mismatch_max
+    if _is_exact(result) and worst > EXACT + ROUNDINGS * unit / _shortest(result):
+        yield f"The two sides of seams differ in length, by up to {worst:.2g} of it."
+
+
+def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
+    if result.settings.get("boundary") != "lengths":
+        return
+    mesh = TriangleMesh(result.vertices, result.faces)
+    sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
+    tails, heads = mesh.tails[sides], mesh.heads[sides]
+    flat = (
+        result.uv[result.uv_faces[sides // 3, (sides + 2) % 3]]
+        - result.uv[result.uv_faces[sides // 3, (sides + 1) % 3]]
+    )
+    lengths = np.linalg.norm(mesh.vertices[heads] - mesh.vertices[tails], axis=1) * result.uv_scale
+    worst = float(np.abs(np.linalg.norm(flat, axis=1) / lengths - 1).max(initial=0.0))
+    if worst > EXACT + ROUNDINGS * unit / _shortest(result):
+        yield f"Lengths along the boundary are not kept: they differ by up to {worst:.2g} of them."
+
+
+def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:
+    rotations = result.rotations
+    if rotations is None or not rotations.worst > EXACT + ROUNDINGS * unit / _shortest(result):
+        return
+    along = np.abs(rotations.handles).max(initial=0.0) > EXACT
+    advice = ", as loops along handles do: correct them (--correct-handles)" if along else ""
+    yield f"Seams turn by up to {rotations.worst:.2g} rad beside multiples of the quantum{advice}."
+
+
+def _distortion(result: Flattening) -> Iterator[str]:
+    measures = result.distortion
+    if measures.qc_mean > EXTREME_QC:
+        yield (
+            f"Angles are far from kept: the mean QC distortion is {measures.qc_mean:.3g}, the worst "
+            f"{measures.qc_max:.3g}; more cones, a free boundary or smaller triangles would lower it."
+        )
+
+
+def _shortest(result: Flattening) -> float:
+    """Return the length in the plane of the shortest side of a triangle."""
+    corners = result.corner_uv
+    lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    return max(float(lengths.min()), np.finfo(float).tiny)

@@ -1,0 +1,153 @@
+"""Nothing brings the package down, and what it reports is what comes out: a slice of benchmarks/hostile.py.
+
+The checks themselves are put to the test, too: on results with planted faults, and on cases that crash or hang.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapes
+
+import coneflat
+
+BENCHMARKS = str(Path(__file__).resolve().parents[1] / "benchmarks")
+if BENCHMARKS not in sys.path:
+    sys.path.append(BENCHMARKS)
+
+from trials.cases import cases, run_case  # noqa: E402
+from trials.outcome import Outcome  # noqa: E402
+from trials.promises import check  # noqa: E402
+from trials.workers import MEMORY, run_all  # noqa: E402
+from trials.written import check_file  # noqa: E402
+
+#: Cases of the slice, about half a minute.
+SLICE = 200
+
+
+def outcomes_of(chosen, **limits):
+    outcomes: list[Outcome] = []
+    run_all(chosen, 1, lambda outcome, _: outcomes.append(outcome), **limits)
+    return outcomes
+
+
+def breaches_of(result, options, vertices, faces):
+    outcome = Outcome("mesh", 0)
+    check(outcome, result, options, vertices, faces)
+    return [cause for cause, _ in outcome.breaches]
+
+
+def test_hostile_cases_break_no_promise():
+    outcomes = outcomes_of(cases(SLICE, 0))
+    assert len(outcomes) == SLICE
+    broken = [
+        f"{one.kind}:{one.seed} {cause}: {details}" for one in outcomes for cause, details in one.breaches
+    ]
+    assert not broken, "\n".join(broken)
+    # Refusing everything is no way to keep promises.
+    assert sum(one.status in ("ok", "noted") for one in outcomes) > SLICE / 2
+
+
+def test_a_case_is_the_same_whenever_it_is_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    one, two = (run_case("mesh", 2) for _ in range(2))
+    assert (one.recipe, one.status, one.message) == (two.recipe, two.status, two.message)
+    assert not list(tmp_path.iterdir())
+
+
+def test_crashes_hangs_and_swollen_memory_are_told_and_survived():
+    kinds = ("crash", "swell", "mesh")
+    told = {one.kind: one for one in outcomes_of([(kind, 2) for kind in kinds])}
+    assert set(told) == set(kinds)
+    told |= {one.kind: one for one in outcomes_of([("hang", 2)], most_work=2.0)}
+    assert told["crash"].breaches[0][0].startswith("crash")
+    assert told["hang"].breaches[0][0].startswith("out of time")
+    assert told["swell"].breaches[0][0] == "out of memory"
+    assert told["swell"].memory > MEMORY
+    assert not told["mesh"].breaches
+
+
+@pytest.fixture(scope="module")
+def ball():
+    mesh = shapes.sphere(2)
+    options = {"charts": "atlas", "quantum": np.pi / 2}
+    return coneflat.flatten(*mesh, **options), options, mesh
+
+
+def test_a_sound_result_breaks_no_promise(ball):
+    result, options, mesh = ball
+    assert breaches_of(result, options, *mesh) == []
+
+
+def planted(result, fault):
+    """A result with a fault of one kind that it does not report."""
+    uv = result.uv.copy()
+    corner = {int(p): int(v) for p, v in zip(result.uv_faces.flat, result.faces.flat, strict=True)}
+    copies = np.bincount(list(corner.values()))
+    inner = next(p for p in corner if copies[corner[p]] == 1)
+    on_seam = next(p for p in corner if copies[corner[p]] == 2)
+    if fault == "not finite":
+        uv[inner] = np.nan
+    elif fault == "outside":
+        uv[inner] += 2.0
+    elif fault == "upside down":
+        face = result.uv_faces[np.flatnonzero((result.uv_faces == inner).any(axis=1))[0]]
+        uv[inner] += 2 * (uv[face[face != inner]].mean(axis=0) - uv[inner])
+    elif fault == "moved a little":
+        uv[on_seam] += 1e-4 * (uv[inner] - uv[on_seam])
+    elif fault == "other cone":
+        return replace(result, curvatures=result.curvatures + np.eye(1, len(result.cones))[0])
+    elif fault == "other vertices":
+        return replace(result, vertices=result.vertices + 1e-9)
+    elif fault == "turned":
+        turn = np.exp(0.1j) * (uv @ [0.5, 0.5j]) + 0.2 + 0.1j
+        first = np.zeros(len(uv), dtype=bool)
+        first[result.uv_faces[:40]] = True
+        corners = result.uv_faces.copy()
+        corners[40:] += len(uv)
+        uv = np.concatenate([np.column_stack([turn.real, turn.imag]), uv * 0.3 + 0.01])
+        return replace(result, uv=uv, uv_faces=corners)
+    return replace(result, uv=uv)
+
+
+@pytest.mark.parametrize(
+    ("fault", "cause"),
+    [
+        ("not finite", "arrays: uv not finite"),
+        ("outside", "place: outside the texture"),
+        ("upside down", "flipped: report differs"),
+        ("upside down", "overlap: report differs"),
+        ("moved a little", "curvature error understated"),
+        ("other cone", "angle off by less than a full turn, exact"),
+        ("other cone", "cones: sum of curvatures"),
+        ("other vertices", "origin: vertices are not the input's"),
+        ("turned", "rotations: report differs"),
+        ("turned", "sides of seams differ, exact"),
+    ],
+)
+def test_a_planted_fault_is_found(ball, fault, cause):
+    result, options, mesh = ball
+    assert cause in breaches_of(planted(result, fault), options, *mesh)
+
+
+def test_a_fault_that_a_note_names_is_no_breach(ball):
+    result, options, mesh = ball
+    moved = planted(result, "other cone")
+    assert "cones: no multiples" in breaches_of(moved, options, *mesh)
+    noted = replace(moved, notes=("1 cone has another angle.",))
+    assert "cones: no multiples" not in breaches_of(noted, options, *mesh)
+
+
+@pytest.mark.parametrize("ending", [".obj", ".ply", ".glb", ".npz"])
+def test_a_file_of_another_layout_is_found(ball, tmp_path, ending):
+    result = ball[0]
+    path = result.save(tmp_path / f"ball{ending}")
+    sound, other = Outcome("file", 0), Outcome("file", 0)
+    check_file(sound, result, path)
+    assert not sound.breaches
+    check_file(other, replace(result, uv=0.99 * result.uv), path)
+    assert any("another layout" in cause or "differently" in cause for cause, _ in other.breaches)
