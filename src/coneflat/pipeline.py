@@ -37,7 +37,7 @@ from .text import plural
 from .threads import meanwhile, one_blas_thread
 from .wishes import Wishes
 
-# Searches for cones at most: each forbids those where the triangles of the one before had no room for the angle.
+# Searches for cones at most, if some of them are too wide for the triangles around.
 SEARCHES = 4
 # Radians by which a cone is off then: a full turn, less what rounding and untangled neighbours make.
 UNHELD = 1.0
@@ -225,12 +225,9 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     """Flatten a connected mesh to one disk."""
     with stages("cones", 0.1):
         surface = Surface.of(part.mesh, part.lengths)
-    for _ in range(SEARCHES):
-        laid_out = _flatten_once(surface, part, options, stages)
-        unheld = unheld_cones(laid_out)
-        if not len(unheld) or not pursues(part.mesh, options) or options.method not in UNFOLDED:
-            break
-        part = replace(part, wishes=part.wishes.without(unheld))
+    laid_out = _flatten_once(surface, part, options, stages)
+    if pursues(part.mesh, options) and options.method in UNFOLDED:
+        laid_out = _with_held_cones(laid_out, surface, part, options, stages)
     if options.charts == "atlas":
         with stages("atlas", 1.0):
             laid_out = without_overlaps(laid_out, part, options)
@@ -242,6 +239,25 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     if options.method in UNFOLDED:
         notes += shortfalls(laid_out, part.wishes.names)
     return replace(laid_out, notes=laid_out.notes + notes)
+
+
+def _with_held_cones(
+    laid_out: LaidOut, surface: Surface, part: Component, options: Options, stages: Stages
+) -> LaidOut:
+    """Return a layout with other cones, if triangles around some of these have no room for their angles.
+
+    Each search forbids the cones that those before could not hold. It may find more of them before it finds none, so
+    the layout with the fewest is taken.
+    """
+    best, fewest = laid_out, len(unheld_cones(laid_out))
+    for _ in range(SEARCHES - 1):
+        if not fewest:
+            break
+        part = replace(part, wishes=part.wishes.without(unheld_cones(laid_out)))
+        laid_out = _flatten_once(surface, part, options, stages)
+        if len(unheld_cones(laid_out)) < fewest:
+            best, fewest = laid_out, len(unheld_cones(laid_out))
+    return best
 
 
 def _missed_distortion(laid_out: LaidOut, part: Component, options: Options) -> tuple[str, ...]:

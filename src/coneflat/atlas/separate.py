@@ -22,8 +22,7 @@ def separate(disk: TriangleMesh, one: BoolArray, other: BoolArray, costs: FloatA
         costs: (e,) of each edge, positive.
     """
     border = border_edges(disk)
-    one = _to_the_border(disk, border, one, other)
-    other = _to_the_border(disk, border, other, one)
+    one, other = _both_to_the_border(disk, border, one, other)
     beside = disk.edge_faces[border, 0]
     mark = np.where(one[beside], 1, np.where(other[beside], 2, 0))
     starts, ends = _between(disk, border, mark)
@@ -47,8 +46,39 @@ def border_edges(disk: TriangleMesh) -> IntArray:
     return edges[order]
 
 
-def _to_the_border(disk: TriangleMesh, border: IntArray, chosen: BoolArray, barred: BoolArray) -> BoolArray:
-    """Return chosen triangles, with the shortest way from them to the border if none of them is there."""
+def _both_to_the_border(
+    disk: TriangleMesh, border: IntArray, one: BoolArray, other: BoolArray
+) -> tuple[BoolArray, BoolArray]:
+    """Return two sets of triangles with ways from each to the border; of one around the other, a single triangle."""
+    for first, second in (
+        (one, other),
+        (_single(one), other),
+        (one, _single(other)),
+        (_single(one), _single(other)),
+    ):
+        wide = _to_the_border(disk, border, first, second)
+        if wide is None:
+            continue
+        wider = _to_the_border(disk, border, second, wide)
+        if wider is not None:
+            return wide, wider
+    raise AssertionError("two triangles of a disk do not keep each other from its border")
+
+
+def _single(chosen: BoolArray) -> BoolArray:
+    """Return one of the chosen triangles alone."""
+    first = np.zeros_like(chosen)
+    first[np.argmax(chosen)] = True
+    return first
+
+
+def _to_the_border(
+    disk: TriangleMesh, border: IntArray, chosen: BoolArray, barred: BoolArray
+) -> BoolArray | None:
+    """Return chosen triangles, with the shortest way from them to the border if none of them is there.
+
+    None if there is no way that does not lead through those that are barred.
+    """
     beside = disk.edge_faces[border, 0]
     if chosen[beside].any():
         return chosen
@@ -57,6 +87,8 @@ def _to_the_border(disk: TriangleMesh, border: IntArray, chosen: BoolArray, barr
     dual = MultiGraph(len(disk.faces), inside[:, 0], inside[:, 1], np.ones(len(inside)))
     distance, before, _ = dual.shortest_paths(np.flatnonzero(chosen))
     free = beside[~barred[beside]]
+    if not np.isfinite(distance[free]).any():
+        return None
     nodes, _ = trace_back(free[[np.argmin(distance[free])]], before)
     widened = chosen.copy()
     widened[nodes] = True
