@@ -176,7 +176,7 @@ def _check_angles(trial: Trial) -> None:
             f"{len(off)} of {at.sum()} vertices, {worst} by {error[worst]:.3g} rad",
         )
     worst = error[at].max(initial=0.0)
-    told = result.distortion.curvature_error_max * np.pi
+    told = max(result.distortion.curvature_error_max * np.pi, result.distortion.angle_sum_error)
     if worst > ANGLE and not told > worst / 2:
         trial.outcome.breach("curvature error understated", f"{told:.3g} rad reported, {worst:.3g} measured")
 
@@ -343,7 +343,7 @@ def _check_cones(trial: Trial) -> None:
         trial.broken("cones", "cones: negative", curvatures.min())
     quantum = options.get("quantum")
     if quantum is not None and len(cones) and _off_multiple(curvatures, quantum).max() > ANGLE:
-        trial.broken("cones", "cones: no multiples", _off_multiple(curvatures, quantum).max())
+        trial.broken("rotation", "cones: no multiples", _off_multiple(curvatures, quantum).max())
 
 
 def _check_report(trial: Trial) -> None:
