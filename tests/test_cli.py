@@ -17,7 +17,6 @@ import shapes
 from coneflat import errors, read_mesh
 from coneflat.cli.given import parse_curvature, parse_vertices
 
-
 #: A line of progress, which comes by the clock.
 PROGRESS = re.compile(r" *\d+\.\d s +\d+%  .*")
 

@@ -12,6 +12,7 @@ from shapes import join, sphere
 
 import coneflat
 from coneflat.io import read_mesh, read_mesh_from
+from coneflat.io.join import read_joined
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -184,6 +185,20 @@ class TestWelding:
         _, (new, values, _), _ = pair
         uvs = [values(new["meshes"][i]["primitives"][0]["attributes"]["TEXCOORD_0"]) for i in (1, 2)]
         assert not np.array_equal(*uvs)
+
+    def test_sheets_of_two_nodes_with_one_border_stay_apart_on_the_command_line(self, tmp_path):
+        make = SceneMaker()
+        sheet = np.array([[x, y, 0.2 * x * y] for x in range(3) for y in range(3)], dtype=float)
+        order = [v for a in (0, 1, 3, 4) for v in (a, a + 3, a + 4, a, a + 4, a + 1)]
+        for points in (sheet, np.column_stack([sheet[:, 0] - 2, sheet[:, 1], 0 * sheet[:, 2]])):
+            one = {"attributes": {"POSITION": make.accessor(points)}, "indices": make.accessor(order, 5121)}
+            make.tree.setdefault("meshes", []).append({"primitives": [one]})
+        make.tree |= {"nodes": [{"mesh": 0}, {"mesh": 1}], "scenes": [{"nodes": [0, 1]}]}
+        (tmp_path / "sheets.glb").write_bytes(make.glb())
+        joined = read_joined(tmp_path / "sheets.glb")
+        assert len(joined.mesh.vertices) == 18
+        assert joined.edges == 0
+        assert coneflat.flatten(joined.mesh).distortion.charts == 2
 
 
 class TestLosses:

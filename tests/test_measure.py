@@ -307,3 +307,12 @@ def test_damaged_files_are_measured_or_refused_in_one_line(tmp_path, seed):
             outcomes.add("measured")
     assert outcomes == {"refused", "measured"}
     assert not any("\n" in message for message in messages)
+
+
+def test_glb_measures_as_the_result_does_up_to_its_precision(tmp_path):
+    result = coneflat.flatten(*shapes.sphere(2), charts="atlas")
+    found = measure_uv(result.save(tmp_path / "a.glb")).report()
+    for name in ("triangles", "charts", "flipped", "degenerate", "overlapping_pairs", "outside"):
+        assert found[name] == measure_uv(result).report()[name], name
+    for name in ("qc_mean", "area_std", "seam_length", "packing_efficiency", "density_spread"):
+        assert found[name] == pytest.approx(measure_uv(result).report()[name], rel=1e-4), name

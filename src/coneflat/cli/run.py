@@ -67,7 +67,7 @@ def run(
     with _kept_apart(output) as stdout, Console(talk) as console:
         result = flatten_file(mesh, console, options, weld)
         result = save(result, console, output, report, texture, stdout, ending)
-        console.finish([path for path in (output, report) if path not in (None, PIPE)], result)
+        console.finish([path for path in (output, report) if path is not None and path != PIPE], result)
     check_required(requirements, result.report(), str(output))
 
 

@@ -53,9 +53,7 @@ class _Reading:
         self._corners: list[IntArray] = [np.empty(0, np.int64)]
         self._count = self._corner_count = 0
         self._blocks = [0]
-        # Of each part's corners: the UVs and normals, None where the primitive has none.
-        self._uvs: list[FloatArray | None] = []
-        self._normals: list[FloatArray | None] = []
+        self._uvs, self._normals = _Rows(2), _Rows(3)
 
     def add_mesh(self, node: int, mesh: Any, matrix: FloatArray) -> None:
         """Add the triangles of a mesh that a node shows.
@@ -92,9 +90,8 @@ class _Reading:
                 corners = corners.reshape(-1, 3)[:, ::-1].reshape(-1)
             self._parts.append(ScenePart(node, mesh, index, corners, is_mirrored))
             self._corners.append(corners + first)
-            self._uvs.append(self._attribute(attributes, "TEXCOORD_0", 2, corners))
-            normals = self._attribute(attributes, "NORMAL", 3, corners)
-            self._normals.append(None if normals is None else normals @ _cofactors(linear).T)
+            self._uvs.add(data, attributes.get("TEXCOORD_0"), node, corners)
+            self._normals.add(data, attributes.get("NORMAL"), node, corners, _cofactors(linear))
         if self._count > self._blocks[-1]:
             self._blocks.append(self._count)
 
@@ -107,8 +104,8 @@ class _Reading:
         corners = np.concatenate(self._corners)
         if not len(corners):
             raise EmptyMeshError(f"{self.data.path} has no faces: its scene shows no triangle")
-        uv, texture = _numbered(self._uvs, self._parts, 2)
-        normals, normal = _numbered(self._normals, self._parts, 3)
+        uv, texture = self._uvs.numbered()
+        normals, normal = self._normals.numbered()
         return RawMesh(
             np.concatenate(self._vertices),
             corners,
@@ -121,14 +118,6 @@ class _Reading:
             scene=GltfScene(self.data, tuple(self._parts)),
             blocks=np.array(self._blocks),
         )
-
-    def _attribute(
-        self, attributes: dict[str, Any], name: str, columns: int, corners: IntArray
-    ) -> FloatArray | None:
-        """Return (c, columns) an attribute at some corners."""
-        if name not in attributes:
-            return None
-        return self.data.values(attributes[name], columns)[corners]
 
     def _check_copied(self, primitive: dict[str, Any], count: int) -> None:
         """Refuse arrays that are there for some of the vertices only, or not at all."""
@@ -157,21 +146,41 @@ class _Reading:
             self.data.fail(f"the positions of a mesh {how}")
 
 
-def _numbered(
-    values: list[FloatArray | None], parts: list[ScenePart], columns: int
-) -> tuple[FloatArray | None, IntArray | None]:
-    """Return the different rows of values at the corners of all parts, and (c,) the row of each, -1 for none."""
-    given = [one for one in values if one is not None]
-    if not given:
-        return None, None
-    rows = np.concatenate(given)
-    padded = np.zeros((len(rows), 3))
-    padded[:, :columns] = rows
-    kept, number = weld(padded)
-    numbers = np.full(sum(len(part.corners) for part in parts), -1, dtype=np.int64)
-    has_one = np.repeat([one is not None for one in values], [len(part.corners) for part in parts])
-    numbers[has_one] = number
-    return rows[kept], numbers
+class _Rows:
+    """What the corners of all parts have of an attribute."""
+
+    def __init__(self, columns: int) -> None:
+        self._rows: list[FloatArray] = []
+        self._corners: list[IntArray] = []
+        self._known: dict[tuple[int, int], int] = {}
+        self._count, self._columns = 0, columns
+
+    def add(
+        self, data: GltfData, index: Any, node: int, corners: IntArray, linear: FloatArray | None = None
+    ) -> None:
+        """Add the corners of a part; an accessor of None stands for none.
+
+        linear: (3, 3) what the values are to be transformed by, the same for all parts of a node.
+        """
+        if index is None:
+            self._corners.append(np.full(len(corners), -1))
+            return
+        if (node, index) not in self._known:
+            rows = data.values(index, self._columns)
+            self._rows.append(rows if linear is None else rows @ linear.T)
+            self._known[node, index] = self._count
+            self._count += len(rows)
+        self._corners.append(corners + self._known[node, index])
+
+    def numbered(self) -> tuple[FloatArray | None, IntArray | None]:
+        """Return the different rows, and (c,) the row of each corner, -1 for none; None, None without any."""
+        if not self._rows:
+            return None, None
+        rows = np.concatenate(self._rows)
+        padded = np.zeros((len(rows), 3))
+        padded[:, : self._columns] = rows
+        kept, number = weld(padded)
+        return rows[kept], np.append(number, -1)[np.concatenate(self._corners)]
 
 
 def _cofactors(linear: FloatArray) -> FloatArray:

@@ -123,7 +123,8 @@ def read_joined(path: str | PathLike[str], weld: bool | None = None) -> Joined:
         MeshError, MeshFileError: as of `read_mesh`.
     """
     mesh = read_mesh(path, weld)
-    if weld is not None or mesh.unwelded is not None:
+    # What a scene has as several nodes stays apart.
+    if weld is not None or mesh.unwelded is not None or mesh.scene is not None:
         return Joined(mesh, np.arange(len(mesh.vertices)))
     return join_borders(mesh)
 
