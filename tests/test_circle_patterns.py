@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapes
@@ -14,6 +16,7 @@ from coneflat.choose import Surface
 from coneflat.cones import ConeSolution, greedy_cones
 from coneflat.conformal.circle_pattern import RadiiProblem, circle_pattern
 from coneflat.conformal.coherent_angles import LEAST_PART, coherent_angles
+from coneflat.conformal.descent import descend
 from coneflat.distortion import measure
 from coneflat.geometry import angle_defect, corner_angles, edge_lengths
 from coneflat.geometry.delaunay import intrinsic_delaunay
@@ -288,3 +291,15 @@ def test_real_models(shared, name):
     assert result.solve.residual < 1e-9
     assert result.distortion.curvature_error_max < 1e-9
     assert result.distortion.flipped == 0
+
+
+def test_radii_that_no_numbers_hold_are_refused(monkeypatch):
+    """As of a pattern that does not exist, whose radii run away while the steps last."""
+
+    def run_away(problem, place, *limits):
+        found = descend(problem, place, *limits)
+        return replace(found, place=found.place + 700.0 * np.eye(1, len(place))[0])
+
+    monkeypatch.setattr("coneflat.conformal.circle_pattern.descend", run_away)
+    with pytest.raises(errors.ConvergenceError, match="the logs of radii came to differ by 7"):
+        flatten(*shapes.hill(6, 5), method="circle-patterns", best_effort=True)

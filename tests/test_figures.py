@@ -98,6 +98,7 @@ class TestFigures:
         ("kind", "look", "message"),
         [
             ("magic", {}, "unknown kind of figure 'magic': choose from layout"),
+            (np.eye(2), {}, "unknown kind of figure array"),
             ("curve", {}, "cone_curve"),
             ("cones", {"eyes": "above"}, "unknown eye 'above'"),
             ("cones", {"eyes": []}, "needs an eye"),
@@ -216,3 +217,9 @@ class TestCommand:
         code, _, err = run("ball.obj")
         assert code == 2
         assert 'pip install "coneflat[figures]"' in err
+
+
+@pytest.mark.parametrize("shown", [None, 3, np.eye(3), "layout"])
+def test_what_is_no_result_has_no_figure(shown):
+    with pytest.raises(OptionError, match="a figure shows what `coneflat.flatten` returns, not"):
+        coneflat.make_figure(shown, "layout")

@@ -137,9 +137,9 @@ def test_a_planted_fault_is_found(ball, fault, cause):
 def test_a_fault_that_a_note_names_is_no_breach(ball):
     result, options, mesh = ball
     moved = planted(result, "other cone")
-    assert "cones: no multiples" in breaches_of(moved, options, *mesh)
-    noted = replace(moved, notes=("1 cone has another angle.",))
-    assert "cones: no multiples" not in breaches_of(noted, options, *mesh)
+    assert "cones: sum of curvatures" in breaches_of(moved, options, *mesh)
+    noted = replace(moved, notes=("The sum of curvatures is off at 1 cone.",))
+    assert "cones: sum of curvatures" not in breaches_of(noted, options, *mesh)
 
 
 @pytest.mark.parametrize("ending", [".obj", ".ply", ".glb", ".npz"])

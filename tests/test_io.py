@@ -11,11 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coneflat import flatten
 from coneflat.errors import (
     ConeflatError,
     EmptyMeshError,
     FaceIndexError,
     MeshFileError,
+    NonFiniteError,
     UnknownFormatError,
 )
 from coneflat.io import INPUT_FORMATS, is_polygon_side, read_mesh, triangulate
@@ -355,3 +357,18 @@ def test_development_meshes():
         faces, face_corners = triangulate(mesh.vertices, mesh.corners, mesh.offsets)
         assert len(faces) == int(count.replace(",", "")), name
         assert is_polygon_side(face_corners, mesh.offsets).all(), name
+
+
+def test_a_signalling_nan_is_passed_on_in_silence(tmp_path):
+    """Such a float32 makes the processor complain on the way to a double; warnings are errors in the tests."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
+    corners.view("<u4")[2, 0] = 0x7F800001
+    head = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+    head += b"property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    (tmp_path / "a.ply").write_bytes(head + corners.tobytes() + b"\3" + np.arange(3, dtype="<i4").tobytes())
+    (tmp_path / "a.stl").write_bytes(bytes(80) + b"\1\0\0\0" + bytes(12) + corners.tobytes() + bytes(2))
+    for name in ("a.ply", "a.stl"):
+        mesh = read_mesh(tmp_path / name)
+        assert np.isnan(mesh.vertices).sum() == 1
+        with pytest.raises(NonFiniteError):
+            flatten(mesh)

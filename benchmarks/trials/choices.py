@@ -108,8 +108,8 @@ def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[s
         if rng.random() < 0.04:
             options["forbidden_seams"] = edges[rng.random(len(edges)) < rng.choice([0.03, 0.3, 0.9])]
     maybe(0.1, "sharp_angle", 0.3, 0.7, 1.2, 3.0)
-    maybe(0.05, "creases", 1.0, 100.0, 1e9)
-    maybe(0.04, "hide_seams", 1.0, 30.0)
+    maybe(0.05, "creases", 1.0, 10.0, 1e9)
+    maybe(0.04, "hide_seams", 1.0, 10.0)
     maybe(0.05, "seam_weights", rng.random(size), 10 ** rng.uniform(-9, 9, size), np.ones(size) * 1e308)
     maybe(0.08, "resolution", 1, 16, 64, 4096)
     maybe(0.08, "padding", 0.0, 0.2, 8.0)

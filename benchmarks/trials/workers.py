@@ -97,7 +97,8 @@ class Worker:
 
     def start(self, case: Case) -> None:
         self.case, self.began, self.work = case, time.perf_counter(), _work_of(self.process.pid)
-        self.pipe.send(case)
+        with contextlib.suppress(ConnectionError):  # that it is gone is seen when it does not answer
+            self.pipe.send(case)
 
     def ended(self) -> Iterator[Outcome]:
         """Yield the outcome of the case, if it has ended or must."""
@@ -199,7 +200,10 @@ def serve(pipe: Connection, home: Path, log: Path, path: list[str]) -> None:
             outcome.breach(f"prints: {text[:80]}", text)
         if outcome.memory > MEMORY:
             outcome.breach("out of memory", f"{outcome.memory:.0f} MB")
-        pipe.send(outcome)
+        try:
+            pipe.send(outcome)
+        except ConnectionError:
+            return
 
 
 def _standard_output(path: Path) -> Callable[[], str]:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from .._arrays import FloatArray, IntArray
+from ..errors import ConvergenceError
 from ..mesh import label_components
 from ..solver import Factor, factorize
 from .coherent_angles import CoherentAngles
@@ -24,6 +25,8 @@ SETTLED, MOST_STEPS, PART = 1e-5, 60, 0.9
 HALVINGS = 30
 # Largest change of a log radius in one step.
 LARGEST_STEP = 5.0
+# By how much log radii may differ: squares of lengths, whose logs lie half as far from 0 each way, are to be finite.
+LARGEST_SPREAD = 600.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,9 @@ def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
         twin: (3m,) half-edges of a connected triangulation.
         coherent: angles.
 
+    Raises:
+        ConvergenceError: radii differ by more than numbers hold.
+
     Notes:
         L. Kharevych, B. Springborn, P. Schroeder, "Discrete conformal mappings via circle patterns", ACM Transactions
         on Graphics 25(2), 2006. Circles that are one have one radius, and their triangles are one face.
@@ -60,6 +66,12 @@ def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
     # what is to be reached. As a small change of what was found, log radii have bits enough.
     found = descend(problem, np.zeros_like(problem.base), TOLERANCE, MAX_STEPS)
     log_radius = (problem.base + found.place)[problem.circle]
+    spread = float(np.ptp(log_radius))
+    if not spread < LARGEST_SPREAD:
+        raise ConvergenceError(
+            f"no circle pattern was found: the logs of radii came to differ by {spread:.3g}, more than numbers hold; "
+            "method 'exact', other cones or --repair may help"
+        )
     log_radius -= (log_radius.max() + log_radius.min()) / 2
     half = _inside_too(problem.half_angles(found.place), coherent, twin)
     lengths = 2 * np.exp(np.repeat(log_radius, 3)) * np.sin(half)

@@ -90,7 +90,8 @@ def read_mesh_from(
             f"{ending!r} is no format that meshes are read from: {', '.join(INPUT_FORMATS)}"
         )
     try:
-        mesh = _READERS[ending](path, content)
+        with np.errstate(invalid="ignore"):  # coordinates that are no numbers are passed on
+            mesh = _READERS[ending](path, content)
         check_corners(path, mesh)
     except (ConeflatError, MemoryError):
         raise
