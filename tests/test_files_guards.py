@@ -82,6 +82,11 @@ class TestGltf:
         make.tree["meshes"][0]["primitives"] = [one] * 400
         refused(make.glb(), "a.glb", "so often that there are over 10,000,000 corners", most=MOST * 8)
 
+    def test_names_that_are_no_text(self):
+        make = square()
+        make.tree["nodes"] = [{"mesh": 0, "name": 1.5}]
+        refused(make.glb(), "a.glb", "the name of number 0 of its nodes is 1.5, no text")
+
     def test_a_mesh_shown_many_times_is_no_bomb(self):
         make = square()
         make.tree["nodes"] = [{"mesh": 0, "translation": [i, 0, 0]} for i in range(500)]

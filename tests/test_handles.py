@@ -107,7 +107,7 @@ def test_measured_rotations_of_a_cut_square():
 @pytest.mark.parametrize(
     ("options", "kind", "message"),
     [
-        ({"quantum": 0}, errors.OptionError, "quantum must be positive"),
+        ({"quantum": 0}, errors.OptionError, "quantum must be from 0.0001 radians"),
         ({"quantum": 1.0}, errors.CurvatureError, "no multiple"),
         ({"quantum": QUARTER, "cones": "greedy"}, errors.OptionError, "pursuit"),
         ({"correct_handles": True}, errors.OptionError, "quantum"),

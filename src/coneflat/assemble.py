@@ -16,7 +16,7 @@ from .figures import SolveFigures
 from .layout.convex import Polygons, make_convex
 from .mesh import TriangleMesh
 from .numbering import result_numbering, turn_corners
-from .options import Options
+from .options import CONED, Options
 from .promises import broken_promises
 from .result import Flattening
 from .rotations import Rotations, measure_rotations
@@ -135,8 +135,10 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
 
 
 def _prescribed(one: LaidOut, options: Options) -> FloatArray:
-    """Return (n,) the curvature that vertices are to have in the plane, NaN on a free boundary."""
+    """Return (n,) the curvature that vertices are to have in the plane, NaN where none is prescribed."""
     is_free = one.mesh.is_boundary_vertex & (not options.prescribes_boundary)
+    if options.method not in CONED:
+        is_free[one.seams] = True
     return np.where(is_free, np.nan, one.target)
 
 

@@ -22,6 +22,8 @@ VARIANTS = ("circle-patterns/fixed", "linear-abf/free", "abf++/free")
 ITERATIVE = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci", "abf++", "abf++/free")
 # Those whose metric lives on flipped triangles and is unfolded on the mesh's own.
 UNFOLDED = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci")
+# Those whose cones have the curvatures that are prescribed; the others lay out what was cut open before.
+CONED = (*UNFOLDED, "linear", "bff", "linear-abf", "abf++")
 LENGTH_RULES = ("integral", "mean")
 AT_CONES = ("auto", "scale", "curvature")
 SOLVERS = ("auto", "pardiso", "scikit-sparse", "cholespy", "scipy", "amg")

@@ -99,6 +99,11 @@ def _rotation_rows(result: Flattening) -> list[tuple[str, str, str]]:
     return rows
 
 
+def _shown(value: float, form: str) -> str:
+    """Return a number as text; a word where there is none, as for the distortion of what has no area."""
+    return f"{value:{form}}" if math.isfinite(value) else "unknown"
+
+
 def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
     """Return (measure, value, meaning) rows of the table that the commands print."""
     d = result.distortion
@@ -120,23 +125,24 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
         ("cones", cones, "singular vertices, and their curvatures"),
         (
             "curvature error",
-            f"{d.curvature_error:.2e} pi",
-            f"||target - K|| / n; worst {d.curvature_error_max:.2e} pi",
+            f"{_shown(d.curvature_error, '.2e')} pi",
+            f"||target - K|| / n; worst {_shown(d.curvature_error_max, '.2e')} pi",
         ),
         (
             "QC distortion",
-            f"{d.qc_mean:.4f}",
-            f"1 is conformal; 95% below {d.qc_p95:.4f}, worst {d.qc_max:.4g}",
+            f"{_shown(d.qc_mean, '.4f')}",
+            f"1 is conformal; 95% below {_shown(d.qc_p95, '.4f')}, worst {_shown(d.qc_max, '.4g')}",
         ),
         (
             "area distortion",
-            f"{d.area_std:.4f}",
+            f"{_shown(d.area_std, '.4f')}",
             "standard deviation of the log of the scale, by area",
         ),
         (
             "of the metric",
-            f"{solve.area_distortion:.4f}",
-            f"the same of the metric; {solve.area_distortion_linear:.4f} in the linear model, of {_allowed(result)}",
+            f"{_shown(solve.area_distortion, '.4f')}",
+            f"the same of the metric; {_shown(solve.area_distortion_linear, '.4f')} in the linear model, of "
+            f"{_allowed(result)}",
         ),
         ("flipped", f"{d.flipped:,}", untangled or "triangles upside down"),
         (
@@ -146,17 +152,21 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
         ),
         (
             "overlap",
-            f"{d.overlap:.3g}" if d.overlapping_pairs else "none",
+            f"{_shown(d.overlap, '.3g')}" if d.overlapping_pairs else "none",
             f"of the area covered, covered twice; {plural(d.overlapping_pairs, 'pair')} of triangles",
         ),
         ("charts", f"{d.charts:,}", "pieces of the layout"),
-        ("packing", f"{result.packing_efficiency:.1%}", "of the texture is covered"),
-        ("texel density", f"{d.density_spread:.3f}", "its spread: the quantile at 95% over that at 5%"),
-        ("seam length", f"{d.seam_length:.3f}", "over the square root of the area"),
+        ("packing", f"{_shown(result.packing_efficiency, '.1%')}", "of the texture is covered"),
+        (
+            "texel density",
+            f"{_shown(d.density_spread, '.3f')}",
+            "its spread: the quantile at 95% over that at 5%",
+        ),
+        ("seam length", f"{_shown(d.seam_length, '.3f')}", "over the square root of the area"),
         (
             "seam mismatch",
-            f"{d.seam_mismatch:.1e}",
-            f"of the two sides' lengths; worst {d.seam_mismatch_max:.1e}",
+            f"{_shown(d.seam_mismatch, '.1e')}",
+            f"of the two sides' lengths; worst {_shown(d.seam_mismatch_max, '.1e')}",
         ),
         *_rotation_rows(result),
     ]

@@ -80,6 +80,14 @@ class GltfData:
             map(len, {id(one): one for one in self._buffers if one is not None}.values())
         )
         self._refuse_compressed()
+        self._check_names()
+
+    def _check_names(self) -> None:
+        """Refuse names that are no text: a GLB written keeps them, and other programs stumble over them."""
+        for kind, items in self.tree.items():
+            for i, item in enumerate(items if isinstance(items, list) else ()):
+                if isinstance(item, dict) and not isinstance(item.get("name", ""), str):
+                    self.fail(f"the name of number {i} of its {kind[:40]} is {item['name']!r:.40}, no text")
 
     def fail(self, reason: str) -> NoReturn:
         """Say what is wrong with the file.

@@ -96,7 +96,8 @@ def _convex_parts(
     faces = faces[np.argsort(owner[faces], kind="stable")]
     names, first = np.unique(owner[faces], return_index=True)
     pieces, polygons = [], []
-    for name, members in zip(names.tolist(), np.split(faces, first[1:]), strict=True):
+    # Of some polygons nothing may be left, and so of all of them.
+    for name, members in zip(names.tolist(), np.split(faces, first)[1:], strict=True):
         corners = np.stack([face_corners[members], uv_faces[members]], axis=2).tolist()
         loops = merge_convex(uv, [[(c, p) for c, p in triangle] for triangle in corners])
         pieces += loops
