@@ -8,6 +8,7 @@ import coneflat
 from coneflat import TriangleMesh, errors
 from coneflat.atlas import find_overlaps
 from coneflat.distortion import measure
+from coneflat.rotations import seam_rotations
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +69,25 @@ def test_tiles(results):
     assert together[0].uv_scale > 1.05 * coneflat.pack_together(pair)[0].uv_scale
 
 
+def test_seams_of_quanta_stay_whole_turns():
+    quantum = np.pi / 2
+    vertices, faces = shapes.sphere(3)
+    parts = [
+        coneflat.flatten(vertices * [1, 1, s], faces, charts="atlas", quantum=quantum, distortion=0.1)
+        for s in (1, 3)
+    ]
+    for one in coneflat.pack_together(parts):
+        mesh = TriangleMesh(one.vertices, one.faces)
+        off = seam_rotations(mesh.vertices, mesh.faces, one.corner_uv, quantum)
+        assert off.max() < 1e-9
+        assert one.rotations.worst == pytest.approx(off.max(), abs=1e-12)
+
+
 def test_what_makes_no_sense(results):
+    with pytest.raises(errors.OptionError, match="not bool"):
+        coneflat.pack_together([True])
+    with pytest.raises(errors.OptionError, match="unknown rotate"):
+        coneflat.pack_together(results, rotate=np.ones(2))
     with pytest.raises(errors.EmptyMeshError, match="no results"):
         coneflat.pack_together([])
     with pytest.raises(errors.OptionError):

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .distortion import angle_sum_errors
+from .atlas.overlap import Overlaps
+from .distortion import angle_sum_errors, measure_at_any_size
 from .mesh import TriangleMesh
 from .options import UNFOLDED
+from .rotations import Rotations, seam_rotations
 from .text import plural
 
 if TYPE_CHECKING:
@@ -46,6 +49,51 @@ def broken_promises(result: Flattening, unit: float = DOUBLE) -> tuple[str, ...]
         *_whole_turns(result, unit),
         *_distortion(result),
     )
+
+
+def remeasured(
+    result: Flattening,
+    changed: Flattening,
+    unit: float,
+    notes: tuple[str, ...] = (),
+    overlaps: Overlaps | None = None,
+) -> Flattening:
+    """Return a changed result, measured anew, with the notes that it then has.
+
+    Args:
+        result: before the change.
+        changed: with the measures and notes of that.
+        unit: rounding of its coordinates.
+        notes: more of them.
+        overlaps: of its triangles, if they are known.
+    """
+    told = broken_promises(result)
+    old = result.distortion
+    distortion = measure_at_any_size(
+        TriangleMesh(changed.vertices, changed.faces),
+        changed.corner_uv,
+        (old.curvature_error, old.curvature_error_max),
+        changed.cones,
+        changed.prescribed,
+        overlaps,
+    )
+    changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
+    kept = tuple(note for note in result.notes if note not in told)
+    return replace(changed, notes=(*kept, *broken_promises(changed, unit), *notes))
+
+
+def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
+    """Return the rotations of seams after points were moved a little: the worst of them is measured anew."""
+    before = result.rotations
+    if before is None:
+        return None
+    off, after = (
+        seam_rotations(each.vertices, each.faces, each.corner_uv, before.quantum)
+        for each in (result, changed)
+    )
+    # Seams that were marked, or are between components, turn freely.
+    bound = off <= before.worst * (1 + 1e-6) + 1e-12
+    return replace(before, worst=float(after[bound].max(initial=0.0)))
 
 
 def _is_exact(result: Flattening) -> bool:
