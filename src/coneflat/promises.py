@@ -164,7 +164,8 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
     exponent = int(np.frexp(np.abs(mesh.vertices).max())[1])
     ways = np.ldexp(mesh.vertices[heads] - mesh.vertices[tails], -exponent)
     lengths = np.linalg.norm(ways, axis=1) * np.ldexp(result.uv_scale, exponent)
-    worst = float(np.abs(np.linalg.norm(flat, axis=1) / lengths - 1).max(initial=0.0))
+    kept = lengths > 0
+    worst = float(np.abs(np.linalg.norm(flat[kept], axis=1) / lengths[kept] - 1).max(initial=0.0))
     if worst > EXACT + ROUNDINGS * unit / _shortest(result):
         yield f"Lengths along the boundary are not kept: they differ by up to {worst:.2g} of them."
 
