@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ._arrays import ComplexArray
 from .atlas.overlap import Overlaps
 from .distortion import angle_sum_errors, measure_at_any_size
-from .mesh import TriangleMesh
+from .mesh import NEXT, PREVIOUS, TriangleMesh
 from .options import UNFOLDED
 from .rotations import Rotations, seam_rotations
 from .text import plural
@@ -143,10 +144,17 @@ def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
 
 
 def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
-    worst, settings = result.distortion.seam_mismatch_max, result.settings
+    settings = result.settings
     marked = settings.get("seams") is not None or settings.get("sharp_angle") is not None
     most = EXACT if _is_exact(result) else ROUGH if marked else np.inf
-    if worst > most + ROUNDINGS * unit / _shortest(result):
+    if not result.distortion.seam_mismatch_max > most:
+        return
+    mesh = TriangleMesh(result.vertices, result.faces)
+    one, two = np.abs(_sides(result))[mesh.edge_halfedges[~mesh.is_boundary_edge]].T
+    off, mean = np.abs(one - two), (one + two) / 2
+    beyond = off > most * mean + ROUNDINGS * unit
+    if beyond.any():
+        worst = (off[beyond] / mean[beyond]).max()
         yield f"The two sides of seams differ in length, by up to {worst:.2g} of it."
 
 
@@ -155,28 +163,37 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
     sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
-    tails, heads = mesh.tails[sides], mesh.heads[sides]
-    flat = (
-        result.uv[result.uv_faces[sides // 3, (sides + 2) % 3]]
-        - result.uv[result.uv_faces[sides // 3, (sides + 1) % 3]]
-    )
     # By a power of two, lest squares underflow.
     exponent = int(np.frexp(np.abs(mesh.vertices).max())[1])
-    ways = np.ldexp(mesh.vertices[heads] - mesh.vertices[tails], -exponent)
+    ways = np.ldexp(mesh.vertices[mesh.heads[sides]] - mesh.vertices[mesh.tails[sides]], -exponent)
     lengths = np.linalg.norm(ways, axis=1) * np.ldexp(result.uv_scale, exponent)
-    kept = lengths > 0
-    worst = float(np.abs(np.linalg.norm(flat[kept], axis=1) / lengths[kept] - 1).max(initial=0.0))
-    if worst > EXACT + ROUNDINGS * unit / _shortest(result):
+    off = np.abs(np.abs(_sides(result)[sides]) - lengths)
+    beyond = off > EXACT * lengths + ROUNDINGS * unit
+    if beyond.any():
+        worst = (off[beyond] / np.maximum(lengths[beyond], np.finfo(float).tiny)).max()
         yield f"Lengths along the boundary are not kept: they differ by up to {worst:.2g} of them."
 
 
 def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:
     rotations = result.rotations
-    if rotations is None or not rotations.worst > EXACT + ROUNDINGS * unit / _shortest(result):
+    if rotations is None or not rotations.worst > EXACT:
         return
-    along = np.abs(rotations.handles).max(initial=0.0) > EXACT
-    advice = ", as loops along handles do: correct them (--correct-handles)" if along else ""
-    yield f"Seams turn by up to {rotations.worst:.2g} rad beside multiples of the quantum{advice}."
+    mesh = TriangleMesh(result.vertices, result.faces)
+    shorter = np.abs(_sides(result))[mesh.edge_halfedges[~mesh.is_boundary_edge]].min(axis=1)
+    off = seam_rotations(result.vertices, result.faces, result.corner_uv, rotations.quantum)
+    # Seams that were marked, or are between components, turn freely.
+    off = np.where(off <= rotations.worst * (1 + EXACT), off, 0.0)
+    if (off * shorter > EXACT * shorter + ROUNDINGS * unit).any():
+        along = np.abs(rotations.handles).max(initial=0.0) > EXACT
+        advice = ", as loops along handles do: correct them (--correct-handles)" if along else ""
+        yield f"Seams turn by up to {rotations.worst:.2g} rad beside multiples of the quantum{advice}."
+
+
+def _sides(result: Flattening) -> ComplexArray:
+    """Return (3m,) the vector in the plane along each half-edge."""
+    places = result.corner_uv @ np.array([1, 1j])
+    sides: ComplexArray = (places[:, PREVIOUS] - places[:, NEXT]).ravel()
+    return sides
 
 
 def _distortion(result: Flattening) -> Iterator[str]:
@@ -191,10 +208,3 @@ def _distortion(result: Flattening) -> Iterator[str]:
             f"Angles are far from kept: the mean QC distortion is {measures.qc_mean:.3g}, a twentieth of the area is "
             f"above {measures.qc_p95:.3g}; {', '.join(cure[:-1])} or {cure[-1]} would lower it."
         )
-
-
-def _shortest(result: Flattening) -> float:
-    """Return the length in the plane of the shortest side of a triangle."""
-    corners = result.corner_uv
-    lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    return max(float(lengths.min()), np.finfo(float).tiny)
