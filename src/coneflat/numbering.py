@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from ._arrays import BoolArray, IntArray
+from .errors import NonFiniteError
 from .mesh import TriangleMesh
 from .validation import CheckedMesh
 
@@ -26,12 +27,21 @@ def result_numbering(checked: CheckedMesh, input_count: int) -> tuple[IntArray, 
     return number, np.concatenate([np.arange(input_count), origin[is_added]])
 
 
+# Size of a mesh of which texels per unit of length, and their like, are numbers.
+SMALLEST = 1e-300
+
 Values = TypeVar("Values", IntArray, BoolArray)
 
 
 def at_unit_size(checked: CheckedMesh) -> CheckedMesh:
-    """Return the mesh scaled by a power of two, which rounds nothing, so that squares of lengths are no extremes."""
+    """Return the mesh scaled by a power of two, which rounds nothing, so that squares of lengths are no extremes.
+
+    Raises:
+        NonFiniteError: it is so small that UV units per unit of length are beyond numbers.
+    """
     size = float(np.abs(checked.mesh.vertices).max())
+    if size < SMALLEST:
+        raise NonFiniteError(f"positions of at most {size:.3g} are too small for numbers: scale the mesh")
     exponent = -int(np.frexp(size)[1])
     mesh = TriangleMesh(np.ldexp(checked.mesh.vertices, exponent), checked.mesh.faces)
     return replace(checked, mesh=mesh, exponent=exponent)

@@ -152,7 +152,7 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
         ),
         (
             "overlap",
-            f"{_shown(d.overlap, '.3g')}" if d.overlapping_pairs else "none",
+            f"{_shown(100 * d.overlap, '.3g')} %" if d.overlapping_pairs else "none",
             f"of the area covered, covered twice; {plural(d.overlapping_pairs, 'pair')} of triangles",
         ),
         ("charts", f"{d.charts:,}", "pieces of the layout"),

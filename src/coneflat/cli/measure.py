@@ -77,7 +77,8 @@ def rows_of_measures(found: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     if found["triangles_without_uv"]:
         missing = f"; {found['triangles_without_uv']:,} without UVs"
     tiles = "" if found["tiles"] == 1 else f" of {found['tiles']:,} unit squares with charts"
-    overlaps = "none" if not found["overlapping_pairs"] else number("overlap", ".3g")
+    share = "unknown" if found["overlap"] is None else f"{100 * found['overlap']:.3g} %"
+    overlaps = share if found["overlapping_pairs"] else "none"
     return [
         ("triangles", number("triangles", ",d"), f"of {found['polygons']:,} polygons, as fans{missing}"),
         ("charts", number("charts", ",d"), f"pieces of the layout; {found['mirrored_charts']:,} mirrored"),
