@@ -206,20 +206,17 @@ def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
 
     A triangle that is turned over, or folds that wind around a point twice, make it large.
     """
+    from .distortion_kernel import sum_angles
+
     points, fan = uv_points(mesh, corner_uv)
     joined = np.zeros(mesh.faces.size, dtype=bool)
     joined[joined_pairs(mesh, corner_uv)] = True
     inside = np.ones(len(points), dtype=bool)
     for end in end_corners(np.flatnonzero(~joined)):
         inside[fan.reshape(-1)[end]] = False
-    ways = (corner_uv - np.roll(corner_uv, 1, axis=1)) @ np.array([1, 1j])
-    # From the side that leaves a corner to the one that arrives, on the other side of the angle.
-    lengths = np.abs(ways)
-    flat = (lengths == 0) | (np.roll(lengths, -1, axis=1) == 0)
-    ways /= np.maximum(lengths, np.finfo(np.float64).tiny)
-    angles = np.abs(np.angle(np.roll(ways, -1, axis=1) * -np.conj(ways)))
-    sums = np.bincount(fan.reshape(-1), np.where(flat, 0.0, angles).reshape(-1), minlength=len(points))
-    inside[fan[flat]] = False
+    sums, change = sum_angles(fan, np.ascontiguousarray(corner_uv), len(points))
+    # A side without length has no direction.
+    inside &= np.isfinite(change)
     return float(np.abs(sums[inside] - 2 * np.pi).max(initial=0.0))
 
 
