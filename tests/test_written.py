@@ -16,7 +16,8 @@ from coneflat.geometry.planar import signed_double_areas
 from coneflat.io.pieces import merge_convex
 from coneflat.io.write import write_measured
 from coneflat.io.written import stored_in_glb
-from coneflat.layout.convex import Polygons, heights, make_convex
+from coneflat.layout.convex import heights, make_convex
+from coneflat.polygons import Polygons
 
 trimesh = pytest.importorskip("trimesh")
 

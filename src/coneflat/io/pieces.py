@@ -11,7 +11,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
-from ..layout.convex import Polygons, heights
+from ..layout.convex import heights
+from ..polygons import Polygons, fan_corners
 
 # Twice the area of the triangle at a corner, over the square of its longest side, from which on the corner is convex:
 # above rounding, with which areas are off by some 1e-16.
@@ -41,11 +42,7 @@ class Pieces:
 
     def fans(self) -> tuple[IntArray, IntArray]:
         """Return the triangles that others read: (t, 3) corners of the source, and (t, 3) points in the plane."""
-        start = np.cumsum(self.sizes) - self.sizes
-        count = self.sizes - 2
-        first = np.repeat(start, count)
-        step = np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count) + 1
-        rows = np.stack([first, first + step, first + step + 1], axis=1)
+        rows = fan_corners(np.concatenate([[0], np.cumsum(self.sizes)]))
         return self.corners[rows], self.points[rows]
 
 

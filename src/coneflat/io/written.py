@@ -13,6 +13,7 @@ from ..atlas.snap import snap_apart
 from ..distortion import measure_at_any_size
 from ..errors import MeshFileError
 from ..mesh import TriangleMesh
+from ..polygons import polygon_of
 from ..promises import DOUBLE, SINGLE, broken_promises
 from ..rotations import Rotations, seam_rotations
 from ..text import plural
@@ -99,8 +100,7 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
     corners, uv_faces = pieces.fans()
     vertex = np.full(int(offsets[-1]), -1, dtype=np.int64)
     vertex[face_corners] = result.faces
-    polygon = np.searchsorted(offsets, face_corners[:, 0], side="right") - 1
-    order = np.argsort(polygon, kind="stable")
+    order = np.argsort(polygon_of(face_corners, offsets), kind="stable")
     face_origin = np.arange(len(order)) if result.face_origin is None else result.face_origin
     notes: tuple[str, ...] = ()
     if len(pieces.split):
