@@ -8,6 +8,7 @@ import coneflat
 from coneflat import TriangleMesh, errors
 from coneflat.atlas import find_overlaps
 from coneflat.distortion import measure
+from coneflat.rotations import seam_rotations
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,24 @@ def test_areas_are_those_of_the_model():
         one = coneflat.flatten(vertices * size, faces)
         again = measure(TriangleMesh(one.vertices, one.faces), one.corner_uv)
         np.testing.assert_allclose(one.distortion.log_area_scale, again.log_area_scale, atol=1e-9)
+
+
+@pytest.mark.parametrize("rotate", ["any", "quarter"])
+def test_seams_keep_to_the_quanta_of_all(rotate):
+    """Quarters and sixths of a turn: halves suit both."""
+    vertices, faces = shapes.sphere(4)
+    x, y, z = vertices.T
+    limbs = vertices * (1 + 2.5 * np.abs(np.cos(2.5 * np.arctan2(y, x))) ** 6 * (1 - z**2))[:, None]
+    before = [
+        coneflat.flatten(limbs, faces, quantum=2 * np.pi / parts, charts="atlas", distortion=0.1)
+        for parts in (4, 6)
+    ]
+    assert min(one.distortion.charts for one in before) > 1
+    for one, parts in zip(coneflat.pack_together(before, rotate=rotate), (4, 6), strict=True):
+        mesh = TriangleMesh(one.vertices, one.faces)
+        off = seam_rotations(mesh, one.corner_uv, 2 * np.pi / parts)[1].max()
+        assert off < 1e-9
+        assert one.rotations.worst == off
 
 
 def test_charts_that_are_not_turned(results):

@@ -17,6 +17,7 @@ from coneflat.io.pieces import merge_convex
 from coneflat.io.write import write_measured
 from coneflat.io.written import stored_in_glb
 from coneflat.layout.convex import heights, make_convex
+from coneflat.mesh import TriangleMesh
 from coneflat.polygons import Polygons
 
 trimesh = pytest.importorskip("trimesh")
@@ -135,6 +136,24 @@ def test_measures_of_a_glb_are_those_of_its_32_bit_numbers(tmp_path):
     assert (signed_double_areas(uv) > 0).all()
     assert written.distortion.qc_mean != result.distortion.qc_mean
     assert written.as_written(".glb") is written
+
+
+def test_marked_seams_of_an_obj_turn_freely_whatever_its_diagonals(tmp_path):
+    """The report names seams that the quantum binds: edges of the fans are others than those of our triangles."""
+    vertices, faces = quads(2, 0.05)
+    write_quads(tmp_path / "in.obj", vertices, faces)
+    # All around the quads of one triangle of the ball.
+    sides = {(a, b) for row in faces[:3].tolist() for a, b in zip(row, row[1:] + row[:1], strict=True)}
+    ring = np.array(sorted((a, b) for a, b in sides if (b, a) not in sides))
+    result = flatten(tmp_path / "in.obj", seams=ring, quantum=np.pi / 2, charts="atlas")
+    written = result.as_written(".obj")
+    edges, others = (
+        set(map(tuple, TriangleMesh(vertices, one.faces).edges.tolist())) for one in (result, written)
+    )
+    assert edges != others
+    assert result.rotations.worst < 1e-9
+    assert written.rotations.worst < 1e-9
+    assert not any("quantum" in note for note in written.notes)
 
 
 def test_charts_that_touch_are_apart_in_single_precision():

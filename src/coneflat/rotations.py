@@ -48,11 +48,13 @@ def measure_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float)
     return Rotations(quantum, float(off.max(initial=0.0)), tuple(handles.tolist()))
 
 
-def seam_rotations(
-    vertices: FloatArray, faces: IntArray, corner_uv: FloatArray, quantum: float
-) -> FloatArray:
-    """Return how far the rotation across each inner edge is from a multiple of a quantum, radians."""
-    return np.abs(off_multiple(_turns(TriangleMesh(vertices, faces), corner_uv), quantum))
+def seam_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> tuple[IntArray, FloatArray]:
+    """Return (k, 2) the ends of all inner edges, and (k,) by how much rotations across miss a multiple of a quantum.
+
+    In radians; 0 where the sides are joined.
+    """
+    inner = mesh.edges[~mesh.is_boundary_edge]
+    return inner, np.abs(off_multiple(_turns(mesh, corner_uv), quantum))
 
 
 def _turns(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:

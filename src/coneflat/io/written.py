@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from ..atlas.overlap import Overlaps
 from ..atlas.snap import snap_apart
-from ..distortion import measure_at_any_size
 from ..errors import MeshFileError
-from ..mesh import TriangleMesh
 from ..polygons import polygon_of
-from ..promises import DOUBLE, SINGLE, broken_promises
-from ..rotations import Rotations, seam_rotations
+from ..promises import DOUBLE, SINGLE
+from ..remeasure import measured_anew
 from ..text import plural
 from .gltf_write import scene_losses
 from .pieces import find_pieces
@@ -60,7 +57,7 @@ def _in_single_precision(result: Flattening) -> Flattening:
     if is_stored and np.array_equal(vertices, result.vertices):
         return result
     uv, overlaps = snap_apart(result.uv, result.uv_faces, stored_in_glb)
-    return _measured(result, replace(result, vertices=vertices, uv=uv), SINGLE, overlaps=overlaps)
+    return measured_anew(result, replace(result, vertices=vertices, uv=uv), SINGLE, overlaps=overlaps)
 
 
 def _positions_in_glb(vertices: FloatArray) -> FloatArray:
@@ -116,49 +113,4 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
         face_corners=corners,
         face_origin=face_origin[order],
     )
-    return _measured(result, fans, DOUBLE, notes)
-
-
-def _measured(
-    result: Flattening,
-    changed: Flattening,
-    unit: float,
-    notes: tuple[str, ...] = (),
-    overlaps: Overlaps | None = None,
-) -> Flattening:
-    """Return a changed result, measured anew, with the notes that it then has.
-
-    Args:
-        result: before the change.
-        changed: with the measures and notes of that.
-        unit: rounding of its coordinates.
-        notes: more of them.
-        overlaps: of its triangles, if they are known.
-    """
-    told = broken_promises(result)
-    old = result.distortion
-    distortion = measure_at_any_size(
-        TriangleMesh(changed.vertices, changed.faces),
-        changed.corner_uv,
-        (old.curvature_error, old.curvature_error_max),
-        changed.cones,
-        changed.prescribed,
-        overlaps,
-    )
-    changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
-    kept = tuple(note for note in result.notes if note not in told)
-    return replace(changed, notes=(*kept, *broken_promises(changed, unit), *notes))
-
-
-def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
-    """Return the rotations of seams after points were moved a little: the worst of them is measured anew."""
-    before = result.rotations
-    if before is None:
-        return None
-    off, after = (
-        seam_rotations(each.vertices, each.faces, each.corner_uv, before.quantum)
-        for each in (result, changed)
-    )
-    # Seams that were marked, or are between components, turn freely.
-    bound = off <= before.worst * (1 + 1e-6) + 1e-12
-    return replace(before, worst=float(after[bound].max(initial=0.0)))
+    return measured_anew(result, fans, DOUBLE, notes)
