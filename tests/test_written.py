@@ -12,11 +12,11 @@ from coneflat import flatten
 from coneflat.atlas import find_overlaps
 from coneflat.atlas.snap import snap_apart
 from coneflat.errors import MeshFileError
-from coneflat.geometry.planar import signed_double_areas
+from coneflat.geometry.planar import heights, sides_between, signed_double_areas
 from coneflat.io.pieces import merge_convex
 from coneflat.io.write import write_measured
 from coneflat.io.written import stored_in_glb
-from coneflat.layout.convex import heights, make_convex
+from coneflat.layout.convex import make_convex
 from coneflat.mesh import TriangleMesh
 from coneflat.polygons import Polygons
 
@@ -90,10 +90,10 @@ def test_a_quad_that_the_plane_makes_concave_is_made_convex_again():
     space = np.concatenate([points, np.zeros((16, 1))], axis=1)[uv_faces]
     pulled = points.copy()
     pulled[6] = [1.5, 1.6]
-    assert (heights(pulled, uv_faces) > 0).all()
+    assert (heights(sides_between(pulled[uv_faces])) > 0).all()
     mended = make_convex(pulled, uv_faces, polygons, space)
     triples, _ = polygons.corner_triples(polygons.points(uv_faces))
-    assert heights(pulled, triples).min() < 0 < heights(mended, triples).min()
+    assert heights(sides_between(pulled[triples])).min() < 0 < heights(sides_between(mended[triples])).min()
     moved = np.flatnonzero((mended != pulled).any(axis=1))
     assert set(moved) <= {5, 6, 9, 10}
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ._arrays import FloatArray, IntArray
 from .conformal.turning import off_multiple
+from .geometry.planar import sides_between
 from .mesh import TriangleMesh
 from .seams.handles import handle_loops
 
@@ -59,8 +60,7 @@ def seam_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) ->
 
 def _turns(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
     """Return the rotation between the two sides of each inner edge, radians."""
-    points = corner_uv[..., 0] + 1j * corner_uv[..., 1]
-    sides = (points[:, [2, 0, 1]] - points[:, [1, 2, 0]]).ravel()
+    sides = sides_between(corner_uv).ravel()
     pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
     with np.errstate(divide="ignore", invalid="ignore"):
         turns: FloatArray = np.angle(-sides[pairs[:, 1]] / sides[pairs[:, 0]])

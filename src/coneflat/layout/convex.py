@@ -9,11 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..geometry.planar import heights, sides_between
 from ..mesh import TriangleMesh
 from ..polygons import Polygons
 
-# Twice the area of a triangle over the square of its longest side, from which on it is safely upright: rounding in the
-# plane is 1e-16 of the extent, and the finest edges are some 1e-6 of it.
+# Height over longest side of a triangle from which on it is safely upright: rounding in the plane is 1e-16 of the extent,
+# and the finest edges are some 1e-6 of it.
 UPRIGHT = 1e-8
 # The same, as it is wanted of corners that are to become convex: as much of it as there is room for.
 WANTED = (0.1, 0.03, 0.01, 1e-3)
@@ -21,15 +22,6 @@ WANTED = (0.1, 0.03, 0.01, 1e-3)
 STRAIGHT = 1e-6
 # Times all points of the polygons that are not convex are moved in turn.
 ROUNDS = 20
-
-
-def heights(points: FloatArray, triangles: IntArray) -> FloatArray:
-    """Return (t,) twice the area of triangles over the square of their longest sides, negative if upside down."""
-    corners = points[triangles]
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    longest = np.max([(one**2).sum(axis=1), (two**2).sum(axis=1), ((two - one) ** 2).sum(axis=1)], axis=0)
-    area: FloatArray = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-    return area / np.maximum(longest, np.finfo(float).tiny)
 
 
 def make_convex(
@@ -47,11 +39,10 @@ def make_convex(
         positions: (m, 3, 3) the triangle corners on the model.
     """
     triples, owner = polygons.corner_triples(polygons.points(uv_faces))
-    bad = heights(points, triples) <= UPRIGHT
-    if not bad.any():
+    is_bad = heights(sides_between(points[triples])) <= UPRIGHT
+    if not is_bad.any():
         return points
-    bad &= ~_concave_in_space(polygons, positions)[owner]
-    chosen = np.unique(owner[bad])
+    chosen = np.unique(owner[is_bad & ~_concave_in_space(polygons, positions)[owner]])
     mesh = TriangleMesh(points, uv_faces)
     movable = ~mesh.is_boundary_vertex
     wished = np.unique(triples[np.isin(owner, chosen)])
@@ -59,7 +50,7 @@ def make_convex(
     if not len(wished):
         return points
     # What is concave in space may be so in the plane; it must not stand in the way of others.
-    hopeless = np.isin(owner, np.setdiff1d(np.unique(owner[heights(points, triples) <= UPRIGHT]), chosen))
+    hopeless = np.isin(owner, np.setdiff1d(owner[is_bad], chosen))
     return _moved(points, np.concatenate([uv_faces, triples[~hopeless]]), wished)
 
 
