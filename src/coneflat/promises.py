@@ -67,7 +67,9 @@ def _upright(result: Flattening) -> Iterator[str]:
         advice = (
             "refine (--refine), which cannot invert any" if _is_exact(result) else "--method exact has fewest"
         )
-        yield f"There {'is' if parts[0].startswith('1 ') else 'are'} {' and '.join(parts)}: {advice}."
+        verb, broken = "is" if parts[0].startswith("1 ") else "are", result.solve.broken
+        why = f" ({plural(broken, 'triangle')} broke the triangle inequality in the metric)" if broken else ""
+        yield f"There {verb} {' and '.join(parts)}{why}: {advice}."
 
 
 def _apart(result: Flattening) -> Iterator[str]:

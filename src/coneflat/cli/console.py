@@ -25,7 +25,6 @@ PATIENCE = 1.0  # seconds between the plain lines that say what is going on, and
 PLAIN_WIDTH = 110
 #: What an artist asks first, in this order; the other rows are printed if verbose.
 FIRST_ROWS = ("charts", "overlap", "flipped", "texel density", "seam length", "QC distortion", "cones")
-EXTREME_QC = 2.0  # far from conformal, on average
 
 
 class Console:
@@ -113,14 +112,14 @@ class Console:
         with self._stages(name):
             yield
 
-    def say(self, lines: Iterable[str], style: str | None = None) -> None:
+    def say(self, lines: Iterable[str]) -> None:
         """Print lines of what came out."""
         if self.quiet:
             return
         if self._bar:
             self._bar.stop()
         for line in lines:
-            click.secho(line, fg=style)
+            click.echo(line)
         self._last_line = self.elapsed
         if self._bar:
             self._bar.start()
@@ -139,8 +138,6 @@ class Console:
             self.table(self._result_rows(result))
         if self.seconds:
             self.say([f"time           {self._spent(() if result is None else result.solvers)}"])
-        if result is not None:
-            self.say((f"warning: {each}" for each in _warnings(result)), "yellow")
 
     def _spent(self, solvers: Sequence[str]) -> str:
         each = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in self.seconds.items())
@@ -177,13 +174,3 @@ class Console:
             table.add_row(*row)
         width = None if sys.stdout.isatty() else PLAIN_WIDTH
         RichConsole(highlight=False, markup=False, width=width).print(table)
-
-
-def _warnings(result: Flattening) -> Iterator[str]:
-    measures, solve = result.distortion, result.solve
-    bad = measures.flipped + measures.degenerate
-    if bad:
-        broken = f"; {solve.broken:,} break the triangle inequality in this metric" if solve.broken else ""
-        yield f"{bad:,} of {len(result.faces):,} triangles are flipped or collapsed in the plane{broken}"
-    if measures.qc_mean > EXTREME_QC:
-        yield f"the mean QC distortion of {measures.qc_mean:.3g} is extreme; more cones would lower it"

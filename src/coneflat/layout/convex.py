@@ -13,8 +13,8 @@ from ..geometry.planar import heights, sides_between
 from ..mesh import TriangleMesh
 from ..polygons import Polygons
 
-# Height over longest side of a triangle from which on it is safely upright: rounding in the plane is 1e-16 of the extent,
-# and the finest edges are some 1e-6 of it.
+# Height over longest side of a triangle from which on it is safely upright: rounding in the plane is 1e-16 of the
+# extent, and the finest edges are some 1e-6 of it.
 UPRIGHT = 1e-8
 # The same, as it is wanted of corners that are to become convex: as much of it as there is room for.
 WANTED = (0.1, 0.03, 0.01, 1e-3)
