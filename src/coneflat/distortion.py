@@ -212,6 +212,12 @@ def seams_of(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
     return _seams_and_charts(mesh, np.ascontiguousarray(corner_uv, dtype=np.float64))[0]
 
 
+def seam_sides(mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return (k,) the lengths in the plane of seam edges, on the one side and on the other."""
+    here, there = (_side_lengths(ends) for ends in _sides(mesh, corner_uv, seams))
+    return here, there
+
+
 def _seams_and_charts(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[IntArray, int, IntArray]:
     """Return the interior edges whose UVs differ, the number of charts, and the chart of each face."""
     from .distortion_kernel import find_joined
@@ -226,7 +232,7 @@ def _seam_mismatch(
     mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the length on the model of each seam edge, and the relative difference of its UV lengths."""
-    here, there = (_side_lengths(ends) for ends in _sides(mesh, corner_uv, seams))
+    here, there = seam_sides(mesh, corner_uv, seams)
     ends = mesh.vertices[mesh.edges[seams]]
     return _side_lengths(ends), np.abs(here - there) / np.maximum((here + there) / 2, np.finfo(float).tiny)
 

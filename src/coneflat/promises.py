@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .distortion import angle_sum_errors
+from .distortion import angle_sum_errors, seam_sides, seams_of
 from .mesh import TriangleMesh
 from .options import UNFOLDED
+from .rotations import seam_rotations
 from .text import plural
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ WINDING = 1.0
 # Mean of QC, and what a twentieth of the area is above, from which on a layout is unfit for most uses, though every
 # triangle is upright. Single triangles are worse on many models.
 EXTREME_QC, EXTREME_TAIL = 1.25, 2.0
+# Lengths that are not told from 0.
+TINY = float(np.finfo(np.float64).tiny)
 # Relative difference of the sides of marked seams that methods without a flat metric are let go.
 ROUGH = 0.01
 
@@ -97,11 +100,18 @@ def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
 
 
 def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
-    worst, settings = result.distortion.seam_mismatch_max, result.settings
+    settings = result.settings
     marked = settings.get("seams") is not None or settings.get("sharp_angle") is not None
     most = EXACT if _is_exact(result) else ROUGH if marked else np.inf
-    if worst > most + ROUNDINGS * unit / _shortest(result):
-        yield f"The two sides of seams differ in length, by up to {worst:.2g} of it."
+    if not result.distortion.seam_mismatch_max > most:
+        return
+    mesh = TriangleMesh(result.vertices, result.faces)
+    here, there = seam_sides(mesh, result.corner_uv, seams_of(mesh, result.corner_uv))
+    mean = np.maximum((here + there) / 2, TINY)
+    off = np.abs(here - there) / mean
+    off = off[off > most + ROUNDINGS * unit / mean]
+    if len(off):
+        yield f"The two sides of seams differ in length, by up to {off.max():.2g} of it."
 
 
 def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
@@ -117,19 +127,25 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
     # By a power of two, lest squares underflow.
     exponent = int(np.frexp(np.abs(mesh.vertices).max())[1])
     ways = np.ldexp(mesh.vertices[heads] - mesh.vertices[tails], -exponent)
-    lengths = np.linalg.norm(ways, axis=1) * np.ldexp(result.uv_scale, exponent)
-    worst = float(np.abs(np.linalg.norm(flat, axis=1) / lengths - 1).max(initial=0.0))
-    if worst > EXACT + ROUNDINGS * unit / _shortest(result):
-        yield f"Lengths along the boundary are not kept: they differ by up to {worst:.2g} of them."
+    lengths = np.maximum(np.linalg.norm(ways, axis=1) * np.ldexp(result.uv_scale, exponent), TINY)
+    off = np.abs(np.linalg.norm(flat, axis=1) - lengths) / lengths
+    off = off[off > EXACT + ROUNDINGS * unit / lengths]
+    if len(off):
+        yield f"Lengths along the boundary are not kept: they differ by up to {off.max():.2g} of them."
 
 
 def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:
     rotations = result.rotations
-    if rotations is None or not rotations.worst > EXACT + ROUNDINGS * unit / _shortest(result):
+    if rotations is None or not rotations.worst > EXACT:
+        return
+    mesh = TriangleMesh(result.vertices, result.faces)
+    seams = seam_rotations(mesh, result.corner_uv, rotations.quantum)
+    off = seams.off[rotations.binds(seams.off) & (seams.off > EXACT + ROUNDINGS * unit * seams.change)]
+    if not len(off):
         return
     along = np.abs(rotations.handles).max(initial=0.0) > EXACT
     advice = ", as loops along handles do: correct them (--correct-handles)" if along else ""
-    yield f"Seams turn by up to {rotations.worst:.2g} rad beside multiples of the quantum{advice}."
+    yield f"Seams turn by up to {off.max():.2g} rad beside multiples of the quantum{advice}."
 
 
 def _distortion(result: Flattening) -> Iterator[str]:
@@ -144,10 +160,3 @@ def _distortion(result: Flattening) -> Iterator[str]:
             f"Angles are far from kept: the mean QC distortion is {measures.qc_mean:.3g}, a twentieth of the area is "
             f"above {measures.qc_p95:.3g}; {', '.join(cure[:-1])} or {cure[-1]} would lower it."
         )
-
-
-def _shortest(result: Flattening) -> float:
-    """Return the length in the plane of the shortest side of a triangle."""
-    corners = result.corner_uv
-    lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    return max(float(lengths.min()), np.finfo(float).tiny)

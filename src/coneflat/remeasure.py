@@ -53,12 +53,12 @@ def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
     before = result.rotations
     if before is None:
         return None
-    (edges, off), (edges_after, after) = (
+    old, new = (
         seam_rotations(TriangleMesh(each.vertices, each.faces), each.corner_uv, before.quantum)
         for each in (result, changed)
     )
-    # Seams that were marked, or are between components, turn freely. Polygons may have other diagonals.
-    free = edges[off > before.worst * (1 + 1e-6) + 1e-12]
+    # Polygons may have other diagonals.
+    free = old.edges[~before.binds(old.off)]
     count = len(changed.vertices)
-    bound = ~np.isin(edges_after @ [count, 1], free @ [count, 1])
-    return replace(before, worst=float(after[bound].max(initial=0.0)))
+    bound = ~np.isin(new.edges @ [count, 1], free @ [count, 1])
+    return replace(before, worst=float(new.off[bound].max(initial=0.0)))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ._arrays import FloatArray, IntArray
+from ._arrays import BoolArray, FloatArray, IntArray
 from .conformal.turning import off_multiple
 from .geometry.planar import sides_between
 from .mesh import TriangleMesh
@@ -37,6 +38,10 @@ class Rotations:
         handles = tuple(angle for part in known for angle in part.handles)
         return cls(known[0].quantum, max(part.worst for part in known), handles)
 
+    def binds(self, off: FloatArray) -> BoolArray:
+        """Return which edges with these deviations are held; seams that were marked, or join components, are not."""
+        return np.asarray(off <= self.worst * (1 + 1e-6) + 1e-12)
+
 
 def measure_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> Rotations:
     """Return the rotations of a layout of a connected mesh; `corner_uv` is (m, 3, 2)."""
@@ -49,13 +54,26 @@ def measure_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float)
     return Rotations(quantum, float(off.max(initial=0.0)), tuple(handles.tolist()))
 
 
-def seam_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> tuple[IntArray, FloatArray]:
-    """Return (k, 2) the ends of all inner edges, and (k,) by how much rotations across miss a multiple of a quantum.
+class SeamRotations(NamedTuple):
+    """Rotations between the two sides of inner edges, 0 where these are joined.
 
-    In radians; 0 where the sides are joined.
+    Attributes:
+        edges: (k, 2) their ends.
+        off: (k,) by how much the rotations miss a multiple of a quantum, radians.
+        change: (k,) by what a rounded point changes them, radians per unit that it is off by.
     """
-    inner = mesh.edges[~mesh.is_boundary_edge]
-    return inner, np.abs(off_multiple(_turns(mesh, corner_uv), quantum))
+
+    edges: IntArray
+    off: FloatArray
+    change: FloatArray
+
+
+def seam_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> SeamRotations:
+    """Return the rotations across all inner edges; `corner_uv` is (m, 3, 2)."""
+    is_inner = ~mesh.is_boundary_edge
+    lengths = np.abs(sides_between(corner_uv)).ravel()[mesh.edge_halfedges[is_inner]]
+    change = 2 / np.maximum(lengths, np.finfo(float).tiny).min(axis=1)
+    return SeamRotations(mesh.edges[is_inner], np.abs(off_multiple(_turns(mesh, corner_uv), quantum)), change)
 
 
 def _turns(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
