@@ -22,7 +22,7 @@ _TAKEN_BY = {
     "cells": ("checker",),
     "color_charts": ("layout",),
     "most": ("curve",),
-    "again": ("layout", "quality", *_VIEWS),
+    "again": ("layout", *_VIEWS),
 }
 
 
