@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from ..mesh import TriangleMesh, end_corners, label_components
+from ..mesh import TriangleMesh, end_corners, label_components, label_faces
 from .marks import BOUNDARY_COLOR, SEAM_COLOR, draw_dots, mark_scale, pixels_of
 from .projection import render_mesh
 from .quantity import Quantity
@@ -136,13 +136,10 @@ def layout_tiles(result: Flattening) -> IntArray:
 
     A chart may reach out of its square, if others made it.
     """
-    corners = result.uv_faces
-    ends = corners[:, :2].reshape(-1), np.repeat(corners[:, 2], 2)
-    count, label = label_components(len(result.uv), *ends)
-    chart = label[corners[:, 0]]
+    count, chart = label_faces(result.uv_faces, len(result.uv))
     size = np.maximum(np.bincount(chart, minlength=count), 1)
     middles = [
-        np.bincount(chart, result.uv[corners][..., k].mean(axis=1), minlength=count) / size for k in (0, 1)
+        np.bincount(chart, result.corner_uv[..., k].mean(axis=1), minlength=count) / size for k in (0, 1)
     ]
     return np.unique(np.floor(np.stack(middles, axis=1)[chart]).astype(np.int64), axis=0)
 
