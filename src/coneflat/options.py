@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._arrays import FloatArray, IntArray
 from .errors import OptionError
+from .text import shown
 
 CONES = ("auto", "pursuit", "greedy", "none")
 #: From cones to a layout: this package's own, the paper's, and those that it compares with.
@@ -48,9 +49,6 @@ PURSUIT_FIELDS = (
     "allowed_cones",
     "quantum",
 )
-
-# Elements of an array, and characters of anything, that a message shows.
-FEW_SHOWN, MOST_SHOWN = 4, 80
 
 Cones = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
 Boundary = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
@@ -155,7 +153,7 @@ class Options:
                 object.__setattr__(self, name, _number(name, getattr(self, name)))
         for name in ("positive_only", "correct_handles", "best_effort", "refine", "repair", "strict"):
             if not isinstance(getattr(self, name), (bool, np.bool_)):
-                raise OptionError(f"{name} is True or False, not {_shown(getattr(self, name))}")
+                raise OptionError(f"{name} is True or False, not {shown(getattr(self, name))}")
         for name in ("distortion", "epsilon"):
             if not 0 < getattr(self, name) < math.inf:
                 raise OptionError(f"{name} must be a positive number, not {getattr(self, name):g}")
@@ -206,7 +204,7 @@ class Options:
             up = _array("up", self.up)
             if up.shape != (3,) or up.dtype.kind not in "fiu" or not (np.isfinite(up).all() and up.any()):
                 raise OptionError(
-                    f"up must be a direction, three numbers that are not all 0, not {_shown(self.up)}"
+                    f"up must be a direction, three numbers that are not all 0, not {shown(self.up)}"
                 )
             object.__setattr__(self, "up", tuple(_of_finite_length(up.astype(np.float64)).tolist()))
 
@@ -315,34 +313,23 @@ class Options:
 
 def _choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
     if not isinstance(value, str) or value not in allowed:
-        raise OptionError(f"unknown {name} {_shown(value)}: choose from {', '.join(allowed)}")
-
-
-def _shown(value: object) -> str:
-    """Return what a message says of a value: one short line."""
-    if isinstance(value, np.ndarray) and value.size > FEW_SHOWN:
-        return f"an array of shape {value.shape} and type {value.dtype}"
-    try:
-        text = " ".join(repr(value).split())
-    except Exception:  # Whatever a foreign class does there.
-        text = f"a {type(value).__name__}"
-    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
+        raise OptionError(f"unknown {name} {shown(value)}: choose from {', '.join(allowed)}")
 
 
 def _number(name: str, value: object) -> float:
     is_scalar = np.ndim(value) == 0 if isinstance(value, np.ndarray) else not isinstance(value, (str, bytes))
     if not is_scalar or isinstance(value, (bool, np.bool_, complex, np.complexfloating)):
-        raise OptionError(f"{name} must be a number, not {_shown(value)}")
+        raise OptionError(f"{name} must be a number, not {shown(value)}")
     try:
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError) as error:
-        raise OptionError(f"{name} must be a number, not {_shown(value)}") from error
+        raise OptionError(f"{name} must be a number, not {shown(value)}") from error
 
 
 def _whole(name: str, value: object) -> int:
     number = math.nan if isinstance(value, (bool, np.bool_)) else _number(name, value)
     if not number.is_integer() or abs(number) >= 2**62:
-        raise OptionError(f"{name} must be a whole number, not {_shown(value)}")
+        raise OptionError(f"{name} must be a whole number, not {shown(value)}")
     return int(number)
 
 
@@ -374,7 +361,7 @@ def _pairs(noun: str, given: object) -> IntArray:
 def _listed(noun: str, vertices: Iterable[Any]) -> list[Any]:
     """Return the elements of a flat list."""
     if np.ndim(vertices) != 1 if isinstance(vertices, np.ndarray) else False:
-        raise OptionError(f"{noun}s must be a list of vertices, not {_shown(vertices)}")
+        raise OptionError(f"{noun}s must be a list of vertices, not {shown(vertices)}")
     return list(vertices)
 
 

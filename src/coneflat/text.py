@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import islice
 
+# Elements of an array, and characters of anything, that a message shows.
+FEW_SHOWN, MOST_SHOWN = 4, 80
+
 
 def plural(count: int, noun: str, nouns: str | None = None) -> str:
     """Return "1 cone", "2 cones"."""
@@ -21,3 +24,14 @@ def list_some(items: Iterable[object], total: int | None = None, most: int = 5) 
 def printable(text: str) -> str:
     """Return a text that can be written as UTF-8: bytes of file names that cannot become \\udcff, say."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def shown(value: object) -> str:
+    """Return what a message says of a value of any kind: one short line."""
+    if getattr(value, "size", 0) > FEW_SHOWN and hasattr(value, "dtype") and hasattr(value, "shape"):
+        return f"an array of shape {value.shape} and type {value.dtype}"
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # Whatever a foreign class does there.
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
