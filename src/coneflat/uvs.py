@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +19,7 @@ from .geometry.planar import signed_double_areas
 from .mapped import Mapped, as_mapped
 from .mesh import TriangleMesh, corner_fans, end_corners, label_components
 from .numbering import at_unit_size
-from .report import MEASURES
+from .report import MEASURES, path_text
 from .text import plural
 from .validation import CheckedMesh, check_mesh, left_out
 
@@ -82,8 +81,7 @@ class UVMeasures:
         `angle_sum_error`, the most by which the angles around a point inside a chart miss a full turn, radians.
         """
         return {
-            # A name that is no text in any encoding must not spoil the file.
-            "input": None if self.path is None else os.fsencode(self.path).decode("utf-8", "replace"),
+            "input": None if self.path is None else path_text(self.path),
             **{name: value if np.isfinite(value) else None for name, value in self.values().items()},
             "notes": list(self.notes),
         }
