@@ -143,6 +143,8 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
     every = mapped.corner_uv[known]
     cover = _cover(np.ldexp(every, -exponent))
     tiles = len(_tiles(checked.mesh, unit, exponent))
+    with np.errstate(over="ignore"):  # What is no number is not known.
+        covered = float(np.ldexp(cover.once, min(2 * exponent, MOST_EXPONENT)))
     counts = {
         "vertices": len(np.unique(mapped.faces)),
         "polygons": mapped.polygons,
@@ -152,7 +154,7 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
         "corners_not_finite": mapped.not_finite,
         "outside": int(((every < 0) | (every > 1)).any(axis=(1, 2)).sum()),
         "tiles": tiles,
-        "packing_efficiency": float(np.ldexp(cover.once, min(2 * exponent, MOST_EXPONENT))) / tiles,
+        "packing_efficiency": covered / tiles,
         "box_efficiency": cover.box_efficiency,
         "angle_sum_error": angle_sum_error(checked.mesh, unit),
     }
