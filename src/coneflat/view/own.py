@@ -6,7 +6,7 @@ import numpy as np
 
 from ..checker import cell_side
 from ..distortion import angle_sum_errors, seams_of
-from ..errors import MissingUVError
+from ..errors import MeshFileError, MissingUVError
 from ..figures import SolveFigures
 from ..geometry import double_areas, edge_lengths
 from ..io.join import Joined
@@ -17,6 +17,8 @@ from ..uvs import measure_mapped, uv_points
 
 #: The `method` in the settings of what was not made but found in the file.
 OWN = "the file's own UVs"
+#: UVs that pages, whose numbers have 32 bits, and pictures can show: squares of larger ones are none.
+LARGEST = 1e15
 #: Rows of a report that say nothing of a map that no search for cones has led to.
 _OF_A_SEARCH = ("cones", "curvature error", "of the metric")
 
@@ -28,6 +30,7 @@ def own_flattening(source: Joined, *, strict: bool = False) -> Flattening | None
 
     Raises:
         MeshError: the triangles are no mesh.
+        MeshFileError: UVs are too large to be shown.
     """
     if not has_uv(source.mesh):
         return None
@@ -43,8 +46,15 @@ def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
     Raises:
         MissingUVError: no triangle has UVs.
         MeshError: the triangles are no mesh.
+        MeshFileError: UVs are too large to be shown.
     """
     measured = measure_mapped(mapped, strict=strict)
+    largest = float(np.abs(measured.corner_uv).max())
+    if largest > LARGEST:
+        raise MeshFileError(
+            f"UVs of up to {largest:.3g} are too large to be shown: `coneflat measure` measures them, --again flattens "
+            "the mesh anew"
+        )
     mesh = measured.mesh
     uv, uv_faces = uv_points(mesh, measured.corner_uv)
     exponent = int(np.frexp(np.abs(mesh.vertices).max())[1])
