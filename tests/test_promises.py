@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import shapes
 
-from coneflat import flatten
+from coneflat import edge_lengths, flatten
 from coneflat.atlas.arrange import whole_turns
 from coneflat.distortion import measure
+from coneflat.errors import ArrayShapeError, FaceIndexError
 from coneflat.mesh import TriangleMesh
 from coneflat.promises import broken_promises
 
@@ -132,3 +133,15 @@ def test_a_side_without_length_hides_no_seams_whose_sides_differ(unit):
     torn = replace(result, uv=uv, distortion=measure(mesh, uv[corners], prescribed=result.prescribed))
     assert torn.distortion.seam_mismatch_max > 0.01
     assert any("two sides of seams differ" in note for note in broken_promises(torn, unit))
+
+
+def test_arrays_that_do_not_fit_the_mesh_are_refused():
+    """Compiled loops would write beyond their ends."""
+    vertices, faces = shapes.grid(4, 3)
+    mesh, uv = TriangleMesh(vertices, faces), vertices[:, :2][faces]
+    with pytest.raises(ArrayShapeError, match="prescribed must have the shape"):
+        measure(mesh, uv, prescribed=np.zeros(1))
+    with pytest.raises(ArrayShapeError, match="corner_uv must have the shape"):
+        measure(mesh, uv[:2])
+    with pytest.raises(FaceIndexError, match="from 0 to 19, but there are 3"):
+        edge_lengths(vertices[:3], faces)

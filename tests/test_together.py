@@ -67,7 +67,7 @@ def test_seams_keep_to_the_quanta_of_all(rotate):
     assert min(one.distortion.charts for one in before) > 1
     for one, parts in zip(coneflat.pack_together(before, rotate=rotate), (4, 6), strict=True):
         mesh = TriangleMesh(one.vertices, one.faces)
-        off = seam_rotations(mesh, one.corner_uv, 2 * np.pi / parts)[1].max()
+        off = seam_rotations(mesh, one.corner_uv, 2 * np.pi / parts).max()
         assert off < 1e-9
         assert one.rotations.worst == off
 
@@ -88,6 +88,10 @@ def test_tiles(results):
 
 
 def test_what_makes_no_sense(results):
+    with pytest.raises(errors.OptionError, match="not bool"):
+        coneflat.pack_together([True])
+    with pytest.raises(errors.OptionError, match="unknown rotate"):
+        coneflat.pack_together(results, rotate=np.ones(2))
     with pytest.raises(errors.EmptyMeshError, match="no results"):
         coneflat.pack_together([])
     with pytest.raises(errors.OptionError):

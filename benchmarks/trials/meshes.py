@@ -287,7 +287,7 @@ def two_parts(vertices: np.ndarray, faces: np.ndarray, rng: Random) -> Mesh:
     other = MAKERS[int(rng.integers(7))][0](rng)
     start = len(vertices)
     merged = shapes.join((vertices, faces), (other[0] + np.array([5.0, 0, 0]), np.asarray(other[1])))
-    if rng.random() < 0.5:
+    if rng.random() < 0.5 and len(faces) and len(other[1]):
         merged[1][merged[1] == start + other[1][0, 0]] = faces[0, 0]
     return merged
 

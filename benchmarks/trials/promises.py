@@ -208,9 +208,12 @@ def _check_boundary(trial: Trial) -> None:
 
 def _check_boundary_lengths(trial: Trial) -> None:
     at = trial.result.vertices[trial.result.faces]
+    # By a power of two, lest squares of tiny or huge lengths are no numbers.
+    exponent = int(np.frexp(np.abs(at).max())[1])
+    at = np.ldexp(at, -exponent)
     space, flat = plane.side_lengths(at).ravel(), trial.sides.ravel()
     border = np.isin(_edge_of_halfedge(trial), np.flatnonzero(trial.topology.count == 1))
-    wanted = space[border] * trial.result.uv_scale
+    wanted = space[border] * np.ldexp(trial.result.uv_scale, exponent)
     coarse = EPS * np.abs(at).max() / np.maximum(space[border], np.finfo(float).tiny)
     off = np.abs(flat[border] - wanted) / np.maximum(wanted, np.finfo(float).tiny)
     off -= 1e-7 + 8 * coarse + 8 * EPS / np.maximum(wanted, EPS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +22,9 @@ def read_obj(path: Path) -> Read:
     points: list[list[float]] = []
     uv: list[list[float]] = []
     space, flat = [], []
-    for line in path.read_text(encoding="utf-8", errors="replace").replace("\\\n", " ").splitlines():
+    # Not by `splitlines`, which ends lines at form feeds and the like, too.
+    text = path.read_bytes().decode("utf-8", "replace").replace("\\\n", " ")
+    for line in re.split(r"\r\n|\n|\r", text):
         words = line.split()
         if words[:1] == ["v"]:
             points.append([float(word) for word in words[1:4]])
@@ -164,7 +167,13 @@ def _compare(
     wanted = result.vertices[result.faces]
     extent = np.abs(wanted).max()
     fine = 1e-6 if ending in (".glb", ".obj") else 1e-12
-    sides = [np.sort(plane.side_lengths(corners).ravel()) for corners in (space, wanted)]
+    # At a size of one: squares of 32-bit numbers are soon none.
+    exponent = int(np.frexp(extent)[1])
+    sides = [
+        np.sort(plane.side_lengths(np.ldexp(corners.astype(np.float64), -exponent)).ravel())
+        for corners in (space, wanted)
+    ]
+    extent = float(np.ldexp(extent, -exponent))
     is_polygon = result.source is not None and len(result.source.offsets) - 1 < len(result.faces)
     if not is_polygon and np.abs(sides[0] - sides[1]).max() > fine * max(extent, np.finfo(float).tiny):
         outcome.breach(f"{name}: another shape", np.abs(sides[0] - sides[1]).max() / extent)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ._arrays import FloatArray, IntArray, dots
 from .atlas.overlap import Overlaps, find_overlaps
+from .errors import ArrayShapeError
 from .mesh import TriangleMesh, end_corners, label_components
 from .threads import meanwhile
 
@@ -103,7 +104,11 @@ def measure(
         curvature_error: what `curvature_errors` returns for the metric.
         prescribed: (n,) curvature that vertices are to have in the plane, radians; NaN where it is free.
         overlaps: what `find_overlaps` returns, if that is known.
+
+    Raises:
+        ArrayShapeError, NonFiniteError: the arrays do not fit the mesh, or UVs are not finite.
     """
+    _check_shapes(mesh, corner_uv, prescribed)
     find = partial(find_overlaps, corner_uv) if overlaps is None else lambda: overlaps
     with meanwhile(find, len(corner_uv)) as finding:
         measured = measure_map(mesh, corner_uv, curvature_error, cones)
@@ -112,6 +117,20 @@ def measure(
             measured = replace(measured, angle_sum_error=float(np.nanmax(np.abs(error), initial=0.0)))
         found = finding.result()
     return replace(measured, overlap=found.fraction, overlapping_pairs=len(found.pairs))
+
+
+def _check_shapes(mesh: TriangleMesh, corner_uv: FloatArray, prescribed: FloatArray | None) -> None:
+    """Refuse arrays that compiled loops would read beyond their ends."""
+    for name, found, wanted in (
+        ("corner_uv", np.shape(corner_uv), (*np.shape(mesh.faces), 2)),
+        (
+            "prescribed",
+            (len(mesh.vertices),) if prescribed is None else np.shape(prescribed),
+            (len(mesh.vertices),),
+        ),
+    ):
+        if found != wanted:
+            raise ArrayShapeError(f"{name} must have the shape {wanted}, as the mesh has it, not {found}")
 
 
 def measure_at_any_size(
@@ -142,7 +161,7 @@ def angle_sum_errors(
     from .distortion_kernel import sum_angles
 
     uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
-    sums, change = sum_angles(mesh.faces, uv, len(prescribed))
+    sums, change = sum_angles(mesh.faces, uv, len(mesh.vertices))
     full = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
     return sums - full + prescribed, change
 
@@ -212,12 +231,6 @@ def seams_of(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
     return _seams_and_charts(mesh, np.ascontiguousarray(corner_uv, dtype=np.float64))[0]
 
 
-def seam_sides(mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return (k,) the lengths in the plane of seam edges, on the one side and on the other."""
-    here, there = (_side_lengths(ends) for ends in _sides(mesh, corner_uv, seams))
-    return here, there
-
-
 def _seams_and_charts(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[IntArray, int, IntArray]:
     """Return the interior edges whose UVs differ, the number of charts, and the chart of each face."""
     from .distortion_kernel import find_joined
@@ -232,7 +245,7 @@ def _seam_mismatch(
     mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the length on the model of each seam edge, and the relative difference of its UV lengths."""
-    here, there = seam_sides(mesh, corner_uv, seams)
+    here, there = (_side_lengths(ends) for ends in _sides(mesh, corner_uv, seams))
     ends = mesh.vertices[mesh.edges[seams]]
     return _side_lengths(ends), np.abs(here - there) / np.maximum((here + there) / 2, np.finfo(float).tiny)
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .distortion import angle_sum_errors, seam_sides, seams_of
+from .atlas.overlap import Overlaps
+from .distortion import angle_sum_errors, measure_at_any_size
+from .geometry.planar import sides_between
 from .mesh import TriangleMesh
 from .options import UNFOLDED
-from .rotations import seam_rotations
+from .rotations import Rotations, seam_rotations
 from .text import plural
 
 if TYPE_CHECKING:
@@ -27,8 +30,6 @@ WINDING = 1.0
 # Mean of QC, and what a twentieth of the area is above, from which on a layout is unfit for most uses, though every
 # triangle is upright. Single triangles are worse on many models.
 EXTREME_QC, EXTREME_TAIL = 1.25, 2.0
-# Lengths that are not told from 0.
-TINY = float(np.finfo(np.float64).tiny)
 # Relative difference of the sides of marked seams that methods without a flat metric are let go.
 ROUGH = 0.01
 
@@ -49,6 +50,52 @@ def broken_promises(result: Flattening, unit: float = DOUBLE) -> tuple[str, ...]
         *_whole_turns(result, unit),
         *_distortion(result),
     )
+
+
+def remeasured(
+    result: Flattening,
+    changed: Flattening,
+    unit: float,
+    notes: tuple[str, ...] = (),
+    overlaps: Overlaps | None = None,
+) -> Flattening:
+    """Return a changed result, measured anew, with the notes that it then has.
+
+    Args:
+        result: before the change.
+        changed: with the measures and notes of that.
+        unit: rounding of its coordinates.
+        notes: more of them.
+        overlaps: of its triangles, if they are known.
+    """
+    told = broken_promises(result)
+    old = result.distortion
+    distortion = measure_at_any_size(
+        TriangleMesh(changed.vertices, changed.faces),
+        changed.corner_uv,
+        (old.curvature_error, old.curvature_error_max),
+        changed.cones,
+        changed.prescribed,
+        overlaps,
+    )
+    changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
+    kept = tuple(note for note in result.notes if note not in told)
+    return replace(changed, notes=(*kept, *broken_promises(changed, unit), *notes))
+
+
+def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
+    """Return the rotations of seams after points were moved a little: the worst of them is measured anew."""
+    before = result.rotations
+    if before is None:
+        return None
+    old, new = (TriangleMesh(each.vertices, each.faces) for each in (result, changed))
+    off, after = (
+        seam_rotations(mesh, each.corner_uv, before.quantum) for mesh, each in ((old, result), (new, changed))
+    )
+    # Polygons may have other diagonals: edges are told by their ends.
+    known, names = (mesh.edges[~mesh.is_boundary_edge] @ [len(result.vertices), 1] for mesh in (old, new))
+    bound = ~np.isin(names, known[~before.binds(off)])
+    return replace(before, worst=float(after[bound].max(initial=0.0)))
 
 
 def _is_exact(result: Flattening) -> bool:
@@ -106,12 +153,12 @@ def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
     if not result.distortion.seam_mismatch_max > most:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
-    here, there = seam_sides(mesh, result.corner_uv, seams_of(mesh, result.corner_uv))
-    mean = np.maximum((here + there) / 2, TINY)
-    off = np.abs(here - there) / mean
-    off = off[off > most + ROUNDINGS * unit / mean]
-    if len(off):
-        yield f"The two sides of seams differ in length, by up to {off.max():.2g} of it."
+    one, two = np.abs(sides_between(result.corner_uv)).ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]].T
+    off, mean = np.abs(one - two), (one + two) / 2
+    beyond = off > most * mean + ROUNDINGS * unit
+    if beyond.any():
+        worst = (off[beyond] / mean[beyond]).max()
+        yield f"The two sides of seams differ in length, by up to {worst:.2g} of it."
 
 
 def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
@@ -119,19 +166,15 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
     sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
-    tails, heads = mesh.tails[sides], mesh.heads[sides]
-    flat = (
-        result.uv[result.uv_faces[sides // 3, (sides + 2) % 3]]
-        - result.uv[result.uv_faces[sides // 3, (sides + 1) % 3]]
-    )
     # By a power of two, lest squares underflow.
     exponent = int(np.frexp(np.abs(mesh.vertices).max())[1])
-    ways = np.ldexp(mesh.vertices[heads] - mesh.vertices[tails], -exponent)
-    lengths = np.maximum(np.linalg.norm(ways, axis=1) * np.ldexp(result.uv_scale, exponent), TINY)
-    off = np.abs(np.linalg.norm(flat, axis=1) - lengths) / lengths
-    off = off[off > EXACT + ROUNDINGS * unit / lengths]
-    if len(off):
-        yield f"Lengths along the boundary are not kept: they differ by up to {off.max():.2g} of them."
+    ways = np.ldexp(mesh.vertices[mesh.heads[sides]] - mesh.vertices[mesh.tails[sides]], -exponent)
+    lengths = np.linalg.norm(ways, axis=1) * np.ldexp(result.uv_scale, exponent)
+    off = np.abs(np.abs(sides_between(result.corner_uv).ravel()[sides]) - lengths)
+    beyond = off > EXACT * lengths + ROUNDINGS * unit
+    if beyond.any():
+        worst = (off[beyond] / np.maximum(lengths[beyond], np.finfo(float).tiny)).max()
+        yield f"Lengths along the boundary are not kept: they differ by up to {worst:.2g} of them."
 
 
 def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:
@@ -139,13 +182,17 @@ def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:
     if rotations is None or not rotations.worst > EXACT:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
-    seams = seam_rotations(mesh, result.corner_uv, rotations.quantum)
-    off = seams.off[rotations.binds(seams.off) & (seams.off > EXACT + ROUNDINGS * unit * seams.change)]
-    if not len(off):
-        return
-    along = np.abs(rotations.handles).max(initial=0.0) > EXACT
-    advice = ", as loops along handles do: correct them (--correct-handles)" if along else ""
-    yield f"Seams turn by up to {off.max():.2g} rad beside multiples of the quantum{advice}."
+    shorter = (
+        np.abs(sides_between(result.corner_uv))
+        .ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]]
+        .min(axis=1)
+    )
+    off = seam_rotations(mesh, result.corner_uv, rotations.quantum)
+    off = np.where(rotations.binds(off), off, 0.0)
+    if (off * shorter > EXACT * shorter + ROUNDINGS * unit).any():
+        along = np.abs(rotations.handles).max(initial=0.0) > EXACT
+        advice = ", as loops along handles do: correct them (--correct-handles)" if along else ""
+        yield f"Seams turn by up to {rotations.worst:.2g} rad beside multiples of the quantum{advice}."
 
 
 def _distortion(result: Flattening) -> Iterator[str]:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from ._arrays import BoolArray, FloatArray, IntArray
+from ._arrays import BoolArray, FloatArray
 from .conformal.turning import off_multiple
 from .geometry.planar import sides_between
 from .mesh import TriangleMesh
@@ -54,26 +53,9 @@ def measure_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float)
     return Rotations(quantum, float(off.max(initial=0.0)), tuple(handles.tolist()))
 
 
-class SeamRotations(NamedTuple):
-    """Rotations between the two sides of inner edges, 0 where these are joined.
-
-    Attributes:
-        edges: (k, 2) their ends.
-        off: (k,) by how much the rotations miss a multiple of a quantum, radians.
-        change: (k,) by what a rounded point changes them, radians per unit that it is off by.
-    """
-
-    edges: IntArray
-    off: FloatArray
-    change: FloatArray
-
-
-def seam_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> SeamRotations:
-    """Return the rotations across all inner edges; `corner_uv` is (m, 3, 2)."""
-    is_inner = ~mesh.is_boundary_edge
-    lengths = np.abs(sides_between(corner_uv)).ravel()[mesh.edge_halfedges[is_inner]]
-    change = 2 / np.maximum(lengths, np.finfo(float).tiny).min(axis=1)
-    return SeamRotations(mesh.edges[is_inner], np.abs(off_multiple(_turns(mesh, corner_uv), quantum)), change)
+def seam_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> FloatArray:
+    """Return (k,) by how much the rotation across each inner edge misses a multiple of a quantum, radians."""
+    return np.abs(off_multiple(_turns(mesh, corner_uv), quantum))
 
 
 def _turns(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:

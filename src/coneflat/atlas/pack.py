@@ -170,7 +170,7 @@ def _check(resolution: int, padding: float, margin: float, rotate: str | int, ti
     if isinstance(rotate, int) and not isinstance(rotate, bool):
         if not 1 <= rotate <= MOST_TURNS:
             raise OptionError(f"rotate must be from 1 to {MOST_TURNS} turns, not {rotate}")
-    elif rotate not in ROTATIONS:
+    elif not isinstance(rotate, str) or rotate not in ROTATIONS:
         raise OptionError(
             f"unknown rotate {rotate!r}: choose from {', '.join(ROTATIONS)}, or a number of turns"
         )

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._arrays import IntArray
-from ..errors import EmptyMeshError
+from ..errors import EmptyMeshError, OptionError
 from ..mesh import TriangleMesh, label_components
 from .arrange import whole_turns
 from .pack import pack_charts
@@ -35,17 +35,20 @@ def pack_together(
         resolution: texels along a side of the texture.
         padding: texels between charts, at least.
         rotate: "any" turns charts so that they fill the texture best, "quarter" lays them straight, "none" leaves them
-            as they are, so what is upright stays so. Those of results with a quantum turn by multiples of it only.
+            as they are, so what is upright stays so. Where a result has a quantum, both turn charts by multiples of it.
         tiles: number of textures.
 
     Raises:
         EmptyMeshError: there are no results.
-        OptionError: a number makes no sense, or so much padding leaves no room.
+        OptionError: something is no result, a number makes no sense, or so much padding leaves no room.
     """
-    if not results:
-        raise EmptyMeshError("there are no results to pack")
-    from ..remeasure import measured_anew
+    from ..promises import DOUBLE, remeasured
 
+    results = _checked(results)
+    quanta = {result.rotations.quantum for result in results if result.rotations is not None}
+    turns: str | int = rotate
+    if quanta and rotate in ("any", "quarter"):
+        turns = math.gcd(*(whole_turns(quantum) for quantum in quanta))
     labels = [_charts(result) for result in results]
     first = np.cumsum([0, *(int(label.max()) + 1 for label in labels)])
     packed = pack_charts(
@@ -53,7 +56,7 @@ def pack_together(
         np.concatenate([label + start for label, start in zip(labels, first[:-1], strict=True)]),
         resolution=resolution,
         padding=padding,
-        rotate=_allowed_turns(results, rotate),
+        rotate=turns,
         tiles=tiles,
     )
     points = np.cumsum([0, *(len(result.uv) for result in results)])
@@ -62,25 +65,38 @@ def pack_together(
     uv[np.concatenate(corners)] = packed.corner_uv
     uv, _ = part_touching(uv, np.concatenate(corners))
     texture = {"resolution": resolution, "padding": padding, "tiles": tiles}
-    moved = (
-        replace(
+    return [
+        remeasured(
             result,
-            uv=own,
-            uv_scale=packed.scale,
-            packing_efficiency=packed.efficiency,
-            settings={**result.settings, **texture},
+            replace(
+                result,
+                uv=own,
+                uv_scale=packed.scale,
+                packing_efficiency=packed.efficiency,
+                settings={**result.settings, **texture},
+            ),
+            DOUBLE,
         )
         for result, own in zip(results, np.split(uv, points[1:-1]), strict=True)
-    )
-    return [measured_anew(before, after) for before, after in zip(results, moved, strict=True)]
+    ]
 
 
-def _allowed_turns(results: Sequence[Flattening], rotate: str) -> str | int:
-    """Return how charts may be turned so that the rotations between the sides of seams stay multiples of the quanta."""
-    turns = [whole_turns(result.rotations.quantum) for result in results if result.rotations is not None]
-    if not turns or rotate not in ("any", "quarter"):
-        return rotate
-    return math.gcd(*turns, 4) if rotate == "quarter" else math.gcd(*turns)
+def _checked(results: object) -> list[Flattening]:
+    """Return results, if they are.
+
+    Raises:
+        EmptyMeshError, OptionError: there are none, or something else is among them.
+    """
+    from ..result import Flattening
+
+    listed: list[Flattening] = []
+    for one in results if isinstance(results, Iterable) else [results]:
+        if not isinstance(one, Flattening):
+            raise OptionError(f"pack_together takes results of flatten, not {type(one).__name__}")
+        listed.append(one)
+    if not listed:
+        raise EmptyMeshError("there are no results to pack")
+    return listed
 
 
 def _charts(result: Flattening) -> IntArray:

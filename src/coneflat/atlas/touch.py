@@ -38,15 +38,19 @@ def part_touching(
     touching, apart = (TOUCHING, APART) if stored is None else (TOUCHING_SINGLE, APART_SINGLE)
     if stored is not None:
         points = stored(points)
+    best, found = points, find_overlaps(points, corners)
+    overlaps = found
     for _ in range(ROUNDS):
-        overlaps = find_overlaps(points, corners)
         moves = _moves(points @ np.array([1, 1j]), corners, overlaps.pairs, touching * extent, apart * extent)
         if not moves.any():
             break
         points = np.clip(points + np.stack([moves.real, moves.imag], axis=1), low, high)
         if stored is not None:
             points = stored(points)
-    return points, overlaps
+        overlaps = find_overlaps(points, corners)
+        if len(overlaps.pairs) < len(found.pairs):
+            best, found = points, overlaps
+    return best, found
 
 
 def _moves(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,6 +27,11 @@ MANY = 40
 # Changes that differ by less, relatively, are equal, and the first in the order of candidates is taken: symmetric
 # surfaces have many that differ by rounding only.
 TIE = 1e-9
+
+
+def above_rounding(energy: float) -> float:
+    """Return E^2, which rounding may have made less than nothing: gains are shares of it, and must not be losses."""
+    return max(float(energy), 0.0)
 
 
 @dataclass(frozen=True)
@@ -125,7 +130,8 @@ class DenseModel:
 
         limits = self.limits
         given = self.gram, self.slope, self.constant, self.least, limits.most, limits.total
-        return Fit(*fit_members(*given, members))
+        fitted = Fit(*fit_members(*given, members))
+        return fitted if fitted.energy >= 0 else replace(fitted, energy=above_rounding(fitted.energy))
 
     def energy(self, members: IntArray) -> float:
         """Return E^2 of a set, infinite where bounds leave no curvatures."""

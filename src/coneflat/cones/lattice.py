@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from .dense_model import DenseModel
+from .dense_model import DenseModel, above_rounding
 from .fit_kernel import fit_curvatures
 from .lattice_kernel import best_merge, best_split, descend_lattice, lattice_energy
 
@@ -79,12 +79,12 @@ class Lattice:
             self.total is not None,
             self.model.usable,
         )
-        return Charges(float(energy), members, units)
+        return Charges(above_rounding(energy), members, units)
 
     def with_energy(self, members: IntArray, units: IntArray) -> Charges:
         """Return charges as they are."""
         energy = lattice_energy(*self._arrays, self.model.constant, members, units, self.quantum)
-        return Charges(float(energy), members, units)
+        return Charges(above_rounding(energy), members, units)
 
     def grown(self, charges: Charges) -> Charges | None:
         """Return charges with one more cone (two more, of opposite sign, if there were none and the sum is 0)."""

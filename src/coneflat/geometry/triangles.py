@@ -9,16 +9,24 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..errors import FaceIndexError
 from ..mesh import NEXT, PREVIOUS
 
 
 def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (m, 3) side lengths in model units; both sides of an edge get the same bits."""
+    """Return (m, 3) side lengths in model units; both sides of an edge get the same bits.
+
+    Raises:
+        FaceIndexError: a face names a vertex that does not exist.
+    """
     from .component_kernel import measure_sides
 
-    lengths: FloatArray = measure_sides(
-        np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
-    )
+    points, triangles = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
+    if triangles.size and not 0 <= triangles.min() <= triangles.max() < len(points):
+        raise FaceIndexError(
+            f"faces name vertices from {triangles.min()} to {triangles.max()}, but there are {len(points)}, from 0 on"
+        )
+    lengths: FloatArray = measure_sides(points, triangles)
     return lengths
 
 

@@ -40,11 +40,33 @@ def check_references(data: GltfData) -> None:
                 data.item("meshes", item["mesh"])
     for name in ("extensionsUsed", "extensionsRequired"):
         data.entry(data.tree, name, list, [])
+    for name, index in _references(data):
+        data.item(name, index)
     for accessor in accessors_of_arrays(data.tree):
         for owner in view_owners(data.item("accessors", accessor)):
             data.view(owner["bufferView"])
     for view in views_of_images(data.tree):
         data.view(view)
+
+
+def _references(data: GltfData) -> Iterator[tuple[str, Any]]:
+    """Yield the list and the number of what scenes, nodes, primitives, textures and skins name, beside arrays."""
+    tree, entry = data.tree, data.entry
+    if "scene" in tree:
+        yield "scenes", tree["scene"]
+    singles = {
+        "nodes": {"mesh": "meshes", "skin": "skins", "camera": "cameras"},
+        "textures": {"source": "images", "sampler": "samplers"},
+        "skins": {"skeleton": "nodes"},
+    }
+    for kind, names in singles.items():
+        for item in entry(tree, kind, list, []):
+            yield from ((to, item[name]) for name, to in names.items() if name in item)
+    for kind, name in (("scenes", "nodes"), ("nodes", "children"), ("skins", "joints")):
+        for item in entry(tree, kind, list, []):
+            yield from (("nodes", node) for node in entry(item, name, list, []))
+    for mesh in entry(tree, "meshes", list, []):
+        yield from (("materials", one["material"]) for one in mesh["primitives"] if "material" in one)
 
 
 def accessors_of_arrays(tree: dict[str, Any]) -> Iterator[int]:

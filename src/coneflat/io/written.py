@@ -11,8 +11,7 @@ from .._arrays import FloatArray, IntArray
 from ..atlas.snap import snap_apart
 from ..errors import MeshFileError
 from ..polygons import polygon_of
-from ..promises import DOUBLE, SINGLE
-from ..remeasure import measured_anew
+from ..promises import DOUBLE, SINGLE, remeasured
 from ..text import plural
 from .gltf_write import scene_losses
 from .pieces import find_pieces
@@ -23,8 +22,8 @@ if TYPE_CHECKING:
 
 # Binary digits of 32-bit numbers.
 DIGITS = 24
-# Sizes of models whose coordinates are 32-bit numbers with all their digits, and so are those of their details.
-SMALLEST, LARGEST = 1e-30, 3e38
+# Sizes of models the squares of whose details are 32-bit numbers, too, as programs that read them compute.
+SMALLEST, LARGEST = 1e-15, 1e18
 
 
 def as_written(result: Flattening, ending: str) -> Flattening:
@@ -57,7 +56,7 @@ def _in_single_precision(result: Flattening) -> Flattening:
     if is_stored and np.array_equal(vertices, result.vertices):
         return result
     uv, overlaps = snap_apart(result.uv, result.uv_faces, stored_in_glb)
-    return measured_anew(result, replace(result, vertices=vertices, uv=uv), SINGLE, overlaps=overlaps)
+    return remeasured(result, replace(result, vertices=vertices, uv=uv), SINGLE, overlaps=overlaps)
 
 
 def _positions_in_glb(vertices: FloatArray) -> FloatArray:
@@ -113,4 +112,4 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
         face_corners=corners,
         face_origin=face_origin[order],
     )
-    return measured_anew(result, fans, DOUBLE, notes)
+    return remeasured(result, fans, DOUBLE, notes)
