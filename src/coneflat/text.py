@@ -28,7 +28,9 @@ def printable(text: str) -> str:
 
 def shown(value: object) -> str:
     """Return what a message says of a value of any kind: one short line."""
-    if getattr(value, "size", 0) > FEW_SHOWN and hasattr(value, "dtype") and hasattr(value, "shape"):
+    import numpy as np  # Commands that only print their help need none.
+
+    if isinstance(value, np.ndarray) and value.size > FEW_SHOWN:
         return f"an array of shape {value.shape} and type {value.dtype}"
     try:
         text = " ".join(repr(value).split())

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import FloatArray, IntArray
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
+from ..text import shown
 from .charts import Charts, read_charts
 from .orient import square_angle, straight_angles
 from .outline import Outlines
@@ -162,17 +163,17 @@ def _alone(outlines: Outlines, rotate: str | int) -> Packing:
 def _check(resolution: int, padding: float, margin: float, rotate: str | int, tiles: int) -> None:
     for name, count in (("resolution", resolution), ("tiles", tiles)):
         if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or count < 1:
-            raise OptionError(f"{name} must be a whole number from 1, not {count!r}")
+            raise OptionError(f"{name} must be a whole number from 1, not {shown(count)}")
     for name, texels in (("padding", padding), ("margin", margin)):
         is_number = isinstance(texels, (int, float, np.number)) and not isinstance(texels, bool)
         if not is_number or not 0 <= texels < math.inf:
-            raise OptionError(f"{name} must be a number of texels, 0 or more, not {texels!r}")
+            raise OptionError(f"{name} must be a number of texels, 0 or more, not {shown(texels)}")
     if isinstance(rotate, int) and not isinstance(rotate, bool):
         if not 1 <= rotate <= MOST_TURNS:
             raise OptionError(f"rotate must be from 1 to {MOST_TURNS} turns, not {rotate}")
     elif not isinstance(rotate, str) or rotate not in ROTATIONS:
         raise OptionError(
-            f"unknown rotate {rotate!r}: choose from {', '.join(ROTATIONS)}, or a number of turns"
+            f"unknown rotate {shown(rotate)}: choose from {', '.join(ROTATIONS)}, or a number of turns"
         )
     if 2 * margin >= resolution:
         raise OptionError(f"margins of {margin:g} texels leave nothing of a texture of {resolution} texels")

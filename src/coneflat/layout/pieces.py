@@ -163,11 +163,13 @@ class _Polygons:
         """Return (p,) height over longest side of the triangle of three corners, the least in plane and space."""
         one, two, three = np.moveaxis(self.point[:, triple], 1, 0)
         a, b = _vectors(self.shape, one, two), _vectors(self.shape, one, three)
-        plane = (np.conj(a) * b).imag / np.max([np.abs(a), np.abs(b), np.abs(b - a)], axis=0) ** 2
+        longest = np.max([np.abs(a), np.abs(b), np.abs(b - a)], axis=0)
+        # Where all corners are one point, there is no height.
+        plane = (np.conj(a) * b).imag / np.maximum(longest**2, np.finfo(float).tiny)
         one, two, three = np.moveaxis(positions[self.vertex[:, triple]], 1, 0)
         u, v = two - one, three - one
         longest = np.max([(w * w).sum(axis=1) for w in (u, v, v - u)], axis=0)
-        space = np.linalg.norm(np.cross(u, v), axis=1) / longest
+        space = np.linalg.norm(np.cross(u, v), axis=1) / np.maximum(longest, np.finfo(float).tiny)
         least: FloatArray = np.minimum(plane, space)
         return least
 
