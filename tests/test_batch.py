@@ -238,8 +238,23 @@ def test_a_link_that_leads_nowhere_is_one_failed_mesh(models, tmp_path):
     assert result.exit_code == 1
     assert "2 of 5 meshes are flattened; 3 failed" in result.output
     rows = rows_of(out / "summary.csv")
-    assert "there is no such file" in rows["nowhere.obj"]["error"]
+    assert "there is no such file: it is a link that leads nowhere" in rows["dangling.obj"]["error"]
     assert "symbolic links" in rows["loop.obj"]["error"]
+
+
+def test_results_have_the_names_of_links_not_of_the_store_that_these_lead_to(models, tmp_path):
+    """Version control of large files keeps contents under their checksums, with links by name beside."""
+    (tmp_path / "store").mkdir()
+    (models / "hill.obj").rename(tmp_path / "store" / "0a1b2c")
+    (models / "hill.obj").symlink_to(tmp_path / "store" / "0a1b2c")
+    (models / "again.obj").symlink_to(models / "ball.obj")
+    out = tmp_path / "out"
+    invoke("batch", models, "--out", out, "--jobs", 1)
+    rows = rows_of(out / "summary.csv")
+    assert rows["hill.obj"]["status"] == "done"
+    assert (out / "hill.obj").is_file()
+    assert rows["ball.obj"]["status"] == "done"
+    assert "again.obj" not in rows, "a file counts once, by its own name"
 
 
 def test_a_mesh_that_vanishes_meanwhile_is_one_failed_mesh(models, tmp_path):

@@ -15,7 +15,7 @@ import pytest
 import shapes
 
 from coneflat import errors, read_mesh
-from coneflat.cli.given import parse_curvature, parse_vertices
+from coneflat.cli.given import parse_angle, parse_curvature, parse_vertices
 
 #: A line of progress, which comes by the clock.
 PROGRESS = re.compile(r" *\d+\.\d s +\d+%  .*")
@@ -97,6 +97,7 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "--report", "missing/x.json"], "missing"),
         (["model.obj", "--texture", "checker"], "only .glb files carry a texture"),
         (["model.obj", "-o", "x.glb", "--texture", "none.png"], "none.png: there is no such file"),
+        (["."], "coneflat batch"),
         (["model.obj", "-o", "x.glb", "--texture", "text.ply"], "text.ply is not a readable image"),
         (["model.obj", "-o", "model.obj"], "is the input and the output"),
         (["model.obj", "-o", "z.obj", "--report", "model.obj"], "is the input and the report"),
@@ -163,6 +164,11 @@ def test_curvatures_as_people_write_them(text, value):
 def test_what_is_no_curvature(text):
     with pytest.raises(errors.OptionError, match="here"):
         parse_curvature(text, "here")
+
+
+def test_what_is_no_angle_is_said_once():
+    with pytest.raises(errors.OptionError, match="^'40dog' is no angle; write"):
+        parse_angle("40dog")
 
 
 def test_cones_named_twice():

@@ -192,6 +192,10 @@ class TestCommand:
             (("ball.obj", "-o", "none/x.png"), "there is no folder"),
             (("ball.obj", "--eye", "front"), "--kind layout takes no --eye: only checker"),
             (("ball.obj", "--kind", "curve", "--color-charts"), "takes no --color-charts"),
+            (
+                ("ball.obj", "--kind", "curve", "--again"),
+                "only layout, checker, quality, cones, curvature do",
+            ),
             (("ball.obj", "--kind", "cones", "--eye", "1,2"), "three numbers"),
             (("ball.obj", "--kind", "cones", "--eye", "1,x,2"), "'1,x,2' is no direction"),
             (("ball.obj", "--dpi", "9000"), "between 10 and 2400"),

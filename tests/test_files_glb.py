@@ -224,7 +224,7 @@ class TestLosses:
         *_, copies, painted = rich[1].as_written(".glb").notes
         assert copies == "Meshes that several nodes show have UVs of their own for each: 1 more of them."
         assert painted == "Textures are kept, but were made for the old UVs: those of 1 material."
-        assert rich[1].as_written(".ply") is rich[1]
+        assert rich[1].as_written(".npz") is rich[1]
 
 
 class TestFilesBeside:

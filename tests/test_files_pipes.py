@@ -11,7 +11,7 @@ from shapes import hill
 
 import coneflat
 from coneflat.cli.main import cli
-from coneflat.errors import UnknownFormatError
+from coneflat.errors import EmptyMeshError, MeshFileError, UnknownFormatError
 from coneflat.io import INPUT_FORMATS, read_mesh, read_mesh_from, write_stream
 
 trimesh = pytest.importorskip("trimesh")
@@ -91,7 +91,7 @@ def test_a_format_names_the_file_that_is_not_named(contents, tmp_path, monkeypat
     assert "out.obj is no .glb file" in ran.stderr
 
 
-@pytest.mark.parametrize(("content", "reason"), [(b"", "- is empty"), (b"hello\n", "- has no vertices")])
+@pytest.mark.parametrize(("content", "reason"), [(b"", "nothing came in"), (b"hello\n", "- has no vertices")])
 def test_what_is_no_mesh_is_refused(content, reason):
     ran = piped(content, "-", "-o", "-")
     assert ran.exit_code != 0
@@ -108,3 +108,28 @@ def test_streams_need_a_known_ending():
         read_mesh_from(b"v 0 0 0", "a", ending=".xyz")
     write_stream(result, stream, ".OBJ")
     assert stream.getvalue().count(b"\nf ") == 32
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["flatten", "hill.off", "-o", "flat.obj", "--report", "-"],
+        ["cones", "hill.off", "-o", "-"],
+        ["measure", "hill.off", "--report", "-"],
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_what_is_no_mesh_goes_into_no_file_of_the_pipes_name(contents, tmp_path, monkeypatch, arguments):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hill.off").write_bytes(contents[".off"])
+    ran = CliRunner().invoke(cli, arguments)
+    assert isinstance(ran.exception, MeshFileError)
+    assert "name a file" in str(ran.exception)
+    assert not (tmp_path / "-").exists()
+
+
+@pytest.mark.parametrize("command", ["flatten", "measure"])
+def test_a_pipe_that_brings_nothing_is_told(command):
+    ran = CliRunner().invoke(cli, [command, "-"], input=b"\n")
+    assert isinstance(ran.exception, EmptyMeshError)
+    assert str(ran.exception) == "nothing came in on standard input"

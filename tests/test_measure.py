@@ -132,6 +132,10 @@ class TestKnownAnswers:
         found = measure_uv(written(tmp_path, text + "f 1/1 2/2 3/3\nf 1/1 3/3 4/5\n")).report()
         assert (found["corners_not_finite"], found["triangles_without_uv"]) == (1, 1)
         assert "not finite" in found["notes"][0]
+        found = measure_uv(written(tmp_path, text + "f 1/1 2/2 3/3\nf 1/1 2/2 3\nf 1/1 3/3 4/5\n")).report()
+        assert found["notes"][0] == (
+            "1 corner with no UV and 1 corner with a UV that is not finite: 2 triangles left out of the measures."
+        )
 
     @pytest.mark.parametrize("turns", [1, 2])
     def test_winding_around_a_point_is_an_angle_error(self, turns):

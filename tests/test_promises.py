@@ -88,6 +88,16 @@ def test_a_point_out_of_place_is_named():
     assert "angles do not sum" in notes
 
 
+def test_a_triangle_without_area_is_named_and_where():
+    result = flatten(*shapes.grid(4, 3))
+    uv = result.uv.copy()
+    uv[result.uv_faces[0]] = uv[result.uv_faces[0, 0]]
+    bad = spoiled(result, uv)
+    assert (bad.distortion.flipped, bad.distortion.degenerate) != (0, 0)
+    note = broken_promises(bad)[0]
+    assert f"{bad.distortion.degenerate} triangles without area in the plane" in note
+
+
 def test_a_vertex_that_triangles_go_around_twice_is_off_by_a_full_turn():
     """A fan whose triangles are all upright, and wind twice around the hub."""
     count = 24

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 import shapes
 from click.testing import CliRunner
@@ -101,3 +102,17 @@ def test_lines_come_a_second_apart_if_it_takes_long(capsys, monkeypatch):
         for now[0] in (5.0, 5.5):
             console.progress(f"step {now[0]}", now[0] / 6)
     assert re.findall(r"step (\S+)", capsys.readouterr().err) == ["1.9", "3.1", "4.3", "5.5"]
+
+
+def test_what_a_note_says_is_said_once(folder):
+    """Of a fan so steep that triangles are upside down, and angles far from kept."""
+    angle = 2 * np.pi * np.arange(24) / 24
+    heights = 6 * np.random.default_rng(3).standard_normal(24)
+    rim = zip(np.cos(angle), np.sin(angle), heights, strict=True)
+    lines = ["v 0 0 0", *(f"v {x} {y} {z}" for x, y, z in rim)]
+    lines += [f"f 1 {2 + i} {2 + (i + 1) % 24}" for i in range(24)]
+    (folder / "fan.obj").write_text("\n".join(lines))
+    out = run(("flatten", "fan.obj", "-o", "flat.obj")).stdout
+    assert len(re.findall("^note: There are .* triangles upside down in the plane", out, re.MULTILINE)) == 1
+    assert len(re.findall("mean QC distortion", out)) == 1
+    assert "warning" not in out

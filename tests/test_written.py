@@ -202,3 +202,33 @@ def test_notes_of_a_file_are_those_of_its_numbers():
     assert written.distortion.flipped + written.distortion.degenerate > 0
     assert any("triangles upside down" in note or "without area" in note for note in written.notes)
     assert not result.as_written(".glb").notes
+
+
+def notes_of(path, ending):
+    out = path.with_name(f"out{ending}")
+    return write_measured(flatten(path), out).notes
+
+
+def test_notes_name_what_another_format_does_not_keep(tmp_path):
+    vertices, faces = shapes.sphere(1)
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    lines = [*(f"v {x} {y} {z}" for x, y, z in vertices), "usemtl skin"]
+    lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]
+    (tmp_path / "painted.obj").write_text("\n".join(lines))
+    mesh.visual = trimesh.visual.TextureVisuals(
+        material=trimesh.visual.material.PBRMaterial(name="skin", baseColorFactor=[1.0, 0.0, 0.0, 1.0])
+    )
+    (tmp_path / "scene.glb").write_bytes(trimesh.Scene([mesh]).export(file_type="glb"))
+    mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=np.full((len(vertices), 4), 9, np.uint8))
+    mesh.export(tmp_path / "coloured.ply")
+    mesh.export(tmp_path / "coloured.obj", include_color=True)
+    told = {
+        "painted.obj": "Groups and materials of the file are not kept in",
+        "scene.glb": "Nodes, materials and textures of the file are not kept in",
+        "coloured.ply": "Vertex colours of the file are not kept in",
+        "coloured.obj": "Vertex colours of the file are not kept in",
+    }
+    for name, note in told.items():
+        for ending in (".obj", ".ply", ".glb", ".npz"):
+            keeps = ending == ".npz" or (name.endswith(ending) and name != "coloured.ply")
+            assert any(f"{note} {ending}" in each for each in notes_of(tmp_path / name, ending)) != keeps

@@ -107,10 +107,7 @@ def _upright(result: Flattening) -> Iterator[str]:
     measures = result.distortion
     parts = [
         plural(count, f"triangle {what}", f"triangles {what}")
-        for count, what in (
-            (measures.flipped, "upside down in the plane"),
-            (measures.degenerate, "without area there"),
-        )
+        for count, what in ((measures.flipped, "upside down"), (measures.degenerate, "without area"))
         if count
     ]
     if parts:
@@ -119,14 +116,15 @@ def _upright(result: Flattening) -> Iterator[str]:
         )
         verb, broken = "is" if parts[0].startswith("1 ") else "are", result.solve.broken
         why = f" ({plural(broken, 'triangle')} broke the triangle inequality in the metric)" if broken else ""
-        yield f"There {verb} {' and '.join(parts)}{why}: {advice}."
+        yield f"There {verb} {' and '.join(parts)} in the plane{why}: {advice}."
 
 
 def _apart(result: Flattening) -> Iterator[str]:
     measures = result.distortion
     if result.settings.get("charts") == "atlas" and measures.overlapping_pairs:
         pairs = plural(measures.overlapping_pairs, "pair")
-        yield f"{pairs} of triangles overlap in the atlas, {measures.overlap:.2g} of the area that it covers."
+        verb = "overlaps" if measures.overlapping_pairs == 1 else "overlap"
+        yield f"{pairs} of triangles {verb} in the atlas, {measures.overlap:.2g} of the area that it covers."
 
 
 def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:

@@ -265,13 +265,10 @@ def _cover(corner_uv: FloatArray) -> _Cover:
 
 def _notes(mapped: Mapped, checked: CheckedMesh) -> tuple[str, ...]:
     """Return what is left out of the measures."""
-    notes = []
-    for count, what in ((mapped.without, "no UV"), (mapped.not_finite, "a UV that is not finite")):
-        if count:
-            triangles = int(np.count_nonzero(~mapped.has_uv))
-            notes.append(
-                f"{plural(count, 'corner')} with {what}: {plural(triangles, 'triangle')} left out of the measures."
-            )
+    corners = ((mapped.without, "no UV"), (mapped.not_finite, "a UV that is not finite"))
+    why = " and ".join(f"{plural(count, 'corner')} with {what}" for count, what in corners if count)
+    triangles = plural(int(np.count_nonzero(~mapped.has_uv)), "triangle")
+    notes = [f"{why}: {triangles} left out of the measures."] if why else []
     repairs = [note for note in checked.notes if note != left_out_of(mapped, checked)]
     if repairs:
         notes.append(f"Measured on a mesh in which this was done first: {' '.join(repairs)}")

@@ -59,11 +59,15 @@ def find_jobs(
         OptionError: a pattern matches nothing, or a result would overwrite a mesh.
         MeshFileError: a folder cannot be read.
     """
-    found: dict[str, None] = {}
+    # A file counts once, by its own name or, where only links to it are given, by the first of these: stores name
+    # their files by checksums.
+    found: dict[str, str] = {}
     for pattern in patterns:
         for path in find_meshes(pattern):
-            found[os.path.realpath(path)] = None
-    meshes = sorted(found)
+            real, name = os.path.realpath(path), os.path.abspath(path)
+            if real == name or real not in found:
+                found[real] = name
+    meshes = sorted(found.values())
     jobs = [
         Job(mesh, str(folder / name), options, weld, _mark(mesh, options, weld, required), required)
         for mesh, name in zip(meshes, _names(meshes, ending), strict=True)

@@ -114,7 +114,7 @@ def parse_angle(text: str) -> float:
     Raises:
         OptionError: it is none of these.
     """
-    return parse_curvature(text, "an angle", "angle")
+    return parse_curvature(text, "", "angle")
 
 
 def parse_curvature(text: str, where: str, noun: str = "curvature") -> float:
@@ -123,15 +123,16 @@ def parse_curvature(text: str, where: str, noun: str = "curvature") -> float:
     Raises:
         OptionError: it is none of these.
     """
+    place = f"{where}: " if where else ""
     match = _CURVATURE.fullmatch(text.strip())
     number = match["number"] if match else ""
     unit = match["unit"].lower() if match and match["unit"] else None
     if match is None or (number in ("", "+", "-") and unit not in ("pi", "π")):
-        raise OptionError(f"{where}: {text.strip()!r} is no {noun}; write 1.57, pi/2, -0.5pi or 90deg")
+        raise OptionError(f"{place}{text.strip()!r} is no {noun}; write 1.57, pi/2, -0.5pi or 90deg")
     factor = float(number + "1" if number in ("", "+", "-") else number)
     divisor = float(match["by"] or 1)
     if divisor == 0:
-        raise OptionError(f"{where}: division by zero")
+        raise OptionError(f"{place}division by zero")
     return factor * _UNITS[unit] / divisor
 
 

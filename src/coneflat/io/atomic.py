@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from ..errors import ConeflatError, MeshFileError, UnknownFormatError
+from .raw import PIPE
 
 
 def as_path(path: object) -> Path:
@@ -46,10 +47,12 @@ def check_target(path: str | PathLike[str]) -> Path:
     """Return the file that a path names, links followed, if it looks as if it could be written.
 
     Raises:
-        MeshFileError: the folder is missing, or the path is something other than a file, or writing is not
+        MeshFileError: the folder is missing, or the path is a pipe or something else than a file, or writing is not
             permitted.
     """
     path = as_path(path)
+    if path == PIPE:
+        raise MeshFileError("- is a pipe, to which only `coneflat flatten` writes its result: name a file")
     try:
         target = Path(os.path.realpath(path))
         folder = target.parent

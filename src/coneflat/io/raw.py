@@ -67,7 +67,8 @@ def read_bytes(path: Path) -> bytes:
     except ConeflatError:
         raise
     except FileNotFoundError as error:
-        raise MeshFileError(f"{path}: there is no such file") from error
+        why = ": it is a link that leads nowhere" if path.is_symlink() else ""
+        raise MeshFileError(f"{path}: there is no such file{why}") from error
     except IsADirectoryError as error:
         raise MeshFileError(f"{path} is a folder, not a file") from error
     except PermissionError as error:
@@ -86,15 +87,19 @@ def read_input() -> bytes:
 
     Raises:
         MeshFileError: that is a terminal, or cannot be read.
+        EmptyMeshError: nothing comes in.
     """
     if sys.stdin is None or sys.stdin.isatty():
         raise MeshFileError(
             "- stands for a mesh on standard input, and there is none: pipe a file into the command"
         )
     try:
-        return sys.stdin.buffer.read()
+        content = sys.stdin.buffer.read()
     except OSError as error:
         raise MeshFileError(f"standard input cannot be read: {error.strerror or error}") from error
+    if not content or content.isspace():
+        raise EmptyMeshError("nothing came in on standard input")
+    return content
 
 
 def check_corners(path: Path, mesh: RawMesh) -> None:

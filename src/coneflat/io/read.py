@@ -62,6 +62,10 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
     path = as_path(path)
     if path == PIPE:
         return read_mesh_from(read_input(), path, weld)
+    if path.is_dir():
+        raise MeshFileError(
+            f"{path} is a folder, not a file; `coneflat batch` flattens all meshes in a folder"
+        )
     ending = known_ending(path, INPUT_FORMATS, "meshes are read from")
     return read_mesh_from(read_bytes(path), path, weld, ending)
 

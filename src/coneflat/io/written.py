@@ -14,6 +14,7 @@ from ..polygons import polygon_of
 from ..promises import DOUBLE, SINGLE, remeasured
 from ..text import plural
 from .gltf_write import scene_losses
+from .left_out import left_out
 from .pieces import find_pieces
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ def as_written(result: Flattening, ending: str) -> Flattening:
 
     A .glb has 32-bit numbers, v from the top down; what rounding made of touching triangles is parted. An .obj has
     polygons, which are measured as the fans of triangles that others read. A .ply and an .npz hold what there is.
+    Notes name what a format does not keep of the input.
 
     Args:
         result: what is written.
@@ -39,13 +41,14 @@ def as_written(result: Flattening, ending: str) -> Flattening:
     Raises:
         MeshFileError: the file cannot hold numbers so large.
     """
+    stored, lost = result, left_out(result, ending)
     if ending == ".glb":
         stored = _in_single_precision(result)
-        lost = [note for note in scene_losses(stored) if note not in stored.notes]
-        return replace(stored, notes=(*stored.notes, *lost)) if lost else stored
-    if ending == ".obj" and result.source is not None and result.face_corners is not None:
-        return _in_fans(result, result.source.offsets, result.face_corners)
-    return result
+        lost = (*lost, *scene_losses(stored))
+    elif ending == ".obj" and result.source is not None and result.face_corners is not None:
+        stored = _in_fans(result, result.source.offsets, result.face_corners)
+    lost = tuple(note for note in lost if note not in stored.notes)
+    return replace(stored, notes=(*stored.notes, *lost)) if lost else stored
 
 
 def _in_single_precision(result: Flattening) -> Flattening:
