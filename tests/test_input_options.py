@@ -323,3 +323,14 @@ def test_seams_of_a_ply_are_kept(tmp_path, monkeypatch):
     again = coneflat.read_flattening("again.npz")
     middles = [np.sort(each.vertices[each.seams].mean(axis=1), axis=0) for each in (first, again)]
     np.testing.assert_allclose(*middles, atol=1e-12)
+
+
+@pytest.mark.parametrize("command", ["view", "figure"])
+def test_uvs_beyond_what_can_be_shown_are_refused_in_a_line(command, tmp_path):
+    path = tmp_path / "far.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1e300 0\nvt 0 1e300\nf 1/1 2/2 3/3\n")
+    output = tmp_path / ("out.html" if command == "view" else "out.png")
+    done = run(command, path, "-o", output)
+    assert isinstance(done.exception, errors.MeshFileError)
+    assert "UVs of up to 1e+300 are too large to be shown" in str(done.exception)
+    assert not output.exists()

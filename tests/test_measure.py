@@ -14,7 +14,7 @@ from click.testing import CliRunner
 import coneflat
 from coneflat import MeshFile, errors, measure_uv
 from coneflat.cli.main import cli
-from coneflat.mapped import fan_corners
+from coneflat.polygons import fan_corners
 from coneflat.uvs import MEASURED
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"

@@ -130,6 +130,21 @@ def test_overlaps_in_an_atlas_are_told_whatever_the_method(method):
     assert told == bool(result.distortion.overlapping_pairs)
 
 
+@pytest.mark.parametrize("unit", [2.0**-53, 2.0**-24])
+def test_a_side_without_length_hides_no_seams_whose_sides_differ(unit):
+    """What rounding may do is counted at each seam for itself."""
+    result = flatten(*shapes.sphere(2), charts="atlas")
+    uv = result.uv * [1.4, 1.0]
+    corners = result.uv_faces
+    inner = ~TriangleMesh(uv, corners).is_boundary_vertex
+    face = np.flatnonzero(inner[corners].all(axis=1))[0]
+    uv[corners[face, 0]] = uv[corners[face, 1]]
+    mesh = TriangleMesh(result.vertices, result.faces)
+    torn = replace(result, uv=uv, distortion=measure(mesh, uv[corners], prescribed=result.prescribed))
+    assert torn.distortion.seam_mismatch_max > 0.01
+    assert any("two sides of seams differ" in note for note in broken_promises(torn, unit))
+
+
 def test_arrays_that_do_not_fit_the_mesh_are_refused():
     """Compiled loops would write beyond their ends."""
     vertices, faces = shapes.grid(4, 3)

@@ -10,7 +10,8 @@ from coneflat import TriangleMesh, cut_open, find_seams
 from coneflat.conformal.exact import exact_metric
 from coneflat.geometry import edge_lengths
 from coneflat.geometry.intrinsic import halfedge_twins
-from coneflat.layout.patches import DEGENERATE, heights
+from coneflat.geometry.planar import heights
+from coneflat.layout.patches import DEGENERATE
 from coneflat.layout.straighten import FlatTriangles, straight_triangles
 from coneflat.layout.unfold import unfold
 from coneflat.layout.untangle import untangle

@@ -11,7 +11,8 @@ import shapes
 import coneflat
 from coneflat import TriangleMesh, edge_lengths
 from coneflat.conformal.exact import exact_metric
-from coneflat.layout.patches import DEGENERATE, STEPS, Patches, heights
+from coneflat.geometry.planar import heights
+from coneflat.layout.patches import DEGENERATE, STEPS, Patches
 from coneflat.layout.straighten import FlatTriangles, straight_triangles
 from coneflat.layout.untangle import LEAST_WORK, WORK, untangle
 

@@ -12,11 +12,13 @@ from coneflat import flatten
 from coneflat.atlas import find_overlaps
 from coneflat.atlas.snap import snap_apart
 from coneflat.errors import MeshFileError
-from coneflat.geometry.planar import signed_double_areas
+from coneflat.geometry.planar import heights, sides_between, signed_double_areas
 from coneflat.io.pieces import merge_convex
 from coneflat.io.write import write_measured
 from coneflat.io.written import stored_in_glb
-from coneflat.layout.convex import Polygons, heights, make_convex
+from coneflat.layout.convex import make_convex
+from coneflat.mesh import TriangleMesh
+from coneflat.polygons import Polygons
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -88,10 +90,10 @@ def test_a_quad_that_the_plane_makes_concave_is_made_convex_again():
     space = np.concatenate([points, np.zeros((16, 1))], axis=1)[uv_faces]
     pulled = points.copy()
     pulled[6] = [1.5, 1.6]
-    assert (heights(pulled, uv_faces) > 0).all()
+    assert (heights(sides_between(pulled[uv_faces])) > 0).all()
     mended = make_convex(pulled, uv_faces, polygons, space)
     triples, _ = polygons.corner_triples(polygons.points(uv_faces))
-    assert heights(pulled, triples).min() < 0 < heights(mended, triples).min()
+    assert heights(sides_between(pulled[triples])).min() < 0 < heights(sides_between(mended[triples])).min()
     moved = np.flatnonzero((mended != pulled).any(axis=1))
     assert set(moved) <= {5, 6, 9, 10}
 
@@ -134,6 +136,24 @@ def test_measures_of_a_glb_are_those_of_its_32_bit_numbers(tmp_path):
     assert (signed_double_areas(uv) > 0).all()
     assert written.distortion.qc_mean != result.distortion.qc_mean
     assert written.as_written(".glb") is written
+
+
+def test_marked_seams_of_an_obj_turn_freely_whatever_its_diagonals(tmp_path):
+    """The report names seams that the quantum binds: edges of the fans are others than those of our triangles."""
+    vertices, faces = quads(2, 0.05)
+    write_quads(tmp_path / "in.obj", vertices, faces)
+    # All around the quads of one triangle of the ball.
+    sides = {(a, b) for row in faces[:3].tolist() for a, b in zip(row, row[1:] + row[:1], strict=True)}
+    ring = np.array(sorted((a, b) for a, b in sides if (b, a) not in sides))
+    result = flatten(tmp_path / "in.obj", seams=ring, quantum=np.pi / 2, charts="atlas")
+    written = result.as_written(".obj")
+    edges, others = (
+        set(map(tuple, TriangleMesh(vertices, one.faces).edges.tolist())) for one in (result, written)
+    )
+    assert edges != others
+    assert result.rotations.worst < 1e-9
+    assert written.rotations.worst < 1e-9
+    assert not any("quantum" in note for note in written.notes)
 
 
 def test_charts_that_touch_are_apart_in_single_precision():

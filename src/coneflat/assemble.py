@@ -13,10 +13,11 @@ from .atlas import part_touching
 from .atlas.arrange import arrange_charts
 from .distortion import curvature_errors, measure
 from .figures import SolveFigures
-from .layout.convex import Polygons, make_convex
+from .layout.convex import make_convex
 from .mesh import TriangleMesh
 from .numbering import result_numbering, turn_corners
 from .options import CONED, Options
+from .polygons import Polygons
 from .promises import broken_promises
 from .result import Flattening
 from .rotations import Rotations, measure_rotations

@@ -18,6 +18,7 @@ from .geometry.areas import area_distortion, weighted_areas
 from .options import Options
 from .prepare import Component, prepare
 from .stages import Progress, Stages
+from .text import shown
 from .threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -137,9 +138,7 @@ def cone_curve(
     """
     is_number = isinstance(most, (int, float, np.integer, np.floating)) and not isinstance(most, bool)
     if not is_number or not float(most).is_integer() or most < 1:
-        raise OptionError(
-            f"the largest number of cones must be a whole number from 1, not {' '.join(repr(most).split())[:80]}"
-        )
+        raise OptionError(f"the largest number of cones must be a whole number from 1, not {shown(most)}")
     options = Options(
         min_cone_angle=min_cone_angle,
         max_cone_angle=max_cone_angle,

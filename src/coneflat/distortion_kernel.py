@@ -100,10 +100,11 @@ def sum_angles(faces: IntArray, corner_uv: FloatArray, count: int) -> tuple[Floa
     """Return (n,) the sum of the angles in the plane around each vertex, and by what a rounded point changes it.
 
     Angles are those of the triangles' shapes, whichever way these are turned, so a vertex that its triangles go
-    around twice has 4 pi. The change is in radians per unit that points are off by.
+    around twice has 4 pi. Where a side has no length there is no angle. The change is in radians per unit that points
+    are off by, infinite beside such a side.
 
     Args:
-        faces: (m, 3).
+        faces: (m, 3) the vertices, or whatever else angles are to be summed up at.
         corner_uv: (m, 3, 2).
         count: n.
     """
@@ -112,6 +113,10 @@ def sum_angles(faces: IntArray, corner_uv: FloatArray, count: int) -> tuple[Floa
         for i in range(3):
             at, one, two = corner_uv[f, i], corner_uv[f, (i + 1) % 3], corner_uv[f, (i + 2) % 3]
             u1, v1, u2, v2 = one[0] - at[0], one[1] - at[1], two[0] - at[0], two[1] - at[1]
-            sums[faces[f, i]] += abs(math.atan2(u1 * v2 - v1 * u2, u1 * u2 + v1 * v2))
-            change[faces[f, i]] += 1.0 / math.hypot(u1, v1) + 1.0 / math.hypot(u2, v2)
+            length1, length2 = math.hypot(u1, v1), math.hypot(u2, v2)
+            change[faces[f, i]] += 1.0 / length1 + 1.0 / length2
+            if length1 > 0.0 and length2 > 0.0:
+                # Of sides of length one, lest products of tiny or huge ones are no numbers.
+                u1, v1, u2, v2 = u1 / length1, v1 / length1, u2 / length2, v2 / length2
+                sums[faces[f, i]] += abs(math.atan2(u1 * v2 - v1 * u2, u1 * u2 + v1 * v2))
     return sums, change

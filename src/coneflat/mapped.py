@@ -15,6 +15,7 @@ from .errors import ArrayShapeError, MissingUVError
 from .inputs import as_input
 from .io.join import Joined, read_joined
 from .io.model import MeshFile
+from .polygons import fan_corners
 from .validation import as_faces
 
 if TYPE_CHECKING:
@@ -105,17 +106,6 @@ def of_file(joined: Joined) -> Mapped:
 def has_uv(mesh: MeshFile) -> bool:
     """Return whether a file gives any corner a UV."""
     return mesh.uv is not None and mesh.texture is not None and bool((mesh.texture >= 0).any())
-
-
-def fan_corners(offsets: IntArray) -> IntArray:
-    """Return (m, 3) the corners of the triangles that polygons fall into, all from the first corner of each.
-
-    offsets: (p + 1,) where the corners of each polygon begin.
-    """
-    counts = np.diff(offsets) - 2
-    first = np.repeat(offsets[:-1], counts)
-    step = np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
-    return np.stack([first, first + step + 1, first + step + 2], axis=1)
 
 
 def _of_result(result: Flattening) -> Mapped:

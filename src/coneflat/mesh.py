@@ -27,6 +27,17 @@ def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int,
     return int(number), labels
 
 
+def label_faces(faces: IntArray, count: int) -> tuple[int, IntArray]:
+    """Return how many sets of points hang together, and (m,) the set of each triangle: the charts, in the plane.
+
+    Args:
+        faces: (m, 3) indices of points.
+        count: of all points; those of no triangle are sets of their own.
+    """
+    number, labels = label_components(count, faces[:, :2].reshape(-1), np.repeat(faces[:, 2], 2))
+    return number, labels[faces[:, 0]]
+
+
 def sort_by_counting(keys: IntArray, bound: int) -> IntArray:
     """Return the stable order of integers from 0 up to a bound, in linear time."""
     # To turn rows into columns, SciPy counts.

@@ -50,7 +50,6 @@ PURSUIT_FIELDS = (
     "quantum",
 )
 
-
 Cones = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
 Boundary = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
 

@@ -11,20 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import BoolArray, FloatArray, IntArray
+from ._arrays import FloatArray, IntArray
 from .assemble import assemble
 from .choose import DEARER, Surface, Turned, choose_cones, is_riddled, pursues
 from .cones import ConeSolution
-from .conformal.boundary import prescribed_boundary, straight_boundary
 from .conformal.turning import open_turning
 from .distortion import measure
 from .errors import CurvatureError, MetricError, SeamError
 from .geometry.areas import area_distortion, weighted_areas
 from .mesh import TriangleMesh
-from .methods import ExactChoices, FlatMetric, LaidOut, exact_flattening, linear_flattening
+from .methods import LaidOut
 from .methods.exact import ExactFlatMetric
-from .methods.handles import corrected_flattening
-from .methods.others import other_method
+from .metric import find_metric
 from .options import UNFOLDED, Boundary, Cones, Options
 from .prepare import Component, Prepared, prepare
 from .result import Flattening
@@ -370,47 +368,3 @@ def _cut(part: Component, solution: ConeSolution, options: Options) -> tuple[Tri
     costs, avoided, forbidden = seam_costs(part, marked)
     seams = find_seams(part.mesh, solution.cones, costs, avoided, forbidden=np.flatnonzero(forbidden))
     return cut_open(part.mesh, seams).mesh, seams
-
-
-def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, options: Options) -> FlatMetric:
-    """Return the flat metric that the options name."""
-    mesh, lengths = surface.mesh, surface.lengths
-    if options.method == "linear":
-        return linear_flattening(mesh, lengths, solution, options.length_rule)
-    if options.method != "exact":
-        return other_method(options.method)(mesh, lengths, solution, options.best_effort)
-    boundary = None
-    if mesh.is_boundary_vertex.any():
-        if options.boundary_kind == "straight":
-            boundary = straight_boundary(mesh, solution.target)
-        elif options.boundary_kind == "disk" or len(wishes.corners):
-            boundary = prescribed_boundary(
-                mesh,
-                lengths,
-                float(solution.curvatures.sum()),
-                wishes.corners.vertices,
-                wishes.corners.curvatures,
-                wishes.names,
-            )
-    choices = ExactChoices(
-        scale_at_cones=options.scale_at_cones,
-        boundary=boundary,
-        kept=_kept_boundary(mesh, wishes, options),
-        # Both sides of a marked seam are to have the same length.
-        keep_area=options.boundary_kind != "lengths" and not options.marks_seams,
-        best_effort=options.best_effort,
-        refine=options.refine,
-        names=wishes.names,
-    )
-    if options.correct_handles and options.quantum is not None and mesh.genus():
-        return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantum)
-    return exact_flattening(mesh, lengths, solution, choices)
-
-
-def _kept_boundary(mesh: TriangleMesh, wishes: Wishes, options: Options) -> BoolArray:
-    """Return (n,) the boundary vertices between which lengths stay: on marked seams, so that both sides are equal."""
-    if options.boundary_kind == "lengths":
-        return mesh.is_boundary_vertex
-    if wishes.on_marks is None:
-        return np.zeros(len(mesh.vertices), dtype=bool)
-    return mesh.is_boundary_vertex & wishes.on_marks

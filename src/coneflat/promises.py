@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ._arrays import ComplexArray
 from .atlas.overlap import Overlaps
 from .distortion import angle_sum_errors, measure_at_any_size
-from .mesh import NEXT, PREVIOUS, TriangleMesh
+from .geometry.planar import sides_between
+from .mesh import TriangleMesh
 from .options import UNFOLDED
 from .rotations import Rotations, seam_rotations
 from .text import plural
@@ -88,12 +88,13 @@ def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
     before = result.rotations
     if before is None:
         return None
+    old, new = (TriangleMesh(each.vertices, each.faces) for each in (result, changed))
     off, after = (
-        seam_rotations(each.vertices, each.faces, each.corner_uv, before.quantum)
-        for each in (result, changed)
+        seam_rotations(mesh, each.corner_uv, before.quantum) for mesh, each in ((old, result), (new, changed))
     )
-    # Seams that were marked, or are between components, turn freely.
-    bound = off <= before.worst * (1 + 1e-6) + 1e-12
+    # Polygons may have other diagonals: edges are told by their ends.
+    known, names = (mesh.edges[~mesh.is_boundary_edge] @ [len(result.vertices), 1] for mesh in (old, new))
+    bound = ~np.isin(names, known[~before.binds(off)])
     return replace(before, worst=float(after[bound].max(initial=0.0)))
 
 
@@ -113,7 +114,9 @@ def _upright(result: Flattening) -> Iterator[str]:
         advice = (
             "refine (--refine), which cannot invert any" if _is_exact(result) else "--method exact has fewest"
         )
-        yield f"There {'is' if parts[0].startswith('1 ') else 'are'} {' and '.join(parts)} in the plane: {advice}."
+        verb, broken = "is" if parts[0].startswith("1 ") else "are", result.solve.broken
+        why = f" ({plural(broken, 'triangle')} broke the triangle inequality in the metric)" if broken else ""
+        yield f"There {verb} {' and '.join(parts)} in the plane{why}: {advice}."
 
 
 def _apart(result: Flattening) -> Iterator[str]:
@@ -148,7 +151,7 @@ def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
     if not result.distortion.seam_mismatch_max > most:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
-    one, two = np.abs(_sides(result))[mesh.edge_halfedges[~mesh.is_boundary_edge]].T
+    one, two = np.abs(sides_between(result.corner_uv)).ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]].T
     off, mean = np.abs(one - two), (one + two) / 2
     beyond = off > most * mean + ROUNDINGS * unit
     if beyond.any():
@@ -165,7 +168,7 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
     exponent = int(np.frexp(np.abs(mesh.vertices).max())[1])
     ways = np.ldexp(mesh.vertices[mesh.heads[sides]] - mesh.vertices[mesh.tails[sides]], -exponent)
     lengths = np.linalg.norm(ways, axis=1) * np.ldexp(result.uv_scale, exponent)
-    off = np.abs(np.abs(_sides(result)[sides]) - lengths)
+    off = np.abs(np.abs(sides_between(result.corner_uv).ravel()[sides]) - lengths)
     beyond = off > EXACT * lengths + ROUNDINGS * unit
     if beyond.any():
         worst = (off[beyond] / np.maximum(lengths[beyond], np.finfo(float).tiny)).max()
@@ -177,21 +180,17 @@ def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:
     if rotations is None or not rotations.worst > EXACT:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
-    shorter = np.abs(_sides(result))[mesh.edge_halfedges[~mesh.is_boundary_edge]].min(axis=1)
-    off = seam_rotations(result.vertices, result.faces, result.corner_uv, rotations.quantum)
-    # Seams that were marked, or are between components, turn freely.
-    off = np.where(off <= rotations.worst * (1 + EXACT), off, 0.0)
+    shorter = (
+        np.abs(sides_between(result.corner_uv))
+        .ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]]
+        .min(axis=1)
+    )
+    off = seam_rotations(mesh, result.corner_uv, rotations.quantum)
+    off = np.where(rotations.binds(off), off, 0.0)
     if (off * shorter > EXACT * shorter + ROUNDINGS * unit).any():
         along = np.abs(rotations.handles).max(initial=0.0) > EXACT
         advice = ", as loops along handles do: correct them (--correct-handles)" if along else ""
         yield f"Seams turn by up to {rotations.worst:.2g} rad beside multiples of the quantum{advice}."
-
-
-def _sides(result: Flattening) -> ComplexArray:
-    """Return (3m,) the vector in the plane along each half-edge."""
-    places = result.corner_uv @ np.array([1, 1j])
-    sides: ComplexArray = (places[:, PREVIOUS] - places[:, NEXT]).ravel()
-    return sides
 
 
 def _distortion(result: Flattening) -> Iterator[str]:

@@ -6,14 +6,18 @@ import math
 import os
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from .text import plural
 
 if TYPE_CHECKING:
+    from .distortion import Distortion
     from .result import Flattening
+
+#: A measure, its value, and what it means.
+Row: TypeAlias = tuple[str, str, str]
 
 MEASURES = (
     "curvature_error",
@@ -41,7 +45,7 @@ MEASURES = (
 def as_dict(result: Flattening) -> dict[str, Any]:
     """Return every measure as plain values; what is not finite becomes None, so that it is valid JSON."""
     report: dict[str, Any] = {
-        "input": _printable(result.source.path) if result.source else None,
+        "input": path_text(result.source.path) if result.source else None,
         "vertices": len(result.vertices),
         "triangles": len(result.faces),
         "cones": len(result.cones),
@@ -71,7 +75,7 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _printable(path: Path) -> str:
+def path_text(path: Path) -> str:
     """Return a path as text that is valid in any encoding, whatever bytes its name has."""
     return os.fsencode(path).decode("utf-8", "replace")
 
@@ -86,7 +90,7 @@ def _allowed(result: Flattening) -> str:
     return f"{settings['distortion']:g} allowed"
 
 
-def _rotation_rows(result: Flattening) -> list[tuple[str, str, str]]:
+def _rotation_rows(result: Flattening) -> list[Row]:
     rotations = result.rotations
     if rotations is None:
         return []
@@ -99,12 +103,12 @@ def _rotation_rows(result: Flattening) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _shown(value: float, form: str) -> str:
+def number_text(value: float, form: str) -> str:
     """Return a number as text; a word where there is none, as for the distortion of what has no area."""
     return f"{value:{form}}" if math.isfinite(value) else "unknown"
 
 
-def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
+def as_rows(result: Flattening) -> list[Row]:
     """Return (measure, value, meaning) rows of the table that the commands print."""
     d = result.distortion
     curvatures = result.curvatures / np.pi
@@ -120,53 +124,72 @@ def as_rows(result: Flattening) -> list[tuple[str, str, str]]:
             f"{solve.untangled_move:.2g} edges"
         )
     added = f"; {solve.refined_triangles:,} more by the refinement" if solve.refined_triangles else ""
+    of_map = map_rows(d)
+    if untangled:
+        of_map["flipped"] = (*of_map["flipped"][:2], untangled)
     return [
         ("triangles", f"{len(result.faces):,}", f"{len(np.unique(result.faces)):,} vertices{added}"),
         ("cones", cones, "singular vertices, and their curvatures"),
         (
             "curvature error",
-            f"{_shown(d.curvature_error, '.2e')} pi",
-            f"||target - K|| / n; worst {_shown(d.curvature_error_max, '.2e')} pi",
+            f"{number_text(d.curvature_error, '.2e')} pi",
+            f"||target - K|| / n; worst {number_text(d.curvature_error_max, '.2e')} pi",
         ),
+        of_map["QC distortion"],
+        of_map["area distortion"],
+        (
+            "of the metric",
+            number_text(solve.area_distortion, ".4f"),
+            f"the same of the metric; {number_text(solve.area_distortion_linear, '.4f')} in the linear model, of "
+            f"{_allowed(result)}",
+        ),
+        *(of_map[name] for name in ("flipped", "degenerate", "overlap", "charts")),
+        packing_row(result.packing_efficiency),
+        *(of_map[name] for name in ("texel density", "seam length", "seam mismatch")),
+        *_rotation_rows(result),
+    ]
+
+
+def map_rows(d: Distortion) -> dict[str, Row]:
+    """Return the rows of the measures of a map alone, by their names."""
+    rows = (
         (
             "QC distortion",
-            f"{_shown(d.qc_mean, '.4f')}",
-            f"1 is conformal; 95% below {_shown(d.qc_p95, '.4f')}, worst {_shown(d.qc_max, '.4g')}",
+            number_text(d.qc_mean, ".4f"),
+            f"1 is conformal; 95% below {number_text(d.qc_p95, '.4f')}, worst {number_text(d.qc_max, '.4g')}",
         ),
         (
             "area distortion",
-            f"{_shown(d.area_std, '.4f')}",
+            number_text(d.area_std, ".4f"),
             "standard deviation of the log of the scale, by area",
         ),
-        (
-            "of the metric",
-            f"{_shown(solve.area_distortion, '.4f')}",
-            f"the same of the metric; {_shown(solve.area_distortion_linear, '.4f')} in the linear model, of "
-            f"{_allowed(result)}",
-        ),
-        ("flipped", f"{d.flipped:,}", untangled or "triangles upside down"),
+        ("flipped", f"{d.flipped:,}", "triangles against the orientation of their chart"),
         (
             "degenerate",
             f"{d.degenerate:,}",
-            f"without area in the plane; {d.degenerate_input:,} had none before",
+            f"without area in the plane; {d.degenerate_input:,} have none on the model",
         ),
         (
             "overlap",
-            f"{_shown(100 * d.overlap, '.3g')} %" if d.overlapping_pairs else "none",
+            f"{number_text(100 * d.overlap, '.3g')} %" if d.overlapping_pairs else "none",
             f"of the area covered, covered twice; {plural(d.overlapping_pairs, 'pair')} of triangles",
         ),
-        ("charts", f"{d.charts:,}", "pieces of the layout"),
-        ("packing", f"{_shown(result.packing_efficiency, '.1%')}", "of the texture is covered"),
+        ("charts", f"{d.charts:,}", f"pieces of the layout; {d.mirrored_charts:,} mirrored"),
         (
             "texel density",
-            f"{_shown(d.density_spread, '.3f')}",
+            number_text(d.density_spread, ".3f"),
             "its spread: the quantile at 95% over that at 5%",
         ),
-        ("seam length", f"{_shown(d.seam_length, '.3f')}", "over the square root of the area"),
+        ("seam length", number_text(d.seam_length, ".3f"), "over the square root of the area"),
         (
             "seam mismatch",
-            f"{_shown(d.seam_mismatch, '.1e')}",
-            f"of the two sides' lengths; worst {_shown(d.seam_mismatch_max, '.1e')}",
+            number_text(d.seam_mismatch, ".1e"),
+            f"of the two sides' lengths; worst {number_text(d.seam_mismatch_max, '.1e')}",
         ),
-        *_rotation_rows(result),
-    ]
+    )
+    return {row[0]: row for row in rows}
+
+
+def packing_row(efficiency: float, tiles: str = "") -> Row:
+    """Return the row that says how much of the texture is covered; of which tiles, if there are several."""
+    return "packing", number_text(efficiency, ".1%"), f"of the texture is covered{tiles}"

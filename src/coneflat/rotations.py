@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._arrays import FloatArray, IntArray
+from ._arrays import BoolArray, FloatArray
 from .conformal.turning import off_multiple
+from .geometry.planar import sides_between
 from .mesh import TriangleMesh
 from .seams.handles import handle_loops
 
@@ -36,6 +37,10 @@ class Rotations:
         handles = tuple(angle for part in known for angle in part.handles)
         return cls(known[0].quantum, max(part.worst for part in known), handles)
 
+    def binds(self, off: FloatArray) -> BoolArray:
+        """Return which edges with these deviations are held; seams that were marked, or join components, are not."""
+        return np.asarray(off <= self.worst * (1 + 1e-6) + 1e-12)
+
 
 def measure_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> Rotations:
     """Return the rotations of a layout of a connected mesh; `corner_uv` is (m, 3, 2)."""
@@ -48,17 +53,14 @@ def measure_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float)
     return Rotations(quantum, float(off.max(initial=0.0)), tuple(handles.tolist()))
 
 
-def seam_rotations(
-    vertices: FloatArray, faces: IntArray, corner_uv: FloatArray, quantum: float
-) -> FloatArray:
-    """Return how far the rotation across each inner edge is from a multiple of a quantum, radians."""
-    return np.abs(off_multiple(_turns(TriangleMesh(vertices, faces), corner_uv), quantum))
+def seam_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> FloatArray:
+    """Return (k,) by how much the rotation across each inner edge misses a multiple of a quantum, radians."""
+    return np.abs(off_multiple(_turns(mesh, corner_uv), quantum))
 
 
 def _turns(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
     """Return the rotation between the two sides of each inner edge, radians."""
-    points = corner_uv[..., 0] + 1j * corner_uv[..., 1]
-    sides = (points[:, [2, 0, 1]] - points[:, [1, 2, 0]]).ravel()
+    sides = sides_between(corner_uv).ravel()
     pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
     with np.errstate(divide="ignore", invalid="ignore"):
         turns: FloatArray = np.angle(-sides[pairs[:, 1]] / sides[pairs[:, 0]])

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import islice
 
-import numpy as np
-
 # Elements of an array, and characters of anything, that a message shows.
 FEW_SHOWN, MOST_SHOWN = 4, 80
 
@@ -29,7 +27,9 @@ def printable(text: str) -> str:
 
 
 def shown(value: object) -> str:
-    """Return what a message says of a value: one short line."""
+    """Return what a message says of a value of any kind: one short line."""
+    import numpy as np  # Commands that only print their help need none.
+
     if isinstance(value, np.ndarray) and value.size > FEW_SHOWN:
         return f"an array of shape {value.shape} and type {value.dtype}"
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +19,7 @@ from .geometry.planar import signed_double_areas
 from .mapped import Mapped, as_mapped
 from .mesh import TriangleMesh, corner_fans, end_corners, label_components
 from .numbering import at_unit_size
-from .report import MEASURES
+from .report import MEASURES, path_text
 from .text import plural
 from .validation import CheckedMesh, check_mesh, left_out
 
@@ -82,8 +81,7 @@ class UVMeasures:
         `angle_sum_error`, the most by which the angles around a point inside a chart miss a full turn, radians.
         """
         return {
-            # A name that is no text in any encoding must not spoil the file.
-            "input": None if self.path is None else os.fsencode(self.path).decode("utf-8", "replace"),
+            "input": None if self.path is None else path_text(self.path),
             **{name: value if np.isfinite(value) else None for name, value in self.values().items()},
             "notes": list(self.notes),
         }
@@ -145,6 +143,8 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
     every = mapped.corner_uv[known]
     cover = _cover(np.ldexp(every, -exponent))
     tiles = len(_tiles(checked.mesh, unit, exponent))
+    with np.errstate(over="ignore"):  # What is no number is not known.
+        covered = float(np.ldexp(cover.once, min(2 * exponent, MOST_EXPONENT)))
     counts = {
         "vertices": len(np.unique(mapped.faces)),
         "polygons": mapped.polygons,
@@ -154,7 +154,7 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
         "corners_not_finite": mapped.not_finite,
         "outside": int(((every < 0) | (every > 1)).any(axis=(1, 2)).sum()),
         "tiles": tiles,
-        "packing_efficiency": float(np.ldexp(cover.once, min(2 * exponent, MOST_EXPONENT))) / tiles,
+        "packing_efficiency": covered / tiles,
         "box_efficiency": cover.box_efficiency,
         "angle_sum_error": angle_sum_error(checked.mesh, unit),
     }
@@ -206,20 +206,17 @@ def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
 
     A triangle that is turned over, or folds that wind around a point twice, make it large.
     """
+    from .distortion_kernel import sum_angles
+
     points, fan = uv_points(mesh, corner_uv)
     joined = np.zeros(mesh.faces.size, dtype=bool)
     joined[joined_pairs(mesh, corner_uv)] = True
     inside = np.ones(len(points), dtype=bool)
     for end in end_corners(np.flatnonzero(~joined)):
         inside[fan.reshape(-1)[end]] = False
-    ways = (corner_uv - np.roll(corner_uv, 1, axis=1)) @ np.array([1, 1j])
-    # From the side that leaves a corner to the one that arrives, on the other side of the angle.
-    lengths = np.abs(ways)
-    flat = (lengths == 0) | (np.roll(lengths, -1, axis=1) == 0)
-    ways /= np.maximum(lengths, np.finfo(np.float64).tiny)
-    angles = np.abs(np.angle(np.roll(ways, -1, axis=1) * -np.conj(ways)))
-    sums = np.bincount(fan.reshape(-1), np.where(flat, 0.0, angles).reshape(-1), minlength=len(points))
-    inside[fan[flat]] = False
+    sums, change = sum_angles(fan, np.ascontiguousarray(corner_uv), len(points))
+    # A side without length has no direction.
+    inside &= np.isfinite(change)
     return float(np.abs(sums[inside] - 2 * np.pi).max(initial=0.0))
 
 

@@ -108,7 +108,8 @@ def figure(
         shown: Any
         if kind == "curve":
             with console.stage("read", 0.0):
-                surface = _surface(mesh, weld)
+                surface, notes = _surface(mesh, weld)
+            console.say(f"note: {note}" for note in notes)
             with console.stage("cones", READ):
                 shown = cone_curve(
                     surface,
@@ -125,15 +126,16 @@ def figure(
         console.finish([output])
 
 
-def _surface(file: Path, weld: bool | None) -> Any:
-    """Return what a search for cones takes: a mesh file as it is, of a result its mesh."""
+def _surface(file: Path, weld: bool | None) -> tuple[Any, tuple[str, ...]]:
+    """Return what a search for cones takes, a mesh file as it is, of a result its mesh; and notes on reading it."""
     from ..io import read_flattening
     from ..io.join import read_joined
 
     if file.suffix.lower() != ".npz":
-        return read_joined(file, weld).mesh
+        joined = read_joined(file, weld)
+        return joined.mesh, joined.notes()
     result = read_flattening(file)
-    return result.vertices, result.faces
+    return (result.vertices, result.faces), ()
 
 
 def _check_combinations(context: click.Context, kind: str) -> None:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from .shared import check_required, input_options, require_option
 from .talk import QUIET, talk_options
+
+if TYPE_CHECKING:
+    from ..report import Row
+    from ..uvs import UVMeasures
 
 
 @click.command(short_help="Measure the UVs that a file has, of any tool.")
@@ -62,59 +65,31 @@ def measure(
             click.echo(json.dumps(found, indent=2))
         elif not as_json:
             console.say(f"note: {note}" for note in measured.notes)
-            console.table(rows_of_measures(found))
+            console.table(rows_of_measures(measured))
             console.finish([] if report is None else [report])
     check_required(requirements, found)
 
 
-def rows_of_measures(found: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """Return (measure, value, meaning) rows of a report of UVs."""
+def rows_of_measures(measured: UVMeasures) -> list[Row]:
+    """Return the rows of the table of measures of UVs."""
+    from ..report import map_rows, number_text, packing_row
+    from .console import FIRST_ROWS
 
-    def number(name: str, form: str) -> str:
-        return "unknown" if found[name] is None else format(found[name], form)
-
+    counts, of_map = measured.counts, map_rows(measured.distortion)
     missing = ""
-    if found["triangles_without_uv"]:
-        missing = f"; {found['triangles_without_uv']:,} without UVs"
-    tiles = "" if found["tiles"] == 1 else f" of {found['tiles']:,} unit squares with charts"
-    share = "unknown" if found["overlap"] is None else f"{100 * found['overlap']:.3g} %"
-    overlaps = share if found["overlapping_pairs"] else "none"
+    if counts["triangles_without_uv"]:
+        missing = f"; {counts['triangles_without_uv']:,} without UVs"
+    tiles = "" if counts["tiles"] == 1 else f" of {counts['tiles']:,} unit squares with charts"
     return [
-        ("triangles", number("triangles", ",d"), f"of {found['polygons']:,} polygons, as fans{missing}"),
-        ("charts", number("charts", ",d"), f"pieces of the layout; {found['mirrored_charts']:,} mirrored"),
-        (
-            "overlap",
-            overlaps,
-            f"of the area covered, covered twice; {found['overlapping_pairs']:,} pairs of triangles",
-        ),
-        ("flipped", number("flipped", ",d"), "triangles against the orientation of their chart"),
-        (
-            "texel density",
-            number("density_spread", ".3f"),
-            "its spread: the quantile at 95% over that at 5%",
-        ),
-        ("seam length", number("seam_length", ".3f"), "over the square root of the area"),
-        (
-            "QC distortion",
-            number("qc_mean", ".4f"),
-            f"1 is conformal; 95% below {number('qc_p95', '.4f')}, worst {number('qc_max', '.4g')}",
-        ),
-        ("area distortion", number("area_std", ".4f"), "standard deviation of the log of the scale, by area"),
-        (
-            "degenerate",
-            number("degenerate", ",d"),
-            f"without area in the plane; {found['degenerate_input']:,} have none on the model",
-        ),
-        ("packing", number("packing_efficiency", ".1%"), f"of the texture is covered{tiles}"),
-        ("outside", number("outside", ",d"), "triangles that reach out of the unit square"),
-        (
-            "seam mismatch",
-            number("seam_mismatch", ".1e"),
-            f"of the two sides' lengths; worst {number('seam_mismatch_max', '.1e')}",
-        ),
+        ("triangles", f"{counts['triangles']:,}", f"of {counts['polygons']:,} polygons, as fans{missing}"),
+        *(of_map.pop(name) for name in FIRST_ROWS if name in of_map),
+        *(of_map.pop(name) for name in ("area distortion", "degenerate")),
+        packing_row(counts["packing_efficiency"], tiles),
+        ("outside", f"{counts['outside']:,}", "triangles that reach out of the unit square"),
+        *of_map.values(),
         (
             "angle error",
-            number("angle_sum_error", ".1e"),
+            number_text(counts["angle_sum_error"], ".1e"),
             "radians missing around points inside charts, the most",
         ),
     ]

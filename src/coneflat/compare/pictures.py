@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
 from ..geometry.planar import signed_double_areas
-from ..mesh import label_components
+from ..mesh import label_faces
 from ..view import draw_checker, draw_cones, draw_layout
 from ..view.camera import Eye, eye_direction, view_aspect
 from ..view.compose import Panel, Row, compose, text_width
@@ -118,9 +118,7 @@ def _turned_like(result: Flattening, model: Flattening) -> Flattening:
 
 def _largest_chart(result: Flattening) -> IntArray:
     """Return the triangles of the chart of most area."""
-    corners = result.uv_faces
-    count, label = label_components(len(result.uv), corners[:, :2].reshape(-1), np.repeat(corners[:, 2], 2))
-    chart = label[corners[:, 0]]
+    count, chart = label_faces(result.uv_faces, len(result.uv))
     areas = np.bincount(chart, np.abs(signed_double_areas(result.corner_uv)), count)
     return np.flatnonzero(chart == areas.argmax())
 

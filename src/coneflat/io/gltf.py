@@ -10,7 +10,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..errors import EmptyMeshError
 from .gltf_data import GltfData
-from .gltf_names import check_names
+from .gltf_names import check_references
 from .gltf_scene import DRACO, GltfScene, ScenePart, shown_nodes, triangle_corners
 from .raw import RawMesh, triangle_offsets
 from .weld import weld
@@ -38,7 +38,7 @@ def parse_gltf(path: Path, content: bytes) -> RawMesh:
             mesh = reading.data.item("nodes", node).get("mesh")
             if mesh is not None:
                 reading.add_mesh(node, mesh, matrix)
-        check_names(reading.data)
+        check_references(reading.data)
         return reading.done()
 
 

@@ -22,7 +22,7 @@ _LISTS = (
 )
 
 
-def check_names(data: GltfData) -> None:
+def check_references(data: GltfData) -> None:
     """Refuse a tree that could not be written again, since something in it is not what it should be.
 
     Raises:

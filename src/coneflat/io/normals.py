@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
+from ..polygons import polygon_of
 from .model import MeshFile
 from .weld import weld
 
@@ -92,7 +93,7 @@ def _smoothing_groups(source: MeshFile) -> IntArray | None:
 def _smoothed(result: Flattening, source: MeshFile, groups: IntArray) -> tuple[FloatArray, IntArray]:
     """Return normals, and the (m, 3) of each corner: the mean over the group at the vertex, or the polygon's own."""
     assert result.face_corners is not None
-    polygon = np.searchsorted(source.offsets, result.face_corners[:, 0], side="right") - 1
+    polygon = polygon_of(result.face_corners, source.offsets)
     group = groups[polygon][:, None]
     count = len(result.vertices)
     keys = np.where(group > 0, group * count + result.faces, -1 - polygon[:, None])

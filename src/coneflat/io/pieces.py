@@ -11,10 +11,11 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
-from ..layout.convex import Polygons, heights
+from ..geometry.planar import heights, sides_between
+from ..polygons import Polygons, fan_corners
 
-# Twice the area of the triangle at a corner, over the square of its longest side, from which on the corner is convex:
-# above rounding, with which areas are off by some 1e-16.
+# Height over longest side of the triangle at a corner from which on the corner is convex: above rounding, with which
+# areas are off by some 1e-16.
 CONVEX = 1e-12
 
 Node: TypeAlias = tuple[int, int]
@@ -41,11 +42,7 @@ class Pieces:
 
     def fans(self) -> tuple[IntArray, IntArray]:
         """Return the triangles that others read: (t, 3) corners of the source, and (t, 3) points in the plane."""
-        start = np.cumsum(self.sizes) - self.sizes
-        count = self.sizes - 2
-        first = np.repeat(start, count)
-        step = np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count) + 1
-        rows = np.stack([first, first + step, first + step + 1], axis=1)
+        rows = fan_corners(np.concatenate([[0], np.cumsum(self.sizes)]))
         return self.corners[rows], self.points[rows]
 
 
@@ -62,7 +59,7 @@ def find_pieces(uv: FloatArray, uv_faces: IntArray, offsets: IntArray, face_corn
     points, sizes, loops = polygons.points(uv_faces), polygons.sizes, polygons.loops()
     triples, at = polygons.corner_triples(points)
     whole = polygons.are_whole(points)
-    height = heights(uv, triples)
+    height = heights(sides_between(uv[triples]))
     # What is upside down as a whole is so in fans, too, and no better in pieces.
     not_left, not_right = (np.zeros(len(sizes), dtype=bool) for _ in range(2))
     not_left[at[~(height > CONVEX)]] = not_right[at[~(height < -CONVEX)]] = True
@@ -145,4 +142,4 @@ def _joined(one: Loop, two: Loop, a: Node, b: Node) -> Loop:
 def _is_convex(uv: FloatArray, loop: Loop) -> bool:
     points = np.array([point for _, point in loop])
     triples = np.stack([np.roll(points, 1), points, np.roll(points, -1)], axis=1)
-    return bool((heights(uv, triples) > CONVEX).all())
+    return bool((heights(sides_between(uv[triples])) > CONVEX).all())

@@ -6,6 +6,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import DegenerateFaceError, FaceIndexError
+from ..polygons import polygon_of
 from .ngons import triangulate_ngons
 from .raw import first_bad_corner
 
@@ -80,8 +81,7 @@ def is_polygon_side(face_corners: IntArray, offsets: IntArray) -> BoolArray:
     sizes = np.diff(offsets)
     if np.all(sizes == 3):
         return np.ones(face_corners.shape, dtype=bool)
-    polygon = np.searchsorted(offsets, face_corners[:, 0], side="right") - 1
-    sizes = sizes[polygon][:, None]
+    sizes = sizes[polygon_of(face_corners, offsets)][:, None]
     steps = np.abs(face_corners - np.roll(face_corners, -1, axis=1))
     return np.asarray((steps == 1) | (steps == sizes - 1))
 

@@ -10,6 +10,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..atlas.snap import snap_apart
 from ..errors import MeshFileError
+from ..polygons import polygon_of
 from ..promises import DOUBLE, SINGLE, remeasured
 from ..text import plural
 from .gltf_write import scene_losses
@@ -98,8 +99,7 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
     corners, uv_faces = pieces.fans()
     vertex = np.full(int(offsets[-1]), -1, dtype=np.int64)
     vertex[face_corners] = result.faces
-    polygon = np.searchsorted(offsets, face_corners[:, 0], side="right") - 1
-    order = np.argsort(polygon, kind="stable")
+    order = np.argsort(polygon_of(face_corners, offsets), kind="stable")
     face_origin = np.arange(len(order)) if result.face_origin is None else result.face_origin
     notes: tuple[str, ...] = ()
     if len(pieces.split):

@@ -6,15 +6,15 @@ own: what they see is upright, too, only where the polygon is convex.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..geometry.planar import heights, sides_between
 from ..mesh import TriangleMesh
+from ..polygons import Polygons
 
-# Twice the area of a triangle over the square of its longest side, from which on it is safely upright: rounding in the
-# plane is 1e-16 of the extent, and the finest edges are some 1e-6 of it.
+# Height over longest side of a triangle from which on it is safely upright: rounding in the plane is 1e-16 of the
+# extent, and the finest edges are some 1e-6 of it.
 UPRIGHT = 1e-8
 # The same, as it is wanted of corners that are to become convex: as much of it as there is room for.
 WANTED = (0.1, 0.03, 0.01, 1e-3)
@@ -22,92 +22,6 @@ WANTED = (0.1, 0.03, 0.01, 1e-3)
 STRAIGHT = 1e-6
 # Times all points of the polygons that are not convex are moved in turn.
 ROUNDS = 20
-
-
-@dataclass(frozen=True, eq=False)
-class Polygons:
-    """The polygons that triangles make up.
-
-    Attributes:
-        offsets: (p + 1,) the corners of polygon i are numbered from offsets[i] to offsets[i + 1].
-        corners: (m, 3) the polygon's corner at each triangle corner.
-    """
-
-    offsets: IntArray
-    corners: IntArray
-
-    @property
-    def sizes(self) -> IntArray:
-        """(p,) corners of each polygon."""
-        return np.diff(self.offsets)
-
-    @property
-    def owner(self) -> IntArray:
-        """(m,) the polygon of each triangle."""
-        owner: IntArray = np.searchsorted(self.offsets, self.corners[:, 0], side="right") - 1
-        return owner
-
-    @property
-    def is_reversed(self) -> BoolArray:
-        """(p,) True for polygons whose triangles run the other way."""
-        a, b, c = self.corners.T
-        reversed_ = np.zeros(len(self.offsets) - 1, dtype=bool)
-        # Corners of a triangle that runs the polygon's way ascend but for one step back.
-        reversed_[self.owner] = (b < a).astype(np.int8) + (c < b) + (a < c) == 2
-        return reversed_
-
-    def loops(self) -> IntArray:
-        """Return (c,) the corners of each polygon, from its first on, in the order in which its triangles run."""
-        sizes = self.sizes
-        start, size = np.repeat(self.offsets[:-1], sizes), np.repeat(sizes, sizes)
-        step = np.arange(len(start)) - start
-        loops: IntArray = start + np.where(np.repeat(self.is_reversed, sizes), (size - step) % size, step)
-        return loops
-
-    def points(self, uv_faces: IntArray) -> IntArray:
-        """Return (c,) the point at each polygon corner; -1 where triangles have several there, or where there is none.
-
-        uv_faces: (m, 3) the point of each triangle corner.
-        """
-        points = np.full(int(self.offsets[-1]), -1, dtype=np.int64)
-        points[self.corners] = uv_faces
-        points[self.corners[points[self.corners] != uv_faces]] = -1
-        return points
-
-    def are_whole(self, points: IntArray) -> BoolArray:
-        """Return (p,) whether all triangles of a polygon are there, and none is cut off in the plane.
-
-        points: (c,) what `points` returns.
-        """
-        counts = np.bincount(self.owner, minlength=len(self.sizes))
-        whole: BoolArray = (counts == self.sizes - 2) & np.logical_and.reduceat(
-            points >= 0, self.offsets[:-1]
-        )
-        return whole
-
-    def corner_triples(self, points: IntArray) -> tuple[IntArray, IntArray]:
-        """Return (k, 3) the points before, at and after each corner of whole polygons of four corners and more.
-
-        Triples run as the triangles do. Also (k,) the polygon of each.
-
-        points: (c,) what `points` returns.
-        """
-        sizes, loops = self.sizes, self.loops()
-        polygon = np.repeat(np.arange(len(sizes)), sizes)
-        place = np.flatnonzero((self.are_whole(points) & (sizes > 3))[polygon])
-        polygon = polygon[place]
-        start, size = self.offsets[polygon], sizes[polygon]
-        before, after = start + (place - start - 1) % size, start + (place - start + 1) % size
-        return points[loops[np.stack([before, place, after], axis=1)]], polygon
-
-
-def heights(points: FloatArray, triangles: IntArray) -> FloatArray:
-    """Return (t,) twice the area of triangles over the square of their longest sides, negative if upside down."""
-    corners = points[triangles]
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    longest = np.max([(one**2).sum(axis=1), (two**2).sum(axis=1), ((two - one) ** 2).sum(axis=1)], axis=0)
-    area: FloatArray = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-    return area / np.maximum(longest, np.finfo(float).tiny)
 
 
 def make_convex(
@@ -125,11 +39,10 @@ def make_convex(
         positions: (m, 3, 3) the triangle corners on the model.
     """
     triples, owner = polygons.corner_triples(polygons.points(uv_faces))
-    bad = heights(points, triples) <= UPRIGHT
-    if not bad.any():
+    is_bad = heights(sides_between(points[triples])) <= UPRIGHT
+    if not is_bad.any():
         return points
-    bad &= ~_concave_in_space(polygons, positions)[owner]
-    chosen = np.unique(owner[bad])
+    chosen = np.unique(owner[is_bad & ~_concave_in_space(polygons, positions)[owner]])
     mesh = TriangleMesh(points, uv_faces)
     movable = ~mesh.is_boundary_vertex
     wished = np.unique(triples[np.isin(owner, chosen)])
@@ -137,7 +50,7 @@ def make_convex(
     if not len(wished):
         return points
     # What is concave in space may be so in the plane; it must not stand in the way of others.
-    hopeless = np.isin(owner, np.setdiff1d(np.unique(owner[heights(points, triples) <= UPRIGHT]), chosen))
+    hopeless = np.isin(owner, np.setdiff1d(owner[is_bad], chosen))
     return _moved(points, np.concatenate([uv_faces, triples[~hopeless]]), wished)
 
 

@@ -34,13 +34,6 @@ AT_REST = 0.25
 PARTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 
 
-def heights(sides: ComplexArray) -> FloatArray:
-    """Return (m,) height over longest side of triangles with sides (m, 3); negative for inverted ones."""
-    doubled = (np.conj(sides[:, 0]) * sides[:, 1]).imag
-    ratio: FloatArray = doubled / (np.abs(sides) ** 2).max(axis=1)
-    return ratio
-
-
 class Patches:
     """The triangles around movable vertices, as functions of how far these move.
 

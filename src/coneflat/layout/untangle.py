@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 
 from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from ..geometry.planar import signed_angles
-from .patches import DEGENERATE, Patches, heights
+from ..geometry.planar import heights, signed_angles
+from .patches import DEGENERATE, Patches
 from .straighten import FlatTriangles
 
 # Height over longest side that a bad triangle is asked to get at least, and those that others are, one after another:

@@ -11,8 +11,8 @@ from .._arrays import FloatArray, IntArray
 from ..errors import ConvergenceError
 from ..figures import SolveFigures
 from ..geometry import angle_defect, double_areas, edge_lengths
-from ..geometry.planar import signed_angles
-from ..mesh import NEXT, PREVIOUS, TriangleMesh
+from ..geometry.planar import heights, sides_between, signed_angles
+from ..mesh import TriangleMesh
 
 # Height over longest side below which a triangle counts as flat, neither upright nor upside down: coordinates are
 # good to about 1e-12 of an edge.
@@ -77,10 +77,9 @@ def laid_out_curvature(mesh: TriangleMesh, corners: FloatArray) -> FloatArray:
     Those of triangles that are upside down count as negative. Where triangles wind around a vertex twice, the
     curvature is a full turn less than it seems.
     """
-    places = np.ascontiguousarray(corners[:, PREVIOUS] - corners[:, NEXT]).view(np.complex128)[..., 0]
-    angles = signed_angles(places)
-    doubled = (np.conj(places[:, 0]) * places[:, 1]).imag
-    is_flat = np.abs(doubled) < FLAT * (np.abs(places) ** 2).max(axis=1)
+    sides = sides_between(corners)
+    angles = signed_angles(sides)
+    is_flat = np.abs(heights(sides)) < FLAT
     angles[is_flat] = np.abs(angles[is_flat])
     return angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
 

@@ -12,7 +12,7 @@ from ..checker import cell_side
 from ..errors import ArrayShapeError, OptionError
 from ..geometry.planar import signed_double_areas
 from ..io.uv_split import split_at_seams
-from ..mesh import TriangleMesh, end_corners, label_components
+from ..mesh import TriangleMesh, end_corners, label_faces
 from .quantity import ColorScale, conformal_distortion, missing_angles, stretch
 from .scales import page_scales
 from .thin import sides, thin
@@ -160,8 +160,8 @@ def _into_unit_ball(vertices: FloatArray) -> tuple[FloatArray, FloatArray, float
 
 def _charts(faces: IntArray, uv: FloatArray) -> IntArray:
     """Return (m,) the chart of each triangle, numbered from the one with the largest area."""
-    count, label = label_components(len(uv), faces[:, :2].reshape(-1), np.repeat(faces[:, 2], 2))
-    chart, areas = label[faces[:, 0]], np.abs(signed_double_areas(uv[faces]))
+    count, chart = label_faces(faces, len(uv))
+    areas = np.abs(signed_double_areas(uv[faces]))
     rank = np.full(count, -1, dtype=np.int64)
     rank[np.argsort(-np.bincount(chart, weights=areas, minlength=count), kind="stable")] = np.arange(count)
     return rank[chart]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from .. import text
 from ..checker import CELLS, check_cells
 from ..curve import ConeCurve
 from ..errors import OptionError
@@ -85,10 +86,6 @@ class Look:
         ]
 
 
-def _short(value: object) -> str:
-    return " ".join(repr(value).split())[:80]
-
-
 def make_figure(shown: Flattening | ConeCurve, kind: str, **look: Any) -> Figure:
     """Return a figure for print, which `save_figure` writes.
 
@@ -105,13 +102,13 @@ def make_figure(shown: Flattening | ConeCurve, kind: str, **look: Any) -> Figure
         OptionError: an option makes no sense, or matplotlib is not installed.
     """
     if not isinstance(kind, str) or kind not in KINDS:
-        raise OptionError(f"unknown kind of figure {_short(kind)}: choose from {', '.join(KINDS)}")
+        raise OptionError(f"unknown kind of figure {text.shown(kind)}: choose from {', '.join(KINDS)}")
     if isinstance(shown, ConeCurve) != (kind == "curve"):
         raise OptionError(
             "figures of the kind 'curve', and no others, show what `coneflat.cone_curve` returns"
         )
     if kind != "curve" and not hasattr(shown, "uv_faces"):
-        raise OptionError(f"a figure shows what `coneflat.flatten` returns, not {_short(shown)}")
+        raise OptionError(f"a figure shows what `coneflat.flatten` returns, not {text.shown(shown)}")
     chosen = Look(**look)
     rows, marks = _ROWS[kind](shown, chosen)
     return compose(rows, title=chosen.title, marks=marks, size=chosen.size, dpi=chosen.dpi)

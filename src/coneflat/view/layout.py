@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from ..mesh import TriangleMesh, end_corners, label_components
+from ..mesh import TriangleMesh, end_corners, label_components, label_faces
 from .marks import BOUNDARY_COLOR, SEAM_COLOR, draw_dots, mark_scale, pixels_of
 from .projection import render_mesh
 from .quantity import Quantity
@@ -131,20 +131,17 @@ def frame_layout(axes: Axes, result: Flattening, crop: bool) -> None:
     axes.set_axis_off()
 
 
-def layout_tiles(result: Flattening) -> IntArray:
+def layout_tiles(result: Flattening) -> FloatArray:
     """Return the (k, 2) lower left corners of the unit squares that hold charts: one, or those of several textures.
 
     A chart may reach out of its square, if others made it.
     """
-    corners = result.uv_faces
-    ends = corners[:, :2].reshape(-1), np.repeat(corners[:, 2], 2)
-    count, label = label_components(len(result.uv), *ends)
-    chart = label[corners[:, 0]]
+    count, chart = label_faces(result.uv_faces, len(result.uv))
     size = np.maximum(np.bincount(chart, minlength=count), 1)
     middles = [
-        np.bincount(chart, result.uv[corners][..., k].mean(axis=1), minlength=count) / size for k in (0, 1)
+        np.bincount(chart, result.corner_uv[..., k].mean(axis=1), minlength=count) / size for k in (0, 1)
     ]
-    return np.unique(np.floor(np.stack(middles, axis=1)[chart]).astype(np.int64), axis=0)
+    return np.unique(np.floor(np.stack(middles, axis=1)[chart]), axis=0)
 
 
 def layout_box(result: Flattening, crop: bool) -> tuple[FloatArray, FloatArray]:
@@ -152,7 +149,7 @@ def layout_box(result: Flattening, crop: bool) -> tuple[FloatArray, FloatArray]:
     used = result.uv[np.unique(result.uv_faces)]
     if not crop:
         tiles = layout_tiles(result)
-        used = np.concatenate([tiles, tiles + 1, used]).astype(np.float64)
+        used = np.concatenate([tiles, tiles + 1, used])
     return used.min(axis=0), used.max(axis=0)
 
 
@@ -208,14 +205,16 @@ def layout_cones(result: Flattening) -> tuple[IntArray, IntArray]:
     return vertex, point
 
 
-def _draw_tiles(axes: Axes, tiles: IntArray) -> None:
+def _draw_tiles(axes: Axes, tiles: FloatArray) -> None:
     """Draw the frames of textures, with their UDIM numbers if there are several."""
     from matplotlib.patches import Rectangle
 
     for u, v in tiles.tolist():
         axes.add_patch(Rectangle((u, v), 1, 1, fill=False, edgecolor=FRAME_COLOR, linewidth=0.5, zorder=-1))
         if len(tiles) > 1:
-            axes.text(u + 0.02, v + 0.98, f"{1001 + u + 10 * v}", color=FRAME_COLOR, va="top", size="small")
+            axes.text(
+                u + 0.02, v + 0.98, f"{1001 + u + 10 * v:.0f}", color=FRAME_COLOR, va="top", size="small"
+            )
 
 
 def _draw_segments(

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray
 from ..checker import cell_side
-from ..distortion import seams_of
-from ..errors import MissingUVError
+from ..distortion import angle_sum_errors, seams_of
+from ..errors import MeshFileError, MissingUVError
 from ..figures import SolveFigures
-from ..geometry import corner_angles, double_areas, edge_lengths
+from ..geometry import double_areas, edge_lengths
 from ..io.join import Joined
 from ..mapped import Mapped, has_uv, of_file
-from ..mesh import TriangleMesh
 from ..report import as_rows
 from ..result import Flattening
 from ..uvs import measure_mapped, uv_points
 
 #: The `method` in the settings of what was not made but found in the file.
 OWN = "the file's own UVs"
+#: UVs that pages, whose numbers have 32 bits, and pictures can show: squares of larger ones are none.
+LARGEST = 1e15
 #: Rows of a report that say nothing of a map that no search for cones has led to.
 _OF_A_SEARCH = ("cones", "curvature error", "of the metric")
 
@@ -30,6 +30,7 @@ def own_flattening(source: Joined, *, strict: bool = False) -> Flattening | None
 
     Raises:
         MeshError: the triangles are no mesh.
+        MeshFileError: UVs are too large to be shown.
     """
     if not has_uv(source.mesh):
         return None
@@ -45,8 +46,15 @@ def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
     Raises:
         MissingUVError: no triangle has UVs.
         MeshError: the triangles are no mesh.
+        MeshFileError: UVs are too large to be shown.
     """
     measured = measure_mapped(mapped, strict=strict)
+    largest = float(np.abs(measured.corner_uv).max())
+    if largest > LARGEST:
+        raise MeshFileError(
+            f"UVs of up to {largest:.3g} are too large to be shown: `coneflat measure` measures them, --again flattens "
+            "the mesh anew"
+        )
     mesh = measured.mesh
     uv, uv_faces = uv_points(mesh, measured.corner_uv)
     exponent = int(np.frexp(np.abs(mesh.vertices).max())[1])
@@ -63,7 +71,7 @@ def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
         curvatures=np.empty(0),
         log_scale=np.full(len(mesh.vertices), np.nan),
         prescribed=np.full(len(mesh.vertices), np.nan),
-        curvature_residual=-_flat_curvature(mesh, uv[uv_faces]),
+        curvature_residual=angle_sum_errors(mesh, measured.corner_uv, np.zeros(len(mesh.vertices)))[0],
         seams=mesh.edges[seams_of(mesh, measured.corner_uv)],
         distortion=measured.distortion,
         seconds={},
@@ -82,13 +90,3 @@ def is_own(result: Flattening) -> bool:
 def shown_rows(result: Flattening) -> list[tuple[str, str, str]]:
     """Return the rows of a result's report that say something of it."""
     return [row for row in as_rows(result) if not (is_own(result) and row[0] in _OF_A_SEARCH)]
-
-
-def _flat_curvature(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
-    """Return (n,) what the angles in the plane around each vertex miss of a full turn, across seams, too, radians."""
-    unit = np.ldexp(corner_uv, -int(np.frexp(np.abs(corner_uv).max())[1]))
-    flat = np.concatenate([unit, np.zeros((*unit.shape[:2], 1))], axis=2).reshape(-1, 3)
-    angles = corner_angles(edge_lengths(flat, np.arange(len(flat)).reshape(-1, 3)))
-    sums = np.bincount(mesh.faces.reshape(-1), np.nan_to_num(angles).reshape(-1), len(mesh.vertices))
-    curvature: FloatArray = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - sums
-    return curvature
