@@ -13,8 +13,10 @@ from ..graph import MultiGraph, trace_back
 from ..mesh import TriangleMesh, label_components
 
 
-def separate(disk: TriangleMesh, one: BoolArray, other: BoolArray, costs: FloatArray) -> IntArray:
+def separate(disk: TriangleMesh, one: BoolArray, other: BoolArray, costs: FloatArray) -> IntArray | None:
     """Return (m,) the piece of each triangle after the cheapest cut between two sets of them, from 0.
+
+    None if each set, down to a single triangle, keeps the other from the border.
 
     Args:
         disk: a topological disk.
@@ -22,7 +24,10 @@ def separate(disk: TriangleMesh, one: BoolArray, other: BoolArray, costs: FloatA
         costs: (e,) of each edge, positive.
     """
     border = border_edges(disk)
-    one, other = _both_to_the_border(disk, border, one, other)
+    both = _both_to_the_border(disk, border, one, other)
+    if both is None:
+        return None
+    one, other = both
     beside = disk.edge_faces[border, 0]
     mark = np.where(one[beside], 1, np.where(other[beside], 2, 0))
     starts, ends = _between(disk, border, mark)
@@ -48,7 +53,7 @@ def border_edges(disk: TriangleMesh) -> IntArray:
 
 def _both_to_the_border(
     disk: TriangleMesh, border: IntArray, one: BoolArray, other: BoolArray
-) -> tuple[BoolArray, BoolArray]:
+) -> tuple[BoolArray, BoolArray] | None:
     """Return two sets of triangles with ways from each to the border; of one around the other, a single triangle."""
     for first, second in (
         (one, other),
@@ -62,7 +67,7 @@ def _both_to_the_border(
         wider = _to_the_border(disk, border, second, wide)
         if wider is not None:
             return wide, wider
-    raise AssertionError("two triangles of a disk do not keep each other from its border")
+    return None
 
 
 def _single(chosen: BoolArray) -> BoolArray:
