@@ -59,9 +59,9 @@ def seam_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) ->
 
 
 def _turns(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
-    """Return the rotation between the two sides of each inner edge, radians."""
+    """Return the rotation between the two sides of each inner edge, radians; 0 where a side has no length."""
     sides = sides_between(corner_uv).ravel()
     pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
     with np.errstate(divide="ignore", invalid="ignore"):
         turns: FloatArray = np.angle(-sides[pairs[:, 1]] / sides[pairs[:, 0]])
-    return turns
+    return np.where(np.isfinite(turns), turns, 0.0)
