@@ -15,7 +15,9 @@ from ._arrays import FloatArray, IntArray
 from .atlas import pack_together
 from .geometry.visibility import visible_share
 from .io import read_mesh
+from .layout.convex import make_convex
 from .pipeline import flatten
+from .polygons import Polygons
 from .sample import sample_path
 
 TAU = 2 * np.pi
@@ -38,6 +40,18 @@ def compile_kernels() -> None:
     flatten(*_tube(closed=True), quantum=np.pi / 2)
     visible_share(*_tube(closed=True))
     flatten(*_tube(closed=False), boundary="disk", best_effort=True)
+    _make_a_dart_convex()
+
+
+def _make_a_dart_convex() -> None:
+    """Make quads of a grid in the plane convex, of which one is not."""
+    x, y = np.meshgrid(np.arange(4.0), np.arange(4.0))
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    points[6] = 1.5, 1.6
+    quads = np.add.outer([0, 1, 2, 4, 5, 6, 8, 9, 10], [0, 1, 5, 4]).ravel()
+    corners = np.add.outer(4 * np.arange(9), [[0, 1, 3], [1, 2, 3]]).reshape(-1, 3)
+    space = np.column_stack([x.ravel(), y.ravel(), np.zeros(16)])[quads[corners]]
+    make_convex(points, quads[corners], Polygons(np.arange(0, 37, 4), corners), space)
 
 
 def _tube(closed: bool, around: int = 40, across: int = 24) -> tuple[FloatArray, IntArray]:
