@@ -64,7 +64,7 @@ def test_a_method_that_fails_is_named_with_its_reason(ball, monkeypatch):
     def fail(name):
         raise errors.ConvergenceError(f"{name} did not converge")
 
-    monkeypatch.setattr("coneflat.pipeline.other_method", fail)
+    monkeypatch.setattr("coneflat.metric.other_method", fail)
     found = compare_methods(*ball, methods=("exact", "bff"), peers=())
     assert found["bff"].result is None
     assert found["bff"].note == "bff did not converge"

@@ -138,9 +138,8 @@ def layout_tiles(result: Flattening) -> FloatArray:
     """
     count, chart = label_faces(result.uv_faces, len(result.uv))
     size = np.maximum(np.bincount(chart, minlength=count), 1)
-    middles = [
-        np.bincount(chart, result.corner_uv[..., k].mean(axis=1), minlength=count) / size for k in (0, 1)
-    ]
+    points = result.uv[result.uv_faces].mean(axis=1)
+    middles = [np.bincount(chart, points[:, k], minlength=count) / size for k in (0, 1)]
     return np.unique(np.floor(np.stack(middles, axis=1)[chart]), axis=0)
 
 
