@@ -20,7 +20,7 @@ PLAIN: tuple[Any, ...] = (
     -math.inf, 2**31, 2**63, 2**70, True, False, 1j, (), [], {}, [[]], [0], [0, 1, 2], (1, 2, 3), [None], ["a"],
     [math.nan], [[0, 1]], [[0, 1, 2]], [[0, 1], [2]], {"a": 1}, {0: "x"}, {0: math.nan}, {0: None},
     {0: 1.0, 1: None}, {1.5: 2}, {(0, 1): 2}, {10**30: 1.0}, range(3), object(), int, len,
-    Path("/nowhere/mesh.obj"), Path("."), "/dev/null", "\0", "ä\n", "x" * 300,
+    Path("/nowhere/mesh.obj"), Path("."), "/dev/null", "\0", "ä\t", "x" * 300,
 )
 #: Those that are used up, or could be changed, by whoever takes them.
 FRESH: tuple[Callable[[], Any], ...] = (

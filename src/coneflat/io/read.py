@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import ConeflatError, EmptyMeshError, MeshFileError, UnknownFormatError
+from ..errors import ConeflatError, EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
+from ..text import shown
 from .atomic import as_path, known_ending
 from .gltf import parse_gltf
 from .model import MeshFile
@@ -84,8 +85,11 @@ def read_mesh_from(
     Raises:
         UnknownFormatError: the ending is not one of `INPUT_FORMATS`.
         MeshFileError, EmptyMeshError, FaceIndexError: as of `read_mesh`.
+        OptionError: `weld` is none of these.
     """
     path = Path(name)
+    if weld is not None and not isinstance(weld, (bool, np.bool_)):
+        raise OptionError(f"weld is True, False or None, not {shown(weld)}")
     if not content or content.isspace():
         raise EmptyMeshError(f"{path} is empty")
     ending = format_of(content) if ending is None else ending.lower()
