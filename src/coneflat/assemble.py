@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +27,11 @@ from .stages import Stages
 if TYPE_CHECKING:
     from .methods import LaidOut
     from .prepare import Component, Prepared
+
+
+POLYGONS_LOST = (
+    "The refinement has triangles of its own: polygons, groups and materials of the file are not kept."
+)
 
 
 def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, stages: Stages) -> Flattening:
@@ -64,11 +70,6 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         uv[corners] = packed.corner_uv
 
     refined = any(one.figures.refined_triangles for one in laid_out)
-    lost: tuple[str, ...] = ()
-    if refined and given.source is not None:
-        lost = (
-            "The refinement has triangles of its own: polygons, groups and materials of the file are not kept.",
-        )
     face_corners = (
         None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
     )
@@ -91,19 +92,13 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     with stages("measure"):
         scaled = _known_or_new(checked.mesh, np.ldexp(positions, checked.exponent), faces)
         errors = curvature_errors(residual[np.isfinite(residual)])
-        distortion = measure(scaled, uv[corners], errors, cones, prescribed)
+        measured = partial(measure, scaled, curvature_error=errors, cones=cones, prescribed=prescribed)
+        distortion = measured(uv[corners])
         if options.charts == "atlas" and distortion.overlapping_pairs:
             parted, overlaps = part_touching(uv, corners)
             if len(overlaps.pairs) < distortion.overlapping_pairs:
-                uv = parted
-                distortion = measure(scaled, uv[corners], errors, cones, prescribed, overlaps)
-        rotations = None
-        if options.quantum is not None:
-            flat = np.split(uv[own], np.cumsum([len(one.corners) for one in laid_out])[:-1])
-            rotations = Rotations.of_all(
-                measure_rotations(one.mesh, corner_uv, options.quantum)
-                for one, corner_uv in zip(laid_out, flat, strict=True)
-            )
+                uv, distortion = parted, measured(parted[corners], overlaps=overlaps)
+        rotations = _rotations(laid_out, uv[own], options)
     result = Flattening(
         vertices=positions,
         faces=faces,
@@ -121,7 +116,12 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         ),
         distortion=distortion.rescaled(checked.exponent * np.log(2)),
         seconds=dict(stages.seconds),
-        notes=(*checked.notes, *prepared.notes, *_distinct_notes(laid_out), *lost),
+        notes=(
+            *checked.notes,
+            *prepared.notes,
+            *_distinct_notes(laid_out),
+            *[POLYGONS_LOST] * (refined and given.source is not None),
+        ),
         settings=options.as_dict(),
         solve=SolveFigures.of_all(
             [one.figures for one in laid_out], [one.area if len(laid_out) > 1 else 1.0 for one in laid_out]
@@ -133,6 +133,19 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         source=given.source,
     )
     return replace(result, notes=(*result.notes, *broken_promises(result)))
+
+
+def _rotations(laid_out: Sequence[LaidOut], corner_uv: FloatArray, options: Options) -> Rotations | None:
+    """Return the rotations of seams against the quantum, if there is one; those between components turn freely.
+
+    corner_uv: (m, 3, 2) points of the triangle corners, component after component.
+    """
+    if options.quantum is None:
+        return None
+    flat = np.split(corner_uv, np.cumsum([len(one.corners) for one in laid_out])[:-1])
+    return Rotations.of_all(
+        measure_rotations(one.mesh, own, options.quantum) for one, own in zip(laid_out, flat, strict=True)
+    )
 
 
 def _prescribed(one: LaidOut, options: Options) -> FloatArray:
