@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -30,6 +30,8 @@ WINDING = 1.0
 # Mean of QC, and what a twentieth of the area is above, from which on a layout is unfit for most uses, though every
 # triangle is upright. Single triangles are worse on many models.
 EXTREME_QC, EXTREME_TAIL = 1.25, 2.0
+# Radians by which a round boundary may turn otherwise than a circle: it is found in rounds, to a thousandth.
+NOT_ROUND = 0.01
 # Relative difference of the sides of marked seams that methods without a flat metric are let go.
 ROUGH = 0.01
 
@@ -47,6 +49,7 @@ def broken_promises(result: Flattening, unit: float = DOUBLE) -> tuple[str, ...]
         *_angle_sums(result, unit),
         *_equal_sides(result, unit),
         *_boundary_lengths(result, unit),
+        *_round_boundary(result, unit),
         *_whole_turns(result, unit),
         *_distortion(result),
     )
@@ -173,6 +176,36 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
     if beyond.any():
         worst = (off[beyond] / np.maximum(lengths[beyond], np.finfo(float).tiny)).max()
         yield f"Lengths along the boundary are not kept: they differ by up to {worst:.2g} of them."
+
+
+def _round_boundary(result: Flattening, unit: float) -> Iterator[str]:
+    """Tell where a loop that is to be round turns otherwise than evenly along its length in the plane."""
+    boundary = result.settings.get("boundary", "free")
+    if boundary != "disk" and isinstance(boundary, str):
+        return
+    mesh = TriangleMesh(result.vertices, result.faces)
+    count, loop = mesh.boundary_loops
+    if isinstance(boundary, Mapping):
+        origin = np.arange(len(loop)) if result.vertex_origin is None else result.vertex_origin
+        on_straight = loop[np.isin(origin, list(boundary)) & (loop >= 0)]
+        loop = np.where(np.isin(loop, on_straight), -1, loop)
+    on_round = np.flatnonzero((loop >= 0) & np.isfinite(result.prescribed))
+    if not len(on_round):
+        return
+    missing, change = angle_sum_errors(mesh, result.corner_uv, np.where(loop >= 0, 0.0, np.nan))
+    edges = mesh.is_boundary_edge
+    sides = np.abs(sides_between(result.corner_uv)).ravel()[mesh.edge_halfedges[edges, 0]]
+    share = np.bincount(mesh.edges[edges].ravel(), np.repeat(sides / 2, 2), len(loop))
+    turns = np.bincount(loop[on_round], -missing[on_round], count)[loop[on_round]]
+    around = np.bincount(loop[on_round], share[on_round], count)[loop[on_round]]
+    even = turns * share[on_round] / np.maximum(around, np.finfo(float).tiny)
+    off = np.abs(-missing[on_round] - even) - ROUNDINGS * unit * change[on_round]
+    worst = int(np.argmax(off))
+    if off[worst] > NOT_ROUND:
+        yield (
+            f"The boundary is not quite round: at vertex {on_round[worst]} it turns by "
+            f"{-missing[on_round[worst]]:.3g} rad, a circle by {even[worst]:.3g}."
+        )
 
 
 def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:

@@ -31,8 +31,6 @@ LENGTH_TOLERANCE = 1e-9
 # Curvature, radians, at a vertex of a round boundary that is no part of a circle any more but a corner too sharp to be
 # one: the sides beside it are nearly all of the boundary. Then the round before has to do.
 TOO_SHARP = 0.99 * np.pi
-# Radians by which the curvature of a round boundary may be off a circle's before it is said.
-NOT_ROUND = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +203,6 @@ def exact_flattening(
         choices.best_effort and bool(np.isfinite(solved.residual)),
         "--method linear needs no convergence",
     )
-    notes += _missed_roundness(lengths, solved, choices, target)
     notes += _lengths_missed(mesh, lengths, solved, choices)
     shrink = area_factor(lengths, solved) if choices.keep_area else 1.0
     target = np.where(fixed, solved.curvature, target)
@@ -309,22 +306,3 @@ def _solve(
 def _is_too_sharp(boundary: BoundaryCurvature, wanted: FloatArray) -> bool:
     """Whether a round boundary would have a corner; those that the user gives do not count."""
     return boundary.has_round_loops and bool((wanted[boundary.corners == 0] >= TOO_SHARP).any())
-
-
-def _missed_roundness(
-    lengths: FloatArray, solved: ExactMetric, choices: ExactChoices, target: FloatArray
-) -> tuple[str, ...]:
-    """Return that a round boundary is none, if so."""
-    if choices.boundary is None or not choices.boundary.has_round_loops:
-        return ()
-    even = choices.boundary.target(lengths, solved.log_scale)
-    on_round = choices.boundary.mesh.is_boundary_vertex & (choices.boundary.corners == 0)
-    off = np.where(on_round, np.abs(even - target), 0.0)
-    worst = int(np.argmax(off))
-    if not off[worst] > NOT_ROUND:
-        return ()
-    name = worst if choices.names is None else choices.names[worst]
-    return (
-        f"The boundary is not quite round: at vertex {name} it turns by {target[worst]:.3g} rad, a circle "
-        f"by {even[worst]:.3g}.",
-    )
