@@ -265,13 +265,15 @@ class DenseModel:
         """Replace members, one at a time, as long as E^2 falls; return it and the members. The required ones stay."""
         members = members.copy()
         fitted = self.fit(members)
-        while len(members) > len(self.fixed) and len(members) >= self.limits.fewest:
+        lost = 0  # swaps since when there have been no feasible curvatures: they may go round in circles
+        while len(members) > len(self.fixed) and len(members) >= self.limits.fewest and lost <= len(members):
             better = self._swapped(members, fitted) if fitted.feasible else None
             if better is None:
                 better = self._swapped_one_by_one(members, fitted)
             if better is None:
                 break
             fitted = better
+            lost += not fitted.feasible
         return fitted.energy, members
 
     def _swapped(self, members: IntArray, fitted: Fit) -> Fit | None:
@@ -302,8 +304,11 @@ class DenseModel:
             if not inside[place]:
                 chosen, _ = self.best_addition(np.delete(members, place), self.usable, limit)
                 if chosen >= 0 and chosen != members[place]:
-                    members[place] = chosen
-                    return self.fit(members)
+                    previous, members[place] = members[place], chosen
+                    found = self.fit(members)
+                    if found.energy < limit or not fitted.feasible:
+                        return found
+                    members[place] = previous
         return None
 
     def refilled(self, members: IntArray, out: IntArray) -> tuple[float, IntArray]:
