@@ -114,7 +114,9 @@ def check_file(outcome: Outcome, result: Any, path: Path) -> None:
         try:
             space, flat = reader(path)
         except Exception as error:
-            if not _is_unreadable(reader, result.source):
+            # trimesh drops the UVs of what has no material.
+            drops = reader is read_trimesh and ending == ".glb" and isinstance(error, AttributeError)
+            if not drops and not _is_unreadable(reader, result.source):
                 outcome.breach(f"{name}: cannot be read", f"{type(error).__name__}: {error}")
             continue
         _compare(outcome, name, result, space, flat, reader is read_glb)

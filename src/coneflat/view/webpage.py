@@ -13,8 +13,11 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..errors import OptionError
 from ..io.atomic import as_path, atomic_write, check_target, known_ending
+from ..text import shown
 from .content import content_of
 from .payload import payload_of
 from .picture import read_picture
@@ -62,7 +65,7 @@ def page_of(
         most_triangles: a mesh with more is thinned for display.
 
     Raises:
-        OptionError: `up` or `show` is none of these.
+        OptionError: `up` or `show` is none of these, or `most_triangles` is no whole number.
         ArrayShapeError: the result has no UVs.
         MeshError: it cannot be thinned to so few triangles.
         MeshFileError: the texture cannot be read.
@@ -72,6 +75,8 @@ def page_of(
     if show not in SHOWS:
         raise OptionError(f"unknown show {show!r}: choose from {', '.join(SHOWS)}")
     picture = None if texture is None else read_picture(texture)
+    if isinstance(most_triangles, bool) or not isinstance(most_triangles, (int, np.integer)):
+        raise OptionError(f"most_triangles must be a whole number, not {shown(most_triangles)}")
     content = content_of(result, most_triangles)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
