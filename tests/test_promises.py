@@ -11,7 +11,7 @@ import shapes
 from coneflat import edge_lengths, flatten
 from coneflat.atlas.arrange import whole_turns
 from coneflat.distortion import measure
-from coneflat.errors import ArrayShapeError, FaceIndexError
+from coneflat.errors import ArrayShapeError, FaceIndexError, OptionError
 from coneflat.mesh import TriangleMesh
 from coneflat.promises import broken_promises
 
@@ -165,3 +165,9 @@ def test_a_round_boundary_that_is_none_is_told():
     point = result.uv_faces[np.isin(result.faces, np.flatnonzero(rim))][0]
     uv[point] += 0.3 * (uv.mean(axis=0) - uv[point])
     assert any("not quite round: at vertex" in note for note in broken_promises(spoiled(result, uv)))
+
+
+@pytest.mark.parametrize("option", [{"quantum": np.pi / 2}, {"positive_only": True}])
+def test_curvatures_that_come_out_are_promised_nothing(option):
+    with pytest.raises(OptionError, match="curvatures come out"):
+        flatten(*shapes.sphere(1), at_cones="scale", **option)
