@@ -52,6 +52,12 @@ class Limits:
         """Whether the curvatures have a sum to keep."""
         return not math.isnan(self.total)
 
+    def text(self) -> str:
+        """Return the bounds for a message."""
+        if not math.isfinite(self.least):
+            return f"up to {self.most / math.pi:.4g} pi"
+        return f"{self.least / math.pi:.4g} pi to {self.most / math.pi:.4g} pi"
+
     @property
     def fewest(self) -> int:
         """The least number of cones that can carry the total."""

@@ -122,8 +122,8 @@ def open_lattice(search: ConeSearch, quantum: float) -> Lattice:
         or (total is not None and (total > 0 >= most or total < 0 <= least))
     ):
         raise CurvatureError(
-            f"no multiple of {quantum / np.pi:.4g} pi lies within the bounds of cone curvatures, "
-            f"{limits.least / np.pi:.4g} pi to {limits.most / np.pi:.4g} pi, and helps to their sum"
+            f"no multiple of {quantum / np.pi:.4g} pi lies within the bounds of cone curvatures, {limits.text()}, and "
+            "helps to their sum"
         )
     return Lattice(search.coarse, quantum, least, most, total)
 
