@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from coneflat.options import PURSUIT_FIELDS
+
 from .topology import Topology
 
 Random = np.random.Generator
@@ -26,16 +28,7 @@ METHODS = (
 )
 #: What the exact method alone has, and what a search for cones alone has.
 OF_EXACT = ("boundary", "at_cones", "refine", "correct_handles")
-OF_SEARCH = (
-    "cone_count",
-    "positive_only",
-    "weights",
-    "required_cones",
-    "forbidden_cones",
-    "allowed_cones",
-    "quantum",
-    "correct_handles",
-)
+OF_SEARCH = (*PURSUIT_FIELDS, "correct_handles")
 INVALID = (None, -1, 0, 1e308, 1e-300, math.nan, math.inf, "abc", "", [], (), {}, [1], [[0, 1]], True, 2**70)
 
 

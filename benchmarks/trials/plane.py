@@ -72,3 +72,8 @@ def overlap_depths(corners: np.ndarray) -> np.ndarray:
     depth[nowhere], depth[:, nowhere] = -1.0, -1.0
     np.fill_diagonal(depth, -1.0)
     return depth
+
+
+def off_multiple(angle: np.ndarray, quantum: float) -> np.ndarray:
+    """Return how far angles are from the nearest multiples of a quantum."""
+    return np.abs(angle - quantum * np.round(angle / quantum))

@@ -235,7 +235,7 @@ def _check_boundary_turns(trial: Trial) -> None:
         if off.any() and quantum is None:
             trial.broken("boundary", "boundary not straight", f"{off.sum()} vertices")
         if quantum is not None:
-            off = _off_multiple(curvature, quantum) - slack
+            off = plane.off_multiple(curvature, quantum) - slack
             if (off[topology.is_border] > 0).any():
                 trial.broken(
                     "boundary", "corners are no multiples", f"by {off[topology.is_border].max():.3g} rad"
@@ -245,8 +245,9 @@ def _check_boundary_turns(trial: Trial) -> None:
     corner_at = np.flatnonzero(np.isin(result.vertex_origin, list(named) if isinstance(named, dict) else []))
     share = np.zeros(len(curvature))
     edge_at = topology.edges[topology.count == 1]
-    length = trial.sides.ravel()[_halfedge_of_edge(trial)[topology.count == 1]]
-    np.add.at(share, edge_at.ravel(), np.repeat(length / 2, 2))
+    length = np.empty(len(topology.edges))
+    length[_edge_of_halfedge(trial)] = trial.sides.ravel()
+    np.add.at(share, edge_at.ravel(), np.repeat(length[topology.count == 1] / 2, 2))
     for loop in topology.border_loops():
         if np.isin(corner_at, loop).any():
             sides = np.setdiff1d(loop, corner_at)
@@ -280,7 +281,7 @@ def _check_rotations(trial: Trial) -> None:
         turn = np.angle(-steps[there] / steps[here])
     slack = ANGLE + 16 * EPS / np.maximum(lengths, EPS)
     known = lengths > 1e-12
-    off = _off_multiple(turn[known], quantum)
+    off = plane.off_multiple(turn[known], quantum)
     worst = float(off.max(initial=0.0))
     told = None if trial.result.rotations is None else trial.result.rotations.worst
     rounding = 2 * slack[known].max(initial=0.0)
@@ -346,8 +347,8 @@ def _check_cones(trial: Trial) -> None:
     if options.get("positive_only") and (curvatures < -ANGLE).any():
         trial.broken("cones", "cones: negative", curvatures.min())
     quantum = options.get("quantum")
-    if quantum is not None and len(cones) and _off_multiple(curvatures, quantum).max() > ANGLE:
-        trial.broken("rotation", "cones: no multiples", _off_multiple(curvatures, quantum).max())
+    if quantum is not None and len(cones) and plane.off_multiple(curvatures, quantum).max() > ANGLE:
+        trial.broken("rotation", "cones: no multiples", plane.off_multiple(curvatures, quantum).max())
 
 
 def _check_report(trial: Trial) -> None:
@@ -395,13 +396,3 @@ def _edge_of_halfedge(trial: Trial) -> np.ndarray:
     tails, heads = trial.result.faces.ravel(), np.roll(trial.result.faces, -1, axis=1).ravel()
     keys = trial.topology.edges[:, 0] * size + trial.topology.edges[:, 1]
     return np.searchsorted(keys, np.minimum(tails, heads) * size + np.maximum(tails, heads))
-
-
-def _halfedge_of_edge(trial: Trial) -> np.ndarray:
-    found = np.empty(len(trial.topology.edges), dtype=np.int64)
-    found[_edge_of_halfedge(trial)] = np.arange(trial.result.faces.size)
-    return found
-
-
-def _off_multiple(angle: np.ndarray, quantum: float) -> np.ndarray:
-    return np.abs(angle - quantum * np.round(angle / quantum))

@@ -133,21 +133,6 @@ def _check_shapes(mesh: TriangleMesh, corner_uv: FloatArray, prescribed: FloatAr
             raise ArrayShapeError(f"{name} must have the shape {wanted}, as the mesh has it, not {found}")
 
 
-def measure_at_any_size(
-    mesh: TriangleMesh,
-    corner_uv: FloatArray,
-    curvature_error: tuple[float, float] = (np.nan, np.nan),
-    cones: IntArray | None = None,
-    prescribed: FloatArray | None = None,
-    overlaps: Overlaps | None = None,
-) -> Distortion:
-    """Measure a UV map as `measure` does, of a mesh so large or small that squares of its lengths may be no numbers."""
-    exponent = -int(np.frexp(np.abs(mesh.vertices[mesh.faces]).max())[1])
-    unit = TriangleMesh(np.ldexp(mesh.vertices, exponent), mesh.faces)
-    measured = measure(unit, corner_uv, curvature_error, cones, prescribed, overlaps)
-    return measured.rescaled(exponent * float(np.log(2)))
-
-
 def angle_sum_errors(
     mesh: TriangleMesh, corner_uv: FloatArray, prescribed: FloatArray
 ) -> tuple[FloatArray, FloatArray]:

@@ -134,15 +134,11 @@ class Options:
                 )
         if self.at_cones == "scale" and any(k is not None for k in self.given_cones.values()):
             raise OptionError("with the scale fixed at cones their curvatures come out: give positions only")
-        for name, given in (
-            ("positive_only", self.positive_only is True),
-            ("quantum", self.quantum is not None),
-        ):
-            if self.at_cones == "scale" and given:
-                raise OptionError(
-                    f"with the scale fixed at cones their curvatures come out, and {name} would not be kept: at_cones "
-                    "'curvature'"
-                )
+        if self.at_cones == "scale" and (self.quantum is not None or self.positive_only is True):
+            name = "positive_only" if self.quantum is None else "quantum"
+            raise OptionError(
+                f"with the scale fixed at cones their curvatures come out: {name} would not be kept"
+            )
         if self.at_cones == "scale" and self.boundary_kind not in ("free", "lengths"):
             raise OptionError(
                 "a prescribed boundary needs prescribed curvatures at cones: at_cones 'curvature'"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .atlas.overlap import Overlaps
-from .distortion import angle_sum_errors, measure_at_any_size
+from .distortion import angle_sum_errors, measure
 from .geometry.planar import sides_between
 from .mesh import TriangleMesh
 from .options import UNFOLDED
@@ -73,14 +73,16 @@ def remeasured(
     """
     told = broken_promises(result)
     old = result.distortion
-    distortion = measure_at_any_size(
-        TriangleMesh(changed.vertices, changed.faces),
+    # By a power of two, lest squares of tiny or huge lengths are no numbers.
+    exponent = -int(np.frexp(np.abs(changed.vertices[changed.faces]).max())[1])
+    distortion = measure(
+        TriangleMesh(np.ldexp(changed.vertices, exponent), changed.faces),
         changed.corner_uv,
         (old.curvature_error, old.curvature_error_max),
         changed.cones,
         changed.prescribed,
         overlaps,
-    )
+    ).rescaled(exponent * float(np.log(2)))
     changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
     kept = tuple(note for note in result.notes if note not in told)
     return replace(changed, notes=(*kept, *broken_promises(changed, unit), *notes))
