@@ -15,10 +15,10 @@ import numpy as np
 from common import MODELS, shapes
 
 from coneflat import Flattening, check_mesh, flatten, read_mesh
-from coneflat.compare.peers import installed_peers, run_peer
-from coneflat.distortion import Distortion
+from coneflat.apps.compare.peers import installed_peers, run_peer
 from coneflat.errors import ConeflatError
 from coneflat.mesh import TriangleMesh
+from coneflat.quality.distortion import Distortion
 
 
 def main() -> None:

@@ -14,8 +14,8 @@ import numpy as np
 from common import best_time, meshes
 
 from coneflat import edge_lengths, mollify
-from coneflat.choose import Surface
 from coneflat.cones import greedy_cones
+from coneflat.cones.choose import Surface
 from coneflat.cones.pursuit import PursuedCones, open_search, pursue
 from coneflat.geometry.ties import tie_key
 from coneflat.solver import factorize

@@ -22,6 +22,9 @@ import numpy as np
 import shapes
 
 from coneflat.cones import cones_with_curvature
+from coneflat.flat import ExactChoices, exact_flattening
+from coneflat.flat.circle_patterns.flatten import circle_patterns
+from coneflat.flat.ricci import ricci_flow
 from coneflat.geometry import (
     angle_defect,
     corner_angles,
@@ -31,9 +34,6 @@ from coneflat.geometry import (
     edge_lengths,
 )
 from coneflat.mesh import TriangleMesh
-from coneflat.methods import ExactChoices, exact_flattening
-from coneflat.methods.circle_patterns import circle_patterns
-from coneflat.methods.ricci import ricci_flow
 
 # Vertices of the icosahedron that the sphere is split from, and curvatures that sum to 4 pi.
 CONES = np.array([0, 2, 3, 5, 7, 8, 10])

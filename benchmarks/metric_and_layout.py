@@ -13,8 +13,8 @@ from common import best_time, meshes
 
 from coneflat import cut_open, edge_lengths, find_seams
 from coneflat.cones import greedy_cones
+from coneflat.flat import ExactChoices, LaidOut, exact_flattening, linear_flattening
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
-from coneflat.methods import ExactChoices, LaidOut, exact_flattening, linear_flattening
 
 CONES = 20
 

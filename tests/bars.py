@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from coneflat.distortion import measure
-from coneflat.io import read_mesh, triangulate
+from coneflat.files import read_mesh
+from coneflat.input.triangulate import triangulate
 from coneflat.mesh import TriangleMesh
-from coneflat.result import Flattening
+from coneflat.quality.distortion import measure
+from coneflat.result.flattening import Flattening
 
 OBJ = b"""\
 # a bar of two cells \xe9

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from coneflat import TriangleMesh, edge_lengths
-from coneflat.conformal.exact import exact_metric
+from coneflat.flat.exact.metric import exact_metric
 
 
 def noisy(shape, amount, seed=0):

@@ -8,17 +8,16 @@ import shapes
 
 from coneflat import PAPER, corner_angles, edge_lengths, errors, flatten, read_mesh
 from coneflat.cones import ConeSolution
-from coneflat.conformal import abf
-from coneflat.conformal.angle_conditions import angle_conditions, wanted_angles
-from coneflat.conformal.linear_abf import linear_angles
-from coneflat.distortion import measure
+from coneflat.flat.angle_based import flatten as abf
+from coneflat.flat.angle_based.conditions import angle_conditions, wanted_angles
+from coneflat.flat.angle_based.flatten import angle_based, linear_angles
 from coneflat.geometry import angle_defect
+from coneflat.geometry.handles import handle_loops
+from coneflat.input.validation import check_mesh
 from coneflat.layout.least_squares import shapes_of_angles, shapes_of_lengths
 from coneflat.mesh import TriangleMesh
-from coneflat.methods.angle_based import angle_based
+from coneflat.quality.distortion import measure
 from coneflat.seams import cut_open
-from coneflat.seams.handles import handle_loops
-from coneflat.validation import check_mesh
 
 BOTH = ("linear-abf", "abf++")
 CLOSED = {

@@ -16,9 +16,9 @@ import shapes
 from click.testing import CliRunner
 
 from coneflat import errors, read_mesh
-from coneflat.batch import find_jobs, run_batch
-from coneflat.batch.process import Child
-from coneflat.cli.main import cli
+from coneflat.apps.batch import find_jobs, run_batch
+from coneflat.apps.batch.process import Child
+from coneflat.apps.cli.main import cli
 
 
 def write_obj(path, mesh):
@@ -194,7 +194,7 @@ def test_a_cluster_does_the_same_even_if_it_loses_a_worker(models, tmp_path, mon
 
 def test_no_cluster_answers(models, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("coneflat.batch.cluster.PATIENCE", 1.0)
+    monkeypatch.setattr("coneflat.apps.batch.cluster.PATIENCE", 1.0)
     with pytest.raises(errors.OptionError, match="no Dask scheduler"):
         run_batch(find_jobs([str(models)], tmp_path, ".obj", {}, None), tmp_path, dask="tcp://127.0.0.1:9")
 
@@ -312,7 +312,7 @@ def test_limits_of_time_that_are_none(models, tmp_path):
 @pytest.mark.parametrize("talks", [False, True])
 def test_what_listens_but_is_no_scheduler_is_given_up_soon(models, tmp_path, talks, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("coneflat.batch.cluster.PATIENCE", 1.0)
+    monkeypatch.setattr("coneflat.apps.batch.cluster.PATIENCE", 1.0)
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def answer():
@@ -330,7 +330,7 @@ def test_what_listens_but_is_no_scheduler_is_given_up_soon(models, tmp_path, tal
 @pytest.mark.parametrize("address", ["", "nonsense://x", "tcp://127.0.0.1:99999"])
 def test_addresses_that_are_none(models, tmp_path, address, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("coneflat.batch.cluster.PATIENCE", 1.0)
+    monkeypatch.setattr("coneflat.apps.batch.cluster.PATIENCE", 1.0)
     with pytest.raises(errors.OptionError, match="no Dask scheduler answers"):
         run_batch(find_jobs([str(models)], tmp_path, ".obj", {}, None), tmp_path, dask=address)
 
@@ -368,7 +368,9 @@ def test_a_worker_that_crashes_fails_its_mesh_alone_and_leaves_nothing_half_writ
     models, tmp_path, monkeypatch, what
 ):
     """The process for ball.obj begins to write, says something, and kills itself."""
-    monkeypatch.setattr("coneflat.batch.process.COMMAND", [sys.executable, "-c", CRASHING, what.decode()])
+    monkeypatch.setattr(
+        "coneflat.apps.batch.process.COMMAND", [sys.executable, "-c", CRASHING, what.decode()]
+    )
     jobs = find_jobs([str(models / "ball.obj"), str(models / "hill.obj")], tmp_path, ".obj", {}, None)
     found = run_batch(jobs, tmp_path, processes=1)
     assert [row["status"] for row in found.rows] == ["failed", "done"]
@@ -396,7 +398,7 @@ def test_a_process_that_cannot_be_started_fails_its_mesh(models, tmp_path, monke
     def refuse(*_, **__):
         raise OSError(12, "Cannot allocate memory")
 
-    monkeypatch.setattr("coneflat.batch.process.subprocess.Popen", refuse)
+    monkeypatch.setattr("coneflat.apps.batch.process.subprocess.Popen", refuse)
     found = run_batch(find_jobs([str(models)], tmp_path, ".obj", {}, None), tmp_path)
     assert found.failed == 3
     assert all("Cannot allocate memory" in row["error"] for row in found.rows)

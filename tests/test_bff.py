@@ -10,9 +10,9 @@ import shapes
 from shapes import cut_disk, lengths_of
 
 from coneflat import TriangleMesh, cut_open, edge_lengths, errors, find_seams, flatten
-from coneflat.choose import Surface
 from coneflat.cones import cones_at, cones_with_curvature
-from coneflat.methods.bff import HarmonicExtension, best_fit_lengths, boundary_first
+from coneflat.cones.choose import Surface
+from coneflat.flat.bff import HarmonicExtension, best_fit_lengths, boundary_first
 
 
 def solved(vertices, faces, cones=(), curvatures=None):

@@ -7,11 +7,12 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_flow
 
 import coneflat
-from coneflat.atlas import Layout, Seams, find_overlaps, injective_charts, overlap_layers
+from coneflat.atlas import Layout, Seams, injective_charts, overlap_layers
 from coneflat.atlas.glue import glue_charts
 from coneflat.atlas.regions import largest_layers
 from coneflat.atlas.separate import border_edges, separate, widen
 from coneflat.atlas.split import split_overlaps
+from coneflat.geometry.overlap import find_overlaps
 from coneflat.mesh import TriangleMesh
 
 

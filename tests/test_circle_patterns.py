@@ -12,21 +12,20 @@ from scipy.spatial import Delaunay
 from scipy.special import spence
 
 from coneflat import TriangleMesh, cut_open, errors, find_seams, flatten
-from coneflat.choose import Surface
 from coneflat.cones import ConeSolution, greedy_cones
-from coneflat.conformal.circle_pattern import RadiiProblem, circle_pattern
-from coneflat.conformal.coherent_angles import LEAST_PART, coherent_angles
-from coneflat.conformal.descent import descend
-from coneflat.distortion import measure
+from coneflat.cones.choose import Surface
+from coneflat.flat.circle_patterns.coherent_angles import LEAST_PART, coherent_angles
+from coneflat.flat.circle_patterns.descent import descend
+from coneflat.flat.circle_patterns.flatten import RadiiProblem, circle_pattern, circle_patterns
+from coneflat.flat.circle_patterns.proper import make_proper
 from coneflat.geometry import angle_defect, corner_angles, edge_lengths
 from coneflat.geometry.delaunay import intrinsic_delaunay
 from coneflat.geometry.intrinsic import intrinsic_triangulation
-from coneflat.geometry.proper import make_proper
+from coneflat.geometry.straight import straight_triangles
 from coneflat.geometry.ties import tie_key
-from coneflat.layout.straighten import straight_triangles
-from coneflat.methods.circle_patterns import circle_patterns
+from coneflat.input.components import prepare
 from coneflat.options import Options
-from coneflat.prepare import prepare
+from coneflat.quality.distortion import measure
 
 
 def lengths_of(mesh):
@@ -300,6 +299,6 @@ def test_radii_that_no_numbers_hold_are_refused(monkeypatch):
         found = descend(problem, place, *limits)
         return replace(found, place=found.place + 700.0 * np.eye(1, len(place))[0])
 
-    monkeypatch.setattr("coneflat.conformal.circle_pattern.descend", run_away)
+    monkeypatch.setattr("coneflat.flat.circle_patterns.flatten.descend", run_away)
     with pytest.raises(errors.ConvergenceError, match="the logs of radii came to differ by 7"):
         flatten(*shapes.hill(6, 5), method="circle-patterns", best_effort=True)

@@ -15,7 +15,7 @@ import pytest
 import shapes
 
 from coneflat import errors, read_mesh
-from coneflat.cli.given import parse_angle, parse_curvature, parse_vertices
+from coneflat.apps.cli.given import parse_angle, parse_curvature, parse_vertices
 
 #: A line of progress, which comes by the clock.
 PROGRESS = re.compile(r" *\d+\.\d s +\d+%  .*")

@@ -12,13 +12,13 @@ import shapes
 from click.testing import CliRunner
 
 from coneflat import MeshFile, errors, flatten
-from coneflat.cli.main import cli, main
-from coneflat.compare import compare_methods, reproduce
-from coneflat.compare.paper import METHODS as PAPER_METHODS
-from coneflat.compare.peers import PEERS, installed_peers, with_uv
-from coneflat.compare.published import MODELS, model_of
-from coneflat.compare.table import COLUMNS, comparison_csv, comparison_markdown
-from coneflat.methods.others import other_method
+from coneflat.apps.cli.main import cli, main
+from coneflat.apps.compare import compare_methods, reproduce
+from coneflat.apps.compare.paper import METHODS as PAPER_METHODS
+from coneflat.apps.compare.peers import PEERS, installed_peers, with_uv
+from coneflat.apps.compare.published import MODELS, model_of
+from coneflat.apps.compare.table import COLUMNS, comparison_csv, comparison_markdown
+from coneflat.flat.methods import other_method
 from coneflat.options import METHODS, VARIANTS
 
 
@@ -64,7 +64,7 @@ def test_a_method_that_fails_is_named_with_its_reason(ball, monkeypatch):
     def fail(name):
         raise errors.ConvergenceError(f"{name} did not converge")
 
-    monkeypatch.setattr("coneflat.metric.other_method", fail)
+    monkeypatch.setattr("coneflat.flat.methods.other_method", fail)
     found = compare_methods(*ball, methods=("exact", "bff"), peers=())
     assert found["bff"].result is None
     assert found["bff"].note == "bff did not converge"
@@ -85,7 +85,7 @@ def test_bad_options(ball, options, message):
 
 
 def test_a_peer_that_is_not_installed(ball, monkeypatch):
-    monkeypatch.setattr("coneflat.compare.run.installed_peers", tuple)
+    monkeypatch.setattr("coneflat.apps.compare.run.installed_peers", tuple)
     with pytest.raises(errors.OptionError, match="xatlas is not installed"):
         compare_methods(*ball, peers=("xatlas",))
 
@@ -207,7 +207,7 @@ def test_what_cannot_work_is_refused_before_the_work(words, message, tmp_path, b
     def work(*_, **__):
         raise AssertionError("went to work")
 
-    monkeypatch.setattr("coneflat.compare.run.flatten", work)
+    monkeypatch.setattr("coneflat.apps.compare.run.flatten", work)
     monkeypatch.setattr(sys, "argv", ["coneflat", *words])
     error = io.StringIO()
     monkeypatch.setattr(sys, "stderr", error)
@@ -261,7 +261,7 @@ def test_a_folder_that_cannot_be_made(tmp_path, ball):
 
 
 def test_every_list_of_methods_is_the_same():
-    from coneflat.cli import method
+    from coneflat.apps.cli import method
 
     assert (method.METHODS, method.VARIANTS) == (METHODS, VARIANTS)
     others = [other_method(name) for name in (METHODS + VARIANTS)[2:]]

@@ -9,9 +9,9 @@ import pytest
 import shapes
 
 import coneflat
-from coneflat.compare import run
-from coneflat.compare.pictures import Sight, draw_layouts, draw_qualities, turned_alike
-from coneflat.compare.run import Comparison, Entry, compare_methods
+from coneflat.apps.compare import run
+from coneflat.apps.compare.pictures import Sight, draw_layouts, draw_qualities, turned_alike
+from coneflat.apps.compare.run import Comparison, Entry, compare_methods
 
 LONG = "circle-patterns/fixed"
 
@@ -66,7 +66,7 @@ def test_no_text_runs_into_another_or_over_the_edge(stretch):
 
 def test_a_legend_is_as_wide_as_its_figure():
     pytest.importorskip("matplotlib")
-    from coneflat.compare.pictures import cone_panel, figure_of, in_rows
+    from coneflat.apps.compare.pictures import cone_panel, figure_of, in_rows
 
     vertices, faces = shapes.sphere(1)
     result = coneflat.flatten(vertices * [0.2, 3, 0.2], faces, cone_count=8)

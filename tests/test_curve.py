@@ -6,7 +6,7 @@ import shapes
 from click.testing import CliRunner
 
 import coneflat
-from coneflat.cli.main import cli
+from coneflat.apps.cli.main import cli
 from coneflat.errors import OptionError
 
 

@@ -10,7 +10,7 @@ from coneflat import TriangleMesh
 from coneflat.geometry import angle_defect, corner_angles, double_areas, edge_lengths
 from coneflat.geometry.delaunay import intrinsic_delaunay, make_delaunay
 from coneflat.geometry.intrinsic import halfedge_twins, intrinsic_triangulation
-from coneflat.layout.straighten import straight_triangles
+from coneflat.geometry.straight import straight_triangles
 
 SURFACES = {
     "sphere": shapes.sphere(3),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import coneflat
-from coneflat.cli.main import cli
+from coneflat.apps.cli.main import cli
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]

@@ -8,14 +8,13 @@ import shapes
 from scipy.spatial import ConvexHull
 
 from coneflat import TriangleMesh, errors
-from coneflat.conformal.doubling import double
-from coneflat.conformal.exact import exact_metric
-from coneflat.conformal.hessian import HessianPattern
-from coneflat.conformal.linear import scaled_lengths
-from coneflat.conformal.preconditioner import conjugate_gradients, corrected
+from coneflat.flat.exact.hessian import HessianPattern
+from coneflat.flat.exact.metric import double, exact_metric
+from coneflat.flat.exact.preconditioner import conjugate_gradients, corrected
+from coneflat.flat.linear import scaled_lengths
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths
 from coneflat.geometry.intrinsic import intrinsic_triangulation
-from coneflat.layout.straighten import straight_triangles
+from coneflat.geometry.straight import straight_triangles
 
 
 def random_sphere(count, seed):

@@ -16,9 +16,10 @@ from coneflat.errors import MeshFileError, OptionError, UnknownFormatError
 
 pytest.importorskip("matplotlib")
 
-from coneflat.cli import figure as command
-from coneflat.cli import main as cli
-from coneflat.view import KINDS, compose, demo_figure, new_figure
+from coneflat.apps.cli import figure as command
+from coneflat.apps.cli import main as cli
+from coneflat.view import KINDS, demo_figure, new_figure
+from coneflat.view.figures import compose
 
 
 @pytest.fixture(scope="module")

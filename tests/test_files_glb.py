@@ -11,8 +11,8 @@ from scenes import PNG, SceneMaker, corners_of, opened, rich_scene
 from shapes import join, sphere
 
 import coneflat
-from coneflat.io import read_mesh, read_mesh_from
-from coneflat.io.join import read_joined
+from coneflat.files import read_mesh, read_mesh_from
+from coneflat.input.join import read_joined
 
 trimesh = pytest.importorskip("trimesh")
 

@@ -18,7 +18,8 @@ from scenes import SceneMaker, opened, rich_scene
 
 import coneflat
 from coneflat.errors import ConeflatError, MeshFileError
-from coneflat.io import read_mesh, read_mesh_from, triangulate
+from coneflat.files import read_mesh, read_mesh_from
+from coneflat.input.triangulate import triangulate
 
 MOST = 64 << 20
 """Bytes that refusing a file of a few kilobytes may take."""

@@ -12,9 +12,9 @@ from shapes import hill, sphere
 
 import coneflat
 from coneflat import check_mesh
-from coneflat.distortion import measure
-from coneflat.io import read_mesh
-from coneflat.io.written import as_written
+from coneflat.files import read_mesh
+from coneflat.files.written import as_written
+from coneflat.quality.distortion import measure
 
 trimesh = pytest.importorskip("trimesh")
 meshio = pytest.importorskip("meshio")

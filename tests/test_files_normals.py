@@ -7,7 +7,7 @@ import pytest
 from shapes import sphere
 
 import coneflat
-from coneflat.io import read_mesh
+from coneflat.files import read_mesh
 
 trimesh = pytest.importorskip("trimesh")
 

@@ -10,9 +10,9 @@ from click.testing import CliRunner
 from shapes import hill
 
 import coneflat
-from coneflat.cli.main import cli
+from coneflat.apps.cli.main import cli
 from coneflat.errors import EmptyMeshError, MeshFileError, UnknownFormatError
-from coneflat.io import INPUT_FORMATS, read_mesh, read_mesh_from, write_stream
+from coneflat.files import INPUT_FORMATS, read_mesh, read_mesh_from, write_stream
 
 trimesh = pytest.importorskip("trimesh")
 

@@ -7,9 +7,8 @@ import pytest
 import shapes
 
 from coneflat import check_mesh, corner_angles, edge_lengths, errors, flatten, read_mesh
-from coneflat.conformal.turning import off_multiple, open_turning
-from coneflat.rotations import measure_rotations
-from coneflat.seams.handles import handle_loops
+from coneflat.geometry.handles import handle_loops, off_multiple, open_turning
+from coneflat.quality.rotations import measure_rotations
 
 QUARTER = np.pi / 2
 

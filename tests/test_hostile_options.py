@@ -11,7 +11,7 @@ import shapes
 
 import coneflat
 from coneflat import errors, find_seams
-from coneflat.inputs import as_input
+from coneflat.input.arrays import as_input
 from coneflat.options import LEAST_QUANTUM
 
 # What no option is.

@@ -11,8 +11,8 @@ from click.testing import CliRunner
 
 import coneflat
 from coneflat import MeshFile, check_mesh, errors
-from coneflat.cli.main import cli
-from coneflat.io.join import join_borders, read_joined
+from coneflat.apps.cli.main import cli
+from coneflat.input.join import join_borders, read_joined
 
 TAKE_MESHES = ("flatten", "batch", "cones", "compare", "view", "figure", "measure")
 
@@ -244,8 +244,8 @@ class TestOwnUVs:
         assert "Shown are" not in done.stdout
 
     def test_they_are_those_of_the_file(self, square):
-        from coneflat.io.join import read_joined
-        from coneflat.view.own import own_flattening
+        from coneflat.input.join import read_joined
+        from coneflat.result.from_uv import own_flattening
 
         shown = own_flattening(read_joined(square))
         vertices, _ = shapes.hill(6, 5)

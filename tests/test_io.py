@@ -20,7 +20,8 @@ from coneflat.errors import (
     NonFiniteError,
     UnknownFormatError,
 )
-from coneflat.io import INPUT_FORMATS, is_polygon_side, read_mesh, triangulate
+from coneflat.files import INPUT_FORMATS, read_mesh
+from coneflat.input.triangulate import is_polygon_side, triangulate
 
 MESHES = Path(__file__).parents[2] / "shared" / "meshes"
 

@@ -10,10 +10,10 @@ import shapes
 
 from coneflat import flatten
 from coneflat.errors import ConeflatError, FaceIndexError, MeshFileError
-from coneflat.io import decimals, obj_write, read_mesh, text, write_flattening
-from coneflat.io.decimals import lines_of, read_many
-from coneflat.io.uv_split import split_at_seams
-from coneflat.io.weld import weld
+from coneflat.files import decimals, obj_write, read_mesh, text, write_flattening
+from coneflat.files.decimals import lines_of, read_many
+from coneflat.files.uv_split import split_at_seams
+from coneflat.input.weld import weld
 
 OBJ = (
     b"\xef\xbb\xbf# C:\\models\\\r\no thing\r\nv 0 0 0\r\n  v 1 0.5 \\\r\n 1e-3 # a \\ b\r\nv 1 1 -0\r\nvt 0 0\r\n"

@@ -11,8 +11,8 @@ from bars import cut_bar, read_bar
 
 import coneflat
 from coneflat.errors import MeshFileError, UnknownFormatError
-from coneflat.io import OUTPUT_FORMATS, atomic_write, check_output, write_flattening
-from coneflat.view.picture import read_picture
+from coneflat.files import OUTPUT_FORMATS, atomic_write, check_output, write_flattening
+from coneflat.view.page.picture import read_picture
 
 
 @pytest.fixture

@@ -14,9 +14,10 @@ import shapes
 from bars import OBJ, POINTS, cut_bar, flattening, read_bar
 
 import coneflat
-from coneflat.checker import DARK_CELL, LIGHT_CELL
 from coneflat.errors import MeshFileError, OptionError
-from coneflat.io import read_mesh, triangulate, write_flattening
+from coneflat.files import read_mesh, write_flattening
+from coneflat.input.triangulate import triangulate
+from coneflat.quality.checker import DARK_CELL, LIGHT_CELL
 
 
 @pytest.fixture
@@ -224,7 +225,7 @@ class TestSplitFormats:
     @pytest.mark.parametrize("cells", [10, 11])
     def test_glb_carries_a_checkerboard(self, tmp_path, monkeypatch, cells):
         image = pytest.importorskip("PIL.Image")
-        monkeypatch.setattr("coneflat.io.texture.cell_side", lambda uv, uv_faces: 1 / cells)
+        monkeypatch.setattr("coneflat.files.texture.cell_side", lambda uv, uv_faces: 1 / cells)
         result = coneflat.flatten(*shapes.hill())
         tree, accessor = glb_parts(result.save(tmp_path / "out.glb", texture="checker"))
         content = embedded_image(tmp_path / "out.glb", tree)

@@ -5,7 +5,7 @@ import pytest
 import shapes
 
 from coneflat import TriangleMesh, edge_lengths, errors, least_squares_layout
-from coneflat.layout.pieces import triangulations
+from coneflat.layout.subdivision import triangulations
 
 
 def test_flat_mesh_comes_back():

@@ -8,8 +8,7 @@ import shapes
 from shapes import cut_disk, lengths_of
 
 from coneflat import TriangleMesh, edge_lengths, errors, flatten
-from coneflat.conformal.energy import conformal_equations
-from coneflat.methods.lscm import least_squares_conformal
+from coneflat.flat.disk_maps import conformal_equations, least_squares_conformal
 
 
 def bent(columns=16, rows=10):

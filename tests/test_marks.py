@@ -8,8 +8,8 @@ import shapes
 
 import coneflat
 from coneflat import errors
-from coneflat.atlas import find_overlaps
-from coneflat.geometry.dihedral import dihedral_angles
+from coneflat.geometry.normals import dihedral_angles
+from coneflat.geometry.overlap import find_overlaps
 from coneflat.mesh import TriangleMesh, end_corners
 
 

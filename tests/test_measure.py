@@ -13,9 +13,9 @@ from click.testing import CliRunner
 
 import coneflat
 from coneflat import MeshFile, errors, measure_uv
-from coneflat.cli.main import cli
-from coneflat.polygons import fan_corners
-from coneflat.uvs import MEASURED
+from coneflat.apps.cli.main import cli
+from coneflat.input.polygons import fan_corners
+from coneflat.result.measure_uv import MEASURED
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 UNIT = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"

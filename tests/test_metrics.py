@@ -150,7 +150,7 @@ def test_too_few_cones_on_a_sphere():
 
 
 def test_unconverged_metric_is_refused_unless_asked(monkeypatch):
-    from coneflat.methods import exact as method
+    from coneflat.flat.exact import flatten as method
 
     exact = method.exact_metric
     monkeypatch.setattr(

@@ -9,9 +9,10 @@ import shapes
 
 import coneflat
 from coneflat import errors
-from coneflat.atlas import coverage, find_overlaps, overlap_regions, part_touching
-from coneflat.atlas.boxes import snug_boxes
-from coneflat.atlas.orientation_kernel import fill_orientations
+from coneflat.atlas import overlap_regions, part_touching
+from coneflat.geometry import coverage
+from coneflat.geometry.overlap import find_overlaps, snug_boxes
+from coneflat.geometry.predicates import fill_orientations
 
 UNIT = [[0, 0], [1, 0], [0, 1]]
 ULP = 2.0**-53

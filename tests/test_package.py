@@ -20,7 +20,7 @@ def test_every_public_name_is_there():
 
 
 def test_import_and_help_load_nothing_heavy():
-    script = "import sys, coneflat, coneflat.cli.main; print(*sys.modules)"
+    script = "import sys, coneflat, coneflat.apps.cli.main; print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     ).stdout.split()

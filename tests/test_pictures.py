@@ -25,7 +25,9 @@ import coneflat
 
 pytest.importorskip("matplotlib")
 
-from coneflat.view import layout, marks, quantity
+from coneflat.view import quantity
+from coneflat.view.figures import cone_marks as marks
+from coneflat.view.figures import uv_layout as layout
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +165,7 @@ class TestChecker:
             assert all(np.ptp(place) <= 2 for place in zip(*changes, strict=True))
 
     def test_cells_are_counted_by_the_area(self, result):
-        from coneflat.checker import cell_side
+        from coneflat.quality.checker import cell_side
 
         one, two = (result.corner_uv[:, k] - result.corner_uv[:, 0] for k in (1, 2))
         area = np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum() / 2

@@ -10,10 +10,10 @@ import shapes
 
 from coneflat import edge_lengths, flatten
 from coneflat.atlas.arrange import whole_turns
-from coneflat.distortion import measure
 from coneflat.errors import ArrayShapeError, FaceIndexError, OptionError
 from coneflat.mesh import TriangleMesh
-from coneflat.promises import broken_promises
+from coneflat.quality.distortion import measure
+from coneflat.result.promises import broken_promises
 
 
 def seam_turns(result):

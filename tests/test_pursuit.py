@@ -11,7 +11,7 @@ from coneflat.cones.coarsen import coarse_basis
 from coneflat.cones.pursuit import open_search
 from coneflat.errors import CurvatureError, OptionError
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, double_areas
-from coneflat.geometry.areas import area_distortion
+from coneflat.geometry.operators import area_distortion
 from coneflat.geometry.ties import tie_key
 
 HANDLE = shapes.genus(3)

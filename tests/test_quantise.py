@@ -9,7 +9,7 @@ from coneflat import read_mesh
 from coneflat.cones.pursuit import open_search
 from coneflat.cones.quantise import quantise_cones
 from coneflat.errors import CurvatureError, OptionError
-from coneflat.geometry.areas import area_distortion
+from coneflat.geometry.operators import area_distortion
 from coneflat.geometry.ties import tie_key
 
 

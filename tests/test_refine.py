@@ -8,14 +8,13 @@ import shapes
 from scaled import noisy, with_cones, with_scale
 
 from coneflat import TriangleMesh, check_mesh, cut_open, edge_lengths, errors, find_seams, mollify, read_mesh
-from coneflat.conformal.exact import exact_metric
+from coneflat.flat.exact.metric import exact_metric
 from coneflat.geometry.intrinsic import intrinsic_triangulation
+from coneflat.geometry.straight import place_triangles, straight_triangles
 from coneflat.geometry.triangles import corner_angles, double_areas
-from coneflat.inputs import as_input
+from coneflat.input.arrays import as_input
 from coneflat.layout.overlay import overlay
 from coneflat.layout.refine import refine
-from coneflat.layout.straighten import straight_triangles
-from coneflat.layout.undo_kernel import place_triangles
 from coneflat.layout.unfold import unfold
 
 TETRAHEDRON = (

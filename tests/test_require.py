@@ -13,8 +13,8 @@ from click.testing import CliRunner
 
 import coneflat
 from coneflat import errors
-from coneflat.cli.main import cli
-from coneflat.requirements import REPORTED, Requirement, breaches, parse_requirements
+from coneflat.apps.cli.main import cli
+from coneflat.result.requirements import REPORTED, Requirement, breaches, parse_requirements
 
 
 @pytest.fixture

@@ -13,13 +13,12 @@ from scipy.spatial import Delaunay
 
 from coneflat import TriangleMesh, errors, flatten
 from coneflat.cones import ConeSolution
-from coneflat.conformal.exact import exact_metric
-from coneflat.conformal.hessian import HessianPattern
-from coneflat.conformal.packing import FixedPackingProblem, PackingProblem, packed_radii
+from coneflat.flat.exact.hessian import HessianPattern
+from coneflat.flat.exact.metric import exact_metric
+from coneflat.flat.ricci import FixedPackingProblem, PackingProblem, packed_radii, ricci_flow
 from coneflat.geometry import angle_defect, corner_angles, edge_lengths
+from coneflat.geometry.flips import other_inversive_distance, tilts
 from coneflat.geometry.intrinsic import intrinsic_triangulation
-from coneflat.geometry.packing_kernel import other_inversive_distance, tilts
-from coneflat.methods.ricci import ricci_flow
 
 BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 
@@ -201,7 +200,7 @@ class TestRoutes:
         gaps = []
         for part in (1e-1, 1e-2, 1e-3):
             monkeypatch.setattr(
-                "coneflat.conformal.packing.packed_radii",
+                "coneflat.flat.ricci.packed_radii",
                 lambda *given, part=part: part * packed_radii(*given),
             )
             metric = exact_metric(mesh, lengths_of(mesh), target, kind=PackingProblem)

@@ -11,7 +11,7 @@ from test_seams import SURFACES, lengths_of, with_cones
 
 from coneflat import TriangleMesh, cut_open, edge_costs, errors, find_seams, visible_share
 from coneflat.geometry import visibility
-from coneflat.geometry.dihedral import dihedral_angles
+from coneflat.geometry.normals import dihedral_angles
 
 
 def well(width=1.0, depth=1.0, wall=0.4, rows=24, around=48):

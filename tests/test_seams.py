@@ -7,7 +7,7 @@ import pytest
 import shapes
 
 from coneflat import TriangleMesh, cut_open, errors, find_seams
-from coneflat.graph import MultiGraph
+from coneflat.geometry.graph import MultiGraph
 from coneflat.mesh import label_components
 
 NONE = np.array([], dtype=int)

@@ -9,10 +9,9 @@ from scipy.sparse.linalg import ArpackNoConvergence
 from shapes import cut_disk, lengths_of
 
 from coneflat import TriangleMesh, edge_lengths, errors, flatten
-from coneflat.conformal.energy import conformal_equations
-from coneflat.layout.boundary_walk import walk_boundary
-from coneflat.methods import spectral
-from coneflat.methods.spectral import spectral_conformal
+from coneflat.flat import disk_maps as spectral
+from coneflat.flat.disk_maps import conformal_equations, spectral_conformal
+from coneflat.geometry.boundary_walk import walk_boundary
 
 
 def energy(disk, points):
@@ -45,7 +44,7 @@ def test_is_the_second_eigenvector(shape):
 
 
 def test_has_less_energy_than_any_pinned_map():
-    from coneflat.methods.lscm import least_squares_conformal
+    from coneflat.flat.disk_maps import least_squares_conformal
 
     disk = cut_disk(*shapes.sphere(3), cones=(3, 77, 300))
     least = energy(disk, spectral_conformal(disk, lengths_of(disk)))

@@ -8,9 +8,9 @@ import shapes
 
 import coneflat
 from coneflat import errors
-from coneflat.conformal.exact import exact_metric
+from coneflat.flat.base import off_by
+from coneflat.flat.exact.metric import exact_metric
 from coneflat.geometry import edge_lengths
-from coneflat.methods.base import off_by
 
 
 def spiky_sphere(rounds: int, amplitude: float, seed: int = 0):

@@ -9,8 +9,8 @@ import pytest
 import shapes
 from click.testing import CliRunner
 
-from coneflat.cli.console import Console
-from coneflat.cli.main import cli
+from coneflat.apps.cli.console import Console
+from coneflat.apps.cli.main import cli
 
 COMMANDS = {
     "flatten": ("flatten", "model.obj", "-o", "out.obj"),
@@ -94,7 +94,7 @@ def test_stages_add_up_and_parts_lie_within_the_whole(capsys):
 
 def test_lines_come_a_second_apart_if_it_takes_long(capsys, monkeypatch):
     now = [0.0]
-    monkeypatch.setattr("coneflat.cli.console.time.perf_counter", lambda: now[0])
+    monkeypatch.setattr("coneflat.apps.cli.console.time.perf_counter", lambda: now[0])
     with Console() as console:
         for now[0] in (0.0, 0.9, 1.9, 2.9, 3.1, 3.9, 4.3, 4.4):
             console.progress(f"step {now[0]}", now[0] / 6)

@@ -6,9 +6,9 @@ import shapes
 
 import coneflat
 from coneflat import TriangleMesh, errors
-from coneflat.atlas import find_overlaps
-from coneflat.distortion import measure
-from coneflat.rotations import seam_rotations
+from coneflat.geometry.overlap import find_overlaps
+from coneflat.quality.distortion import measure
+from coneflat.quality.rotations import seam_rotations
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coneflat.errors import DegenerateFaceError, FaceIndexError
-from coneflat.io import is_polygon_side, triangulate
+from coneflat.input.triangulate import is_polygon_side, triangulate
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 

@@ -7,12 +7,12 @@ import pytest
 import shapes
 
 from coneflat import TriangleMesh, cut_open, find_seams
-from coneflat.conformal.exact import exact_metric
+from coneflat.flat.exact.metric import exact_metric
 from coneflat.geometry import edge_lengths
 from coneflat.geometry.intrinsic import halfedge_twins
 from coneflat.geometry.planar import heights
+from coneflat.geometry.straight import FlatTriangles, straight_triangles
 from coneflat.layout.patches import DEGENERATE
-from coneflat.layout.straighten import FlatTriangles, straight_triangles
 from coneflat.layout.unfold import unfold
 from coneflat.layout.untangle import untangle
 

@@ -10,10 +10,10 @@ import shapes
 
 import coneflat
 from coneflat import TriangleMesh, edge_lengths
-from coneflat.conformal.exact import exact_metric
+from coneflat.flat.exact.metric import exact_metric
 from coneflat.geometry.planar import heights
+from coneflat.geometry.straight import FlatTriangles, straight_triangles
 from coneflat.layout.patches import DEGENERATE, STEPS, Patches
-from coneflat.layout.straighten import FlatTriangles, straight_triangles
 from coneflat.layout.untangle import LEAST_WORK, WORK, untangle
 
 
@@ -80,7 +80,7 @@ class TestWinding:
             seen.append((result, faces, angles, flat, on_boundary))
             return result
 
-        monkeypatch.setattr("coneflat.methods.exact.untangle", watched)
+        monkeypatch.setattr("coneflat.flat.exact.flatten.untangle", watched)
         coneflat.flatten(*WILD[name])
         assert seen
         for result, faces, angles, before, on_boundary in seen:
@@ -104,7 +104,7 @@ class TestWinding:
         _, faces = fan(6, 0, 0)
         turn = 2 * np.pi * np.arange(7) / 3
         points = np.append(np.column_stack([np.cos(turn[:6]), np.sin(turn[:6])]), [[0, 0]], axis=0)
-        from coneflat.methods.base import laid_out_curvature
+        from coneflat.flat.base import laid_out_curvature
 
         mesh = TriangleMesh(np.column_stack([points, np.zeros(7)]), faces)
         curvature = laid_out_curvature(mesh, points[faces])
@@ -112,7 +112,7 @@ class TestWinding:
         np.testing.assert_allclose(curvature[:6], np.pi - 2 * np.pi / 6)
 
     def test_a_triangle_on_a_line_is_neither_upright_nor_inverted(self):
-        from coneflat.methods.base import laid_out_curvature
+        from coneflat.flat.base import laid_out_curvature
 
         points = np.array([[0, 0], [1, 0.0], [0.5, 0]])
         mesh = TriangleMesh(np.column_stack([points, np.zeros(3)]), np.array([[0, 1, 2]]))

@@ -19,11 +19,11 @@ import coneflat
 from coneflat.errors import ArrayShapeError, MeshError, MeshFileError, OptionError, UnknownFormatError
 from coneflat.mesh import end_corners
 from coneflat.view import colours
-from coneflat.view.content import content_of, outline_halfedges
-from coneflat.view.picture import read_picture
+from coneflat.view.figures.raster import rasterise
+from coneflat.view.page.content import content_of, outline_halfedges
+from coneflat.view.page.picture import read_picture
+from coneflat.view.page.webpage import MOST_IN_NOTEBOOK, SHOWS, notebook_html, open_page, page_of
 from coneflat.view.quantity import ColorScale
-from coneflat.view.raster import rasterise
-from coneflat.view.webpage import MOST_IN_NOTEBOOK, SHOWS, notebook_html, open_page, page_of
 
 TYPES = {"f4": "<f4", "u4": "<u4", "i4": "<i4", "u2": "<u2", "u1": "u1"}
 PIXEL = base64.b64decode(
@@ -64,7 +64,7 @@ class TestPage:
         )
         assert head["cone_curvatures"] == pytest.approx(result.curvatures.tolist())
         assert np.linalg.norm(places, axis=1).max() == pytest.approx(1.0)
-        assert head["rows"] == [list(row) for row in coneflat.report.as_rows(result)]
+        assert head["rows"] == [list(row) for row in coneflat.result.report.as_rows(result)]
 
     def test_it_names_no_other_place(self, result):
         page = page_of(result)
@@ -87,7 +87,7 @@ class TestPage:
         assert result._repr_html_().startswith("<iframe srcdoc=")
 
     def test_a_notebook_holds_a_thinned_mesh(self, result, monkeypatch):
-        monkeypatch.setattr("coneflat.view.webpage.MOST_IN_NOTEBOOK", 2000)
+        monkeypatch.setattr("coneflat.view.page.webpage.MOST_IN_NOTEBOOK", 2000)
         assert len(notebook_html(result)) < len(page_of(result))
         assert MOST_IN_NOTEBOOK <= 100_000
 
@@ -325,7 +325,7 @@ class TestFiles:
 
     def test_without_a_path_it_is_opened(self, result, monkeypatch):
         opened = []
-        monkeypatch.setattr("coneflat.view.webpage.open_page", opened.append)
+        monkeypatch.setattr("coneflat.view.page.webpage.open_page", opened.append)
         path = result.view()
         assert opened == [path]
         assert path.read_text(encoding="utf-8").startswith("<!doctype html>")

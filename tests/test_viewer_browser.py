@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from browsing import NARROW, WIDE, Visit, thing
 
-from coneflat.view.content import content_of
-from coneflat.view.webpage import SHOWS, notebook_html, page_of
+from coneflat.view.page.content import content_of
+from coneflat.view.page.webpage import SHOWS, notebook_html, page_of
 
 CELL = "1 / coneflat.state.get('squares') * coneflat.model.head.uv_side"
 
@@ -23,7 +23,7 @@ def colour_at(visit, u, v):
 
 def inner_points(viewed, cell, count=12):
     """Middles of squares of the plane that lie well inside a triangle-covered part."""
-    from coneflat.view.raster import rasterise
+    from coneflat.view.figures.raster import rasterise
 
     flat = np.column_stack([1000 * viewed.uv, np.zeros(len(viewed.uv))])
     covered = rasterise(flat, viewed.uv_faces, 1000, 1000).covered

@@ -8,7 +8,7 @@ import shapes
 from click.testing import CliRunner
 
 from coneflat import MeshFile, TriangleMesh, errors, find_cones, flatten, read_mesh
-from coneflat.cli.main import cli
+from coneflat.apps.cli.main import cli
 
 
 def painted_ply(path, vertices, faces, red):

@@ -9,16 +9,16 @@ import pytest
 import shapes
 
 from coneflat import flatten
-from coneflat.atlas import find_overlaps
 from coneflat.atlas.snap import snap_apart
 from coneflat.errors import MeshFileError
+from coneflat.files.polygons import merge_convex
+from coneflat.files.write import write_measured
+from coneflat.files.written import stored_in_glb
+from coneflat.geometry.overlap import find_overlaps
 from coneflat.geometry.planar import heights, sides_between, signed_double_areas
-from coneflat.io.pieces import merge_convex
-from coneflat.io.write import write_measured
-from coneflat.io.written import stored_in_glb
+from coneflat.input.polygons import Polygons
 from coneflat.layout.convex import make_convex
 from coneflat.mesh import TriangleMesh
-from coneflat.polygons import Polygons
 
 trimesh = pytest.importorskip("trimesh")
 

@@ -17,13 +17,13 @@ from palette import save_figure_small
 from scipy.sparse import csr_matrix, identity
 
 import coneflat
-from coneflat.geometry.areas import vertex_areas
+from coneflat.geometry.operators import vertex_areas
 from coneflat.view import demo_figure
-from coneflat.view.camera import view_aspect
-from coneflat.view.compose import Panel, Row, compose
-from coneflat.view.layout import layout_aspect
-from coneflat.view.marks import mark_handles
-from coneflat.view.model import draw_quantity
+from coneflat.view.figures.camera import view_aspect
+from coneflat.view.figures.compose import Panel, Row, compose
+from coneflat.view.figures.cone_marks import mark_handles
+from coneflat.view.figures.model import draw_quantity
+from coneflat.view.figures.uv_layout import layout_aspect
 from coneflat.view.quantity import ColorScale, Quantity, curvature
 
 DPI = 170.0

@@ -91,7 +91,7 @@ def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[s
     maybe(0.12, "refine", True)
     maybe(0.35, "repair", True)
     maybe(0.04, "strict", True)
-    maybe(0.1, "solver", "scipy", "cholespy", "auto", "amg", "pardiso", "scikit-sparse")
+    maybe(0.1, "solver", "scipy", "cholespy", "auto", "amg", "pardiso")
     if len(topology.inner):
         edges = topology.edges[topology.inner]
         if rng.random() < 0.06:

@@ -39,7 +39,7 @@ COMMANDS = {
 
 def make_command(rng: Random, folder: Path) -> list[str]:
     """Return a command line in a folder that has some meshes in it."""
-    from coneflat.cli.main import cli
+    from coneflat.apps.cli.main import cli
 
     names = [name for name in COMMANDS if name in cli.commands or name == "nonsense"]
     weights = np.array([COMMANDS[name] for name in names], dtype=float)
@@ -112,7 +112,7 @@ def _write_inputs(rng: Random, folder: Path) -> None:
 
 def run_command(line: list[str]) -> tuple[int, str, str]:
     """Return the exit code, and what was printed to stdout and stderr; the process's own are left alone."""
-    from coneflat.cli.main import main
+    from coneflat.apps.cli.main import main
 
     out, err = io.StringIO(), io.StringIO()
     with (

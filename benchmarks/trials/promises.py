@@ -130,7 +130,7 @@ def _check_orientation(trial: Trial) -> None:
 
 def _check_overlap(trial: Trial) -> None:
     """Nothing overlaps in an atlas, and the report counts what does."""
-    from coneflat.atlas.overlap import find_overlaps
+    from coneflat.geometry.overlap import find_overlaps
 
     found = find_overlaps(trial.corners)
     told = trial.result.distortion
@@ -353,7 +353,7 @@ def _check_cones(trial: Trial) -> None:
 
 def _check_report(trial: Trial) -> None:
     """The report is JSON without NaN, and what is said of it is readable."""
-    from coneflat.report import as_rows
+    from coneflat.result.report import as_rows
 
     json.dumps(trial.result.report(), allow_nan=False)
     repr(trial.result)

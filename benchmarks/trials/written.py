@@ -213,7 +213,7 @@ def _compare(
 
 def _check_overlap(outcome: Outcome, name: str, flat: np.ndarray, notes: str) -> None:
     """Nothing overlaps in the numbers of the file, without any tolerance, where the report says so."""
-    from coneflat.atlas.overlap import find_overlaps
+    from coneflat.geometry.overlap import find_overlaps
 
     pairs = find_overlaps(flat.astype(np.float64)).pairs
     if len(pairs):

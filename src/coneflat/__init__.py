@@ -16,23 +16,23 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "flatten": "pipeline",
-    "Flattening": "result",
+    "Flattening": "result.flattening",
     "PAPER": "options",
-    "read_mesh": "io",
-    "read_flattening": "io",
-    "MeshFile": "io",
+    "read_mesh": "files",
+    "read_flattening": "files",
+    "MeshFile": "input.mesh_file",
     "sample_path": "sample",
     "cone_curve": "curve",
     "ConeCurve": "curve",
     "find_cones": "curve",
     "FoundCones": "curve",
     "TriangleMesh": "mesh",
-    "check_mesh": "validation",
-    "CheckedMesh": "validation",
-    "measure": "distortion",
-    "Distortion": "distortion",
-    "measure_uv": "uvs",
-    "UVMeasures": "uvs",
+    "check_mesh": "input.validation",
+    "CheckedMesh": "input.validation",
+    "measure": "quality.distortion",
+    "Distortion": "quality.distortion",
+    "measure_uv": "result.measure_uv",
+    "UVMeasures": "result.measure_uv",
     "edge_lengths": "geometry",
     "corner_angles": "geometry",
     "cotangents": "geometry",
@@ -43,7 +43,7 @@ _HOMES = {
     "cones_at": "cones",
     "cones_with_curvature": "cones",
     "ConeSolution": "cones",
-    "scaled_lengths": "conformal.linear",
+    "scaled_lengths": "flat.linear",
     "find_seams": "seams",
     "edge_costs": "seams",
     "visible_share": "geometry.visibility",
@@ -51,7 +51,7 @@ _HOMES = {
     "CutMesh": "seams",
     "least_squares_layout": "layout",
     "ConeflatError": "errors",
-    "pack_together": "atlas",
+    "pack_together": "result.together",
     "make_figure": "view",
     "save_figure": "view",
     "draw_layout": "view",
@@ -114,31 +114,25 @@ __all__ = [
 
 if TYPE_CHECKING:
     from . import errors
-    from .atlas import pack_together
     from .cones import ConeSolution, cones_at, cones_with_curvature, greedy_cones
-    from .conformal.linear import scaled_lengths
     from .curve import ConeCurve, FoundCones, cone_curve, find_cones
-    from .distortion import Distortion, measure
     from .errors import ConeflatError
-    from .geometry import (
-        angle_defect,
-        corner_angles,
-        cotangent_laplacian,
-        cotangents,
-        edge_lengths,
-        mollify,
-    )
+    from .files import read_flattening, read_mesh
+    from .flat.linear import scaled_lengths
+    from .geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths, mollify
     from .geometry.visibility import visible_share
-    from .io import MeshFile, read_flattening, read_mesh
+    from .input.mesh_file import MeshFile
+    from .input.validation import CheckedMesh, check_mesh
     from .layout import least_squares_layout
     from .mesh import TriangleMesh
     from .options import PAPER
     from .pipeline import flatten
-    from .result import Flattening
+    from .quality.distortion import Distortion, measure
+    from .result.flattening import Flattening
+    from .result.measure_uv import UVMeasures, measure_uv
+    from .result.together import pack_together
     from .sample import sample_path
     from .seams import CutMesh, cut_open, edge_costs, find_seams
-    from .uvs import UVMeasures, measure_uv
-    from .validation import CheckedMesh, check_mesh
     from .view import (
         draw_checker,
         draw_cone_curve,

@@ -12,12 +12,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from ._arrays import FloatArray, IntArray
-from .atlas import pack_together
+from .files import read_mesh
 from .geometry.visibility import visible_share
-from .io import read_mesh
+from .input.polygons import Polygons
 from .layout.convex import make_convex
 from .pipeline import flatten
-from .polygons import Polygons
+from .result.together import pack_together
 from .sample import sample_path
 
 TAU = 2 * np.pi

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._arrays import FloatArray, IntArray
-from .choose import Surface, only_choice, search_on
 from .cones import ConeSolution
+from .cones.choose import Surface, only_choice, search_on
 from .errors import OptionError
-from .geometry.areas import area_distortion, weighted_areas
+from .geometry.operators import area_distortion, weighted_areas
+from .input.components import Component, prepare
 from .options import Options
-from .prepare import Component, prepare
-from .stages import Progress, Stages
+from .progress import Progress, Stages
 from .text import shown
 from .threads import one_blas_thread
 

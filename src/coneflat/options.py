@@ -27,7 +27,7 @@ UNFOLDED = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci")
 CONED = (*UNFOLDED, "linear", "bff", "linear-abf", "abf++")
 LENGTH_RULES = ("integral", "mean")
 AT_CONES = ("auto", "scale", "curvature")
-SOLVERS = ("auto", "pardiso", "scikit-sparse", "cholespy", "scipy", "amg")
+SOLVERS = ("auto", "pardiso", "cholespy", "scipy", "amg")
 CHARTS = ("one", "atlas")
 BOUNDARIES = ("free", "lengths", "disk", "straight")
 

@@ -12,28 +12,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._arrays import FloatArray, IntArray
-from .assemble import assemble
-from .choose import DEARER, Surface, Turned, choose_cones, is_riddled, pursues
+from .atlas.injective import without_overlaps
 from .cones import ConeSolution
-from .conformal.turning import open_turning
-from .distortion import measure
+from .cones.choose import DEARER, Surface, Turned, choose_cones, is_riddled, pursues
 from .errors import CurvatureError, MetricError, SeamError
-from .geometry.areas import area_distortion, weighted_areas
+from .flat import LaidOut
+from .flat.exact.flatten import ExactFlatMetric
+from .flat.methods import find_metric
+from .geometry.handles import open_turning
+from .geometry.operators import area_distortion, weighted_areas
+from .input.components import Component, Prepared, prepare, seam_costs
+from .input.constraints import Wishes
 from .mesh import TriangleMesh
-from .methods import LaidOut
-from .methods.exact import ExactFlatMetric
-from .metric import find_metric
 from .options import UNFOLDED, Boundary, Cones, Options
-from .prepare import Component, Prepared, prepare
-from .result import Flattening
-from .rotations import measure_rotations
-from .seaming import seam_costs, without_overlaps
+from .progress import Progress, Stages
+from .quality.distortion import measure
+from .quality.rotations import measure_rotations
+from .result.assemble import assemble
+from .result.flattening import Flattening
 from .seams import cut_open, find_seams
 from .solver import solving
-from .stages import Progress, Stages
 from .text import plural
 from .threads import meanwhile, one_blas_thread
-from .wishes import Wishes
 
 # Searches for cones at most, if some of them are too wide for the triangles around.
 SEARCHES = 4
@@ -133,7 +133,7 @@ def flatten(
             map has no inverted triangle by construction, instead of the input's own triangles.
         repair: drop, split and cut what makes the input no manifold, instead of refusing it.
         strict: refuse triangles without area, instead of opening them by a tiny perturbation.
-        solver: what factorizes: "pardiso", "scikit-sparse", "cholespy", "scipy", or "amg", which iterates and
+        solver: what factorizes: "pardiso", "cholespy", "scipy", or "amg", which iterates and
             needs little memory; "auto" takes the fastest that is installed.
         charts: "one" lays every component out as a single disk, which may overlap itself, as the paper does; "atlas"
             moves its seams, and cuts where it must, so that nothing overlaps.

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..geometry.overlap import find_overlaps
 from ..geometry.planar import signed_double_areas
 from ..mesh import TriangleMesh
-from .layout import Layout, Seams, same_points
-from .overlap import find_overlaps
+from .chart_seams import Layout, Seams, same_points
 
 # Relative to the length of a seam edge: how far its two sides may be apart, moved together, to be glued.
 CONGRUENT = 1e-7

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import FloatArray, IntArray, dots
+from ..flat import LaidOut
+from ..geometry.overlap import find_overlaps
 from ..geometry.planar import signed_double_areas
+from ..input.components import Component, seam_costs
 from ..mesh import TriangleMesh
+from ..options import Options
+from .chart_seams import Layout, Seams
 from .glue import glue_charts
-from .layout import Layout, Seams
-from .overlap import find_overlaps
 from .split import split_overlaps
 
 # Parts of the area that charts should have at least. Where the cheapest cuts leave several charts, dearer ones that
@@ -61,3 +66,22 @@ def injective_charts(
         if len(sizes) == 1 or (not slivers and len(corners) > LARGE):
             break
     return min(found, key=lambda one: one[:2])[2]
+
+
+def without_overlaps(laid_out: LaidOut, part: Component, options: Options) -> LaidOut:
+    """Return the layout split, as little as can be, into charts that do not overlap themselves."""
+    mesh = laid_out.mesh
+    if mesh is part.mesh:
+        costs, avoided, forbidden = seam_costs(part, options)
+        costs = np.where(avoided | forbidden, costs + costs.sum(), costs)
+    else:  # a refinement has edges of its own
+        ends = mesh.vertices[mesh.edges]
+        costs = np.sqrt(dots(ends[:, 1] - ends[:, 0], ends[:, 1] - ends[:, 0]))
+    charts = injective_charts(mesh, laid_out.points, laid_out.corners, costs)
+    return replace(
+        laid_out,
+        points=charts.points,
+        corners=charts.corners,
+        chart=charts.chart,
+        seams=mesh.edges[Seams(mesh, charts).edges],
+    )

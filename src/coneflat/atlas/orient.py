@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import FloatArray
+from .._arrays import FloatArray, IntArray
+from ..compiled import compiled
 from ..errors import OptionError
 from .charts import Charts, read_charts
 from .outline import Outlines
 
 if TYPE_CHECKING:
     ComplexArray = NDArray[np.complex128]
+
 
 QUARTER = np.pi / 2
 # Areas that differ by so little, relatively, are the same but for rounding.
@@ -95,7 +97,6 @@ def square_angle(points: ComplexArray) -> float:
 
 def convex_hull(points: ComplexArray) -> ComplexArray:
     """Return the corners of the convex hull, counterclockwise; the two ends if the points lie on a line."""
-    from .hull_kernel import fill_hull
 
     points = np.unique(points)
     if len(points) == 1:
@@ -145,3 +146,27 @@ def mean_rise(charts: Charts, corners: ArrayLike | None, up: ArrayLike) -> Compl
     rise = 0.5j * (height * opposite).sum(axis=1)
     total: ComplexArray = charts.sums(rise.real) + 1j * charts.sums(rise.imag)
     return total
+
+
+@compiled
+def fill_hull(points: FloatArray, hull: IntArray) -> int:
+    """Find the corners of a convex hull by monotone chains (Andrew 1979) and return their number.
+
+    Args:
+        points: (n, 2) different points, n > 1, sorted by their first coordinate and then the second.
+        hull: (n + 1,) filled with the corners, counterclockwise; only the two ends of points on a line.
+    """
+    count, last = 0, len(points) - 1
+    for chain in range(2):
+        begin = count
+        for i in range(len(points)):
+            k = i if chain == 0 else last - i
+            while count > begin + 1:
+                a, b = points[hull[count - 2]], points[hull[count - 1]]
+                if (b[0] - a[0]) * (points[k, 1] - a[1]) > (b[1] - a[1]) * (points[k, 0] - a[0]):
+                    break
+                count -= 1
+            hull[count] = k
+            count += 1
+        count -= 1  # each chain ends where the other begins
+    return count

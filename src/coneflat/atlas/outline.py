@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import BoolArray, IntArray
+from ..compiled import compiled
 from ..mesh import NEXT
 
 
@@ -63,10 +64,68 @@ def find_outlines(
 
 def _uncancelled(corners: NDArray[np.complex128], chart: IntArray) -> BoolArray:
     """Return (3m,) False for sides that run as often one way as the other between their ends, all in one chart."""
-    from .outline_kernel import match_sides
 
     table = np.full(2 ** int(np.ceil(np.log2(2 * corners.size))), -1, dtype=np.int32)
     same, ways = np.empty((2, corners.size), dtype=np.int32)
     match_sides(np.ascontiguousarray(corners).view(np.uint64).reshape(-1, 2), chart, table, same, ways)
     kept: BoolArray = ways[same] != 0
     return kept
+
+
+@compiled
+def match_sides(
+    bits: NDArray[np.uint64],
+    chart: IntArray,
+    table: NDArray[np.int32],
+    same: NDArray[np.int32],
+    ways: NDArray[np.int32],
+) -> None:
+    """Find the sides of a chart that have the same ends, by a table of the sides seen so far.
+
+    Args:
+        bits: (3m, 2) of the coordinates of the triangle corners. Side i runs from corner i to the next.
+        chart: (m,) chart of each triangle.
+        table: 2^p numbers, at least twice as many as sides, all -1; overwritten.
+        same: (3m,) filled: the first side with the same ends, in either order.
+        ways: (3m,) filled: of each such side, how often it is there as it runs less how often the other way.
+    """
+    mask = np.uint64(len(table) - 1)
+    for side in range(len(bits)):
+        start, end = side, side - side % 3 + (side + 1) % 3
+        # The hash must not depend on the order of the ends.
+        key = _mixed(_hash(bits[start]) + _hash(bits[end]) + np.uint64(chart[side // 3]))
+        ways[side] = 0
+        while True:
+            slot = np.int64(key & mask)
+            other = table[slot]
+            if other < 0:
+                table[slot] = other = side
+            other_start, other_end = other, other - other % 3 + (other + 1) % 3
+            if chart[other // 3] == chart[side // 3]:
+                if _equal(bits, start, other_start) and _equal(bits, end, other_end):
+                    same[side] = other
+                    ways[other] += 1
+                    break
+                if _equal(bits, start, other_end) and _equal(bits, end, other_start):
+                    same[side] = other
+                    ways[other] -= 1
+                    break
+            key += np.uint64(1)
+
+
+@compiled
+def _equal(bits: NDArray[np.uint64], one: int, two: int) -> bool:
+    return bool(bits[one, 0] == bits[two, 0] and bits[one, 1] == bits[two, 1])
+
+
+@compiled
+def _hash(point: NDArray[np.uint64]) -> np.uint64:
+    return _mixed(_mixed(point[0]) + point[1])
+
+
+@compiled
+def _mixed(bits: np.uint64) -> np.uint64:
+    """Return 64 bits, each of which depends on all given: products with odd numbers carry up, shifts carry down."""
+    bits = (bits ^ (bits >> np.uint64(32))) * np.uint64(0x9E3779B97F4A7C15)
+    bits = (bits ^ (bits >> np.uint64(29))) * np.uint64(0xD6E8FEB86659FD93)
+    return bits ^ (bits >> np.uint64(32))

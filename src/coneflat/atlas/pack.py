@@ -14,7 +14,7 @@ from ..text import shown
 from .charts import Charts, read_charts
 from .orient import square_angle, straight_angles
 from .outline import Outlines
-from .search import Packing, pack
+from .pack_masks import Packing, pack
 
 ROTATIONS = ("any", "quarter", "none")
 # Angles that a chart is tried at, for so many charts at most; more than that fill each other's gaps in quarter turns.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
-from ..graph import MultiGraph, trace_back
+from ..geometry.graph import MultiGraph, trace_back
 from ..mesh import TriangleMesh, label_components
 
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..geometry.overlap import Overlaps, find_overlaps
 from ..geometry.planar import signed_double_areas
-from .overlap import Overlaps, find_overlaps
 from .touch import part_touching
 
 # Of 32-bit numbers below 1: how far apart they are.

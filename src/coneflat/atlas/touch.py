@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
+from ..geometry.overlap import Overlaps, find_overlaps
 from ..mesh import NEXT
-from .overlap import Overlaps, find_overlaps
 
 # Of the extent of the layout: what overlaps by less touches, and is then moved by so much more than it overlaps.
 TOUCHING, APART = 1e-11, 2.0**-49

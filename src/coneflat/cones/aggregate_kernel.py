@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from ..geometry.compiled import compiled
+from ..compiled import compiled
 
 # Couplings that differ by less, relatively, are equal: regular meshes have many that differ by rounding only.
 TIE = 1 + 1e-9

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from ..conformal.turning import off_multiple
+from ..geometry.handles import off_multiple
 from .cone_search import ConeSearch
 from .quantise import QuantisedCones
 from .solution import ConeSolution

@@ -7,7 +7,7 @@ All moves transfer d quanta from cone s to vertex t, which changes E^2 by
 from __future__ import annotations
 
 from .._arrays import BoolArray, FloatArray, IntArray
-from ..geometry.compiled import compiled
+from ..compiled import compiled
 
 # A move must lower E^2 by this share.
 GAIN = 1e-9

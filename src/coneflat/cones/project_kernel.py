@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from ..geometry.compiled import compiled
+from ..compiled import compiled
 from .fit_kernel import factor_lower, fit_members
 
 # What must remain of a candidate's diagonal for it to be independent of the members.

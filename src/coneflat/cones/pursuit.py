@@ -19,7 +19,7 @@ from scipy.sparse import csc_matrix
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import CurvatureError, OptionError
-from ..geometry.areas import weighted_areas
+from ..geometry.operators import weighted_areas
 from ..text import list_some, plural
 from .cone_search import ConeSearch
 from .dense_model import Limits

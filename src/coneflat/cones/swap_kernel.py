@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
-from ..geometry.compiled import compiled
+from ..compiled import compiled
 
 
 @compiled

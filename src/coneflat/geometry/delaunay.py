@@ -36,7 +36,7 @@ def make_delaunay(
         Where nothing fails the condition the cost is one pass over the edges. The condition is meaningful
         also where scaled lengths break the triangle inequality.
     """
-    from .flip_kernel import EUCLIDEAN, PACKED, SCALED, WEIGHTED, find_violations, flip_until_delaunay
+    from .flips import EUCLIDEAN, PACKED, SCALED, WEIGHTED, find_violations, flip_until_delaunay
 
     if radii is not None:
         kind, scale = WEIGHTED if has_lengths else PACKED, radii

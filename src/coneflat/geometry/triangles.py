@@ -19,7 +19,7 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     Raises:
         FaceIndexError: a face names a vertex that does not exist.
     """
-    from .component_kernel import measure_sides
+    from ..mesh import measure_sides
 
     points, triangles = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     if triangles.size and not 0 <= triangles.min() <= triangles.max() < len(points):

@@ -53,7 +53,7 @@ def _is_seen(
     points: FloatArray, faces: IntArray, facing: FloatArray, direction: FloatArray, axes: FloatArray
 ) -> BoolArray:
     """Return (n,) whether points, in pixels from the centre, are seen from a direction."""
-    from .raster_kernel import fill_nearest
+    from .raster import fill_nearest
 
     right = np.cross(direction, axes[np.argmin(np.abs(axes @ direction))])
     right /= np.linalg.norm(right)

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import ComplexArray, FloatArray, IntArray
-from ..conformal.doubling import double
-from ..conformal.exact import ExactMetric
 from ..errors import MetricError
+from ..flat.exact.metric import ExactMetric, double
 from ..geometry.intrinsic import IntrinsicTriangulation, halfedge_twins, intrinsic_triangulation
+from ..geometry.straight import FlatTriangles
 from ..mesh import TriangleMesh
 from .overlay import Overlay, overlay
-from .pieces import Pieces, find_pieces
-from .straighten import FlatTriangles
+from .subdivision import Pieces, find_pieces
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +91,7 @@ def refine(mesh: TriangleMesh, metric: ExactMetric) -> Refinement:
 
         The cost is a few passes over the mesh, and linear in the number of crossings.
     """
-    from .undo_kernel import find_turns, place_triangles
+    from ..geometry.straight import find_turns, place_triangles
 
     if metric.euclidean_flips:
         raise MetricError(

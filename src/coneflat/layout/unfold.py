@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from .straighten import FlatTriangles
+from ..compiled import compiled
+from ..geometry.straight import FlatTriangles
 
 # Iterations that spread the gaps; each costs as much as half a breadth-first search.
 SWEEPS = 10
@@ -42,7 +43,6 @@ def unfold(flat: FlatTriangles, corners: IntArray, cut: BoolArray) -> FloatArray
         | border first, 10 steps | 1e-13, 7e-13 | 8e-13, 7e-11 | 1e-11, 3e-9 |
         | border first, 100 steps | 1e-13, 8e-13 | 8e-13, 2e-11 | 1e-11, 2e-10 |
     """
-    from .unfold_kernel import spread
 
     corner = np.ascontiguousarray(corners, dtype=np.int64).ravel()
     cut = cut | (flat.twin < 0)
@@ -80,7 +80,6 @@ def _next(halfedges: IntArray) -> IntArray:
 
 def _border(flat: FlatTriangles, cut: BoolArray, start: int) -> tuple[IntArray, ComplexArray]:
     """Return the border loop of a half-edge and frames of its triangles in which the loop closes."""
-    from .unfold_kernel import walk_border
 
     room = int(cut.sum())
     border, frames = np.empty(room, dtype=np.int64), np.empty(room + 1, dtype=np.complex128)
@@ -106,7 +105,6 @@ def _close_gaps(
     Conjugate gradients on the sum of the squared relative gaps, preconditioned by the diagonal. The gaps are
     jumps along lines where fronts have met; k iterations spread a jump over about k triangles.
     """
-    from .unfold_kernel import apply_stiffness, gap_forces
 
     squared = sides.real**2 + sides.imag**2
     weight = 1 / np.maximum(squared, NO_LENGTH**2 * squared.max())
@@ -130,3 +128,109 @@ def _close_gaps(
         product, before = np.vdot(residual, damped).real, product
         direction = damped + product / before * direction
     points += shift
+
+
+@compiled
+def walk_border(
+    twin: IntArray,
+    cut: BoolArray,
+    turns: ComplexArray,
+    start: int,
+    border: IntArray,
+    frames: ComplexArray,
+) -> int:
+    """Fill the half-edges of a border loop, in order, and the frames of their triangles.
+
+    The walk starts in the frame of the first triangle and carries it around each vertex through the fan of
+    triangles inside. Returns the length n of the loop; frames[n] is where the first frame has come to.
+    """
+    count = 0
+    h = start
+    frame = 1.0 + 0.0j
+    while True:
+        border[count] = h
+        frames[count] = frame
+        count += 1
+        h = h - h % 3 + (h + 1) % 3
+        while twin[h] >= 0 and not cut[h]:
+            frame *= turns[h]
+            frame /= abs(frame)
+            h = twin[h]
+            h = h - h % 3 + (h + 1) % 3
+        if h == start:
+            frames[count] = frame
+            return count
+
+
+@compiled
+def spread(
+    twin: IntArray,
+    cut: BoolArray,
+    sides: ComplexArray,
+    turns: ComplexArray,
+    corner: IntArray,
+    queue: IntArray,
+    last: int,
+    reached: BoolArray,
+    frame: ComplexArray,
+    placed: BoolArray,
+    points: ComplexArray,
+) -> int:
+    """Lay out, breadth first, all triangles that can be reached from the `last` ones in the queue.
+
+    corner: (3m,) vertex of the cut mesh at each corner. Triangles in the queue are reached, have frames,
+    and at least one corner placed. Returns the length of the queue: all triangles laid out.
+    """
+    first = 0
+    while first < last:
+        f = queue[first]
+        first += 1
+        # Side h runs from corner h + 1 to corner h + 2; the second round closes the gaps of the first.
+        for step in range(6):
+            start, end = corner[3 * f + (step + 1) % 3], corner[3 * f + (step + 2) % 3]
+            if placed[start] and not placed[end]:
+                points[end] = points[start] + frame[f] * sides[3 * f + step % 3]
+                placed[end] = True
+        for h in range(3 * f, 3 * f + 3):
+            t = twin[h]
+            if t >= 0 and not cut[h] and not reached[t // 3]:
+                turned = frame[f] * turns[h]
+                frame[t // 3] = turned / abs(turned)
+                reached[t // 3] = True
+                queue[last] = t // 3
+                last += 1
+    return last
+
+
+@compiled
+def gap_forces(
+    corner: IntArray,
+    sides: ComplexArray,
+    weight: FloatArray,
+    frame: ComplexArray,
+    points: ComplexArray,
+    force: ComplexArray,
+) -> None:
+    """Add up, at each vertex, how far it lies from where the sides of its triangles put it.
+
+    Weights of one over the squared length of a side make relative gaps what is measured.
+    """
+    force[:] = 0.0
+    for h in range(len(sides)):
+        start = corner[h - h % 3 + (h + 1) % 3]
+        end = corner[h - h % 3 + (h + 2) % 3]
+        gap = (frame[h // 3] * sides[h] - (points[end] - points[start])) * weight[h]
+        force[end] += gap
+        force[start] -= gap
+
+
+@compiled
+def apply_stiffness(corner: IntArray, weight: FloatArray, shift: ComplexArray, force: ComplexArray) -> None:
+    """Fill the force at each vertex by which springs along the sides resist a shift of the vertices."""
+    force[:] = 0.0
+    for h in range(len(weight)):
+        start = corner[h - h % 3 + (h + 1) % 3]
+        end = corner[h - h % 3 + (h + 2) % 3]
+        pull = weight[h] * (shift[end] - shift[start])
+        force[end] += pull
+        force[start] -= pull

@@ -9,8 +9,8 @@ import numpy as np
 
 from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..geometry.planar import heights, signed_angles
+from ..geometry.straight import FlatTriangles
 from .patches import DEGENERATE, Patches
-from .straighten import FlatTriangles
 
 # Height over longest side that a bad triangle is asked to get at least, and those that others are, one after another:
 # where all are thin, as on a stretched surface, they cannot be helped much.

@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 
 from .._arrays import FloatArray
 from ..errors import OptionError
-from ..geometry.areas import at_safe_scale
-from ..geometry.dihedral import dihedral_angles
+from ..geometry.normals import dihedral_angles
+from ..geometry.operators import at_safe_scale
 from ..geometry.visibility import visible_share
 from ..mesh import TriangleMesh
 from ..options import MOST_PREFERENCE

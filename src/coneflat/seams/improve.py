@@ -7,12 +7,14 @@ surfaces with handles, too: taking a path out of a loop leaves two borders, one 
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import dataclass
+
 import numpy as np
 
-from .._arrays import IntArray
-from .key_paths import Fixed, KeyPaths, find_key_paths
-from .open_mesh import OpenMesh
-from .reconnect import Reconnection
+from .._arrays import FloatArray, IntArray
+from .key_paths import Fixed, KeyPaths, Parts, find_key_paths
+from .open_mesh import NO_COSTS, NOTHING, OpenMesh, Reach
 
 # Relative: what is gained must be more than rounding makes.
 LEAST_GAIN = 1e-9
@@ -86,3 +88,124 @@ def _exchange(seams: KeyPaths, gone: frozenset[int]) -> tuple[IntArray | None, b
         work.cut_along(found)
         work.lower_heights(found)
     return found, parts is not None
+
+
+@dataclass(frozen=True, eq=False)
+class _Branch:
+    """Shortest trees that tie some circles to a place.
+
+    Attributes:
+        splits: the pairs of sets of circles to which a tree may fall apart at the place.
+        reach: where the place is off the border.
+        value: (count of circles,) what a tree costs where the place is a circle.
+        merged: (count of circles,) the same for trees that fall apart at the circle.
+    """
+
+    splits: list[tuple[int, int]]
+    reach: Reach
+    value: FloatArray
+    merged: FloatArray
+
+
+class Reconnection:
+    """The shortest tree that ties circles together and costs less than a limit.
+
+    S. Dreyfus and R. Wagner, "The Steiner problem in graphs", 1971. A set of circles is a binary number; the last of
+    the circles is in none: it is what the tree of all others is led to.
+    """
+
+    def __init__(self, work: OpenMesh, parts: Parts, limit: float) -> None:
+        self.work, self.circles, self.ends, self.limit = work, parts.circles, parts.ends, limit
+        # No seam is shorter if replaced alone, or nearly so. So these are apart at least as far as their arms are long.
+        self.apart = np.maximum(parts.arms[:, None], parts.arms)
+        self.branches: dict[int, _Branch] = {}
+
+    def solve(self) -> IntArray | None:
+        """Return the half-edges of the tree, None if there is none that costs less."""
+        all_others = 2 ** (len(self.ends) - 1) - 1
+        for some in range(1, all_others + 1):
+            self.branches[some] = self._branch(some, some == all_others)
+        found = self.branches[all_others].value[self.ends[-1]] < self.limit
+        tree = np.unique(self._to_circle(all_others, self.ends[-1])) if found else None
+        for branch in self.branches.values():
+            self.work.forget(self.circles, branch.reach)
+        return tree
+
+    def _branch(self, some: int, is_last: bool) -> _Branch:
+        """Return the shortest trees that tie some circles to every place."""
+        splits = [(part, some ^ part) for part in range(1, some) if part & ~some == 0 and part < some ^ part]
+        merged = np.full(self.circles.count, np.inf)
+        if not splits:
+            merged[self.ends[some.bit_length() - 1]] = 0.0
+        inner, costs = [NOTHING], [NO_COSTS]
+        for one, two in splits:
+            first, second = self.branches[one], self.branches[two]
+            merged = np.minimum(merged, first.value + second.value)
+            both = first.reach.vertices
+            both = both[np.isfinite(second.reach.distance[both])]
+            inner.append(both)
+            costs.append(first.reach.distance[both] + second.reach.distance[both])
+        begin = [end for end in self.ends[:-1] if merged[end] < self.limit]
+        seeds = [self.circles.leaving(end) for end in begin]
+        target, limit, farthest = -1, *self._bounds(some)
+        if is_last:
+            target, limit, farthest = self.ends[-1], min(self.limit, merged[self.ends[-1]]), np.inf
+        reach = self.work.search(
+            self.circles,
+            np.concatenate([NOTHING, *seeds]),
+            np.repeat(merged[begin], [len(one) for one in seeds]),
+            np.concatenate(inner),
+            np.concatenate(costs),
+            target=target,
+            limit=limit,
+            farthest=farthest,
+        )
+        return _Branch(splits, reach, np.minimum(merged, reach.arrival), merged)
+
+    def _bounds(self, some: int) -> tuple[float, float]:
+        """Return limits of the distance and height, and of the distance: what the other circles leave of the whole.
+
+        A tree costs at least half of a way around it. One around a vertex and the others is made up of ways between
+        some of these and two more, neither of which costs less than the height.
+        """
+        others = [i for i in range(len(self.ends)) if not some >> i & 1]
+        between = sorted(self.apart[i, j] for i, j in itertools.combinations(others, 2))
+        around = sum(between) / 2 if len(others) == 3 else 0.0
+        return (
+            self.limit - sum(between[: len(others) - 1]) / 2,
+            self.limit - max([around, *between]),
+        )
+
+    def _to_circle(self, some: int, circle: int) -> list[int]:
+        """Return the half-edges of the tree that ties some circles to another, or one of them."""
+        branch = self.branches[some]
+        if branch.reach.arrival[circle] < branch.merged[circle]:
+            return self._along(some, int(branch.reach.last[circle]))
+        return self._at_circle(some, circle)
+
+    def _at_circle(self, some: int, circle: int) -> list[int]:
+        """Return the half-edges of the tree of some circles that falls apart at a circle."""
+        splits = self.branches[some].splits
+        if not splits:
+            return []
+        costs = [self.branches[one].value[circle] + self.branches[two].value[circle] for one, two in splits]
+        one, two = splits[int(np.argmin(costs))]
+        return self._to_circle(one, circle) + self._to_circle(two, circle)
+
+    def _to_vertex(self, some: int, vertex: int) -> list[int]:
+        """Return the half-edges of the tree that ties some circles to a vertex off the border."""
+        branch = self.branches[some]
+        slot = int(branch.reach.before[vertex])
+        if slot >= 0:
+            return self._along(some, slot)
+        pairs = [(self.branches[one].reach, self.branches[two].reach) for one, two in branch.splits]
+        costs = [one.distance[vertex] + two.distance[vertex] for one, two in pairs]
+        first, second = branch.splits[int(np.argmin(costs))]
+        return self._to_vertex(first, vertex) + self._to_vertex(second, vertex)
+
+    def _along(self, some: int, slot: int) -> list[int]:
+        """Return the half-edges of a way that was found from some circles, and of the tree at which it begins."""
+        way, vertex = self.work.way(self.branches[some].reach, slot)
+        if vertex >= 0:
+            return way + self._to_vertex(some, vertex)
+        return way + self._at_circle(some, int(self.circles.number[way[-1]]))

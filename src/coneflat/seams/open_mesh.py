@@ -105,7 +105,7 @@ class OpenMesh:
 
     def label_circles(self, points: IntArray) -> Circles:
         """Return the curves of the border, and the points that are not on it; those returned before are void."""
-        from .search_kernel import label_circles
+        from .shortest_paths import label_circles
 
         self._number[self._labelled] = -1
         sides = np.flatnonzero(self.cut)
@@ -152,7 +152,7 @@ class OpenMesh:
         ends: tuple[int, float, float],
         reach: Reach,
     ) -> None:
-        from .search_kernel import search
+        from .shortest_paths import search
 
         starts, heads, costs, enters = self._graph
         seeds, seed_costs, origins, inner, inner_costs = begin

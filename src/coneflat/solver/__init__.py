@@ -1,11 +1,10 @@
 """Sparse symmetric positive definite systems: one interface, a file per back end.
 
-The ladder, best first: MKL PARDISO (pypardiso) for large systems, CHOLMOD with supernodes (scikit-sparse), CHOLMOD
-without (cholespy), SuperLU (SciPy), and conjugate gradients with multigrid (pyamg) for what fits no factorization.
+The ladder, best first: MKL PARDISO (pypardiso) for large systems, CHOLMOD without supernodes (cholespy), SuperLU
+(SciPy), and conjugate gradients with multigrid (pyamg) for what fits no factorization.
 """
 
-from .hermitian import HermitianFactor
-from .ladder import available, factorize, solving
+from .factorize import HermitianFactor, available, factorize, solving
 from .types import Factor, NotPositiveDefinite
 
 __all__ = ["Factor", "HermitianFactor", "NotPositiveDefinite", "available", "factorize", "solving"]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from .curve import draw_cone_curve
-from .demo import demo_figure
-from .figure import FIGURE_FORMATS, check_figure_target, new_figure, save_figure
-from .kinds import KINDS, Look, make_figure
-from .layout import draw_layout
-from .model import draw_checker, draw_cones, draw_curvature, draw_quality
-from .projection import MeshPicture, render_mesh
+from .figures.cone_curve import draw_cone_curve
+from .figures.demo import demo_figure
+from .figures.figure import FIGURE_FORMATS, check_figure_target, new_figure, save_figure
+from .figures.kinds import KINDS, Look, make_figure
+from .figures.model import draw_checker, draw_cones, draw_curvature, draw_quality
+from .figures.projection import MeshPicture, render_mesh
+from .figures.uv_layout import draw_layout
 from .quantity import ColorScale, Quantity
 
 __all__ = [

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from ..distortion import quantile
 from ..errors import OptionError
 from ..geometry import angle_defect, corner_angles, edge_lengths
 from ..geometry.triangles import double_areas
 from ..mesh import TriangleMesh
+from ..quality.distortion import quantile
 
 if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
 
-    from ..result import Flattening
+    from ..result.flattening import Flattening
 
 LEAST_QC_RANGE = 0.05
 """A colour scale shorter than this would show noise as if it were distortion."""

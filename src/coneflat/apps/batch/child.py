@@ -1,0 +1,63 @@
+"""A process of its own for flattening: `python -m coneflat.batch.child` reads jobs and writes rows, a line each."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from typing import IO, Any
+
+# What the summary tells of a mesh, from its report.
+COLUMNS = (
+    "vertices", "triangles", "cones", "curvature_error_max", "qc_mean", "qc_max", "area_std", "area_distortion",
+    "flipped", "charts", "seam_length", "seam_mismatch_max", "rotation_deviation", "uv_scale",
+)  # fmt: skip
+
+
+def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
+    """Flatten a mesh file to a file and return the row of the summary; errors become rows, too."""
+    from ...errors import ConeflatError
+    from ...files.write import write_measured
+    from ...input.join import read_joined
+    from ...pipeline import flatten
+    from ...result.requirements import REPORTED, breaches, parse_requirements
+
+    start = time.perf_counter()
+    row: dict[str, Any] = {"mesh": job["mesh"], "output": job["output"]}
+    try:
+        source = read_joined(job["mesh"], job["weld"])
+        result = flatten(source.mesh, **job["options"])
+        result = write_measured(result, job["output"])
+        report = result.report()
+        unmet = breaches(parse_requirements(job["required"], REPORTED), report)
+        row |= {
+            "status": "failed" if unmet else "done",
+            "error": f"not met: {'; '.join(unmet)}" if unmet else "",
+        } | {name: report[name] for name in COLUMNS}
+        row["notes"] = " ".join(source.notes_of(report["notes"]))
+    except ConeflatError as error:
+        row |= {"status": "failed", "error": str(error)}
+    except MemoryError:
+        row |= {"status": "failed", "error": "not enough memory for this mesh"}
+    except Exception as error:
+        row |= {"status": "failed", "error": f"internal error: {type(error).__name__}: {error}"}
+    return row | {"seconds": round(time.perf_counter() - start, 3)}
+
+
+def serve(requests: IO[str], answers: IO[str]) -> None:
+    """Answer jobs until there are no more."""
+    for line in requests:
+        answers.write(json.dumps(flatten_file(json.loads(line))) + "\n")
+        answers.flush()
+
+
+def main() -> None:
+    """Serve over standard input and output, which libraries that print of themselves do not get at."""
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    serve(sys.stdin, answers)
+
+
+if __name__ == "__main__":
+    main()

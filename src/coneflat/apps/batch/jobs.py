@@ -1,0 +1,121 @@
+"""What a batch is to do: a mesh, where its result goes, and how to know that it is done."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ...errors import OptionError
+from ...files.read import find_meshes
+
+
+@dataclass(frozen=True)
+class Job:
+    """A mesh to flatten.
+
+    Attributes:
+        mesh, output: absolute paths.
+        options: keyword arguments of `coneflat.flatten`, as JSON has them.
+        weld: merge vertices at the same position; None for the default, see `coneflat.io.join.read_joined`.
+        mark: what changes when the mesh file, the options or the version do; "" where there is no such file.
+        required: what measures must be, such as "flipped=0"; a mesh that does not meet it has failed.
+    """
+
+    mesh: str
+    output: str
+    options: Mapping[str, Any]
+    weld: bool | None
+    mark: str
+    required: tuple[str, ...] = ()
+
+    def as_json(self) -> str:
+        """Return the job as one line."""
+        return json.dumps(asdict(self))
+
+
+def find_jobs(
+    patterns: Iterable[str],
+    folder: Path,
+    ending: str,
+    options: Mapping[str, Any],
+    weld: bool | None,
+    required: tuple[str, ...] = (),
+) -> list[Job]:
+    """Return a job for each mesh that the patterns name, in the order of their paths.
+
+    Args:
+        patterns: files, folders (every mesh in them), or patterns with *, ? and ** for any depth.
+        folder: where results go, under the meshes' own names.
+        ending: of the results, such as ".obj".
+        options, weld, required: see `Job`.
+
+    Raises:
+        OptionError: a pattern matches nothing, or a result would overwrite a mesh.
+        MeshFileError: a folder cannot be read.
+    """
+    # A file counts once, by its own name or, where only links to it are given, by the first of these: stores name
+    # their files by checksums.
+    found: dict[str, str] = {}
+    for pattern in patterns:
+        for path in find_meshes(pattern):
+            real, name = os.path.realpath(path), os.path.abspath(path)
+            if real == name or real not in found:
+                found[real] = name
+    meshes = sorted(found.values())
+    jobs = [
+        Job(mesh, str(folder / name), options, weld, _mark(mesh, options, weld, required), required)
+        for mesh, name in zip(meshes, _names(meshes, ending), strict=True)
+    ]
+    for job in jobs:
+        if os.path.realpath(job.output) in found:
+            raise OptionError(f"the result of {job.mesh} would overwrite {job.output}: choose another folder")
+    return jobs
+
+
+def _names(meshes: list[str], ending: str) -> list[str]:
+    """Return a name for each result: the mesh's own, with as much of its path as it takes to be the only one."""
+    paths = [Path(mesh) for mesh in meshes]
+    names = [path.stem for path in paths]
+    for depth in range(max((len(path.parts) for path in paths), default=0)):
+        twice = {name for name, count in Counter(name.lower() for name in names).items() if count > 1}
+        if not twice:
+            break
+        # First the kind of file tells them apart, then the folders.
+        names = [
+            _longer(path, depth) if name.lower() in twice else name
+            for path, name in zip(paths, names, strict=True)
+        ]
+    # What differs by upper and lower case alone, or runs together, is numbered.
+    taken: set[str] = set()
+    for i, name in enumerate(names):
+        count = 1
+        while names[i].lower() in taken:
+            count += 1
+            names[i] = f"{name}_{count}"
+        taken.add(names[i].lower())
+    return [name + ending for name in names]
+
+
+def _longer(path: Path, depth: int) -> str:
+    kind = f"{path.stem}_{path.suffix[1:].lower()}"
+    folders = path.parent.relative_to(path.anchor).parts
+    return "_".join([*folders[max(len(folders) - depth, 0) :], kind])
+
+
+def _mark(mesh: str, options: Mapping[str, Any], weld: bool | None, required: tuple[str, ...]) -> str:
+    from ... import __version__
+
+    try:
+        about = os.stat(mesh)
+    except (OSError, ValueError):  # A link that leads nowhere: reading it says so.
+        return ""
+    text = json.dumps(
+        [about.st_size, about.st_mtime_ns, dict(options), weld, required, __version__], sort_keys=True
+    )
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

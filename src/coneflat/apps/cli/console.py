@@ -1,0 +1,176 @@
+"""What the commands print: progress on stderr, results on stdout."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict
+from pathlib import Path
+from types import TracebackType
+
+import click
+from rich.console import Console as RichConsole
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from ...progress import Progress as Listener
+from ...progress import Stages
+from ...result.flattening import Flattening
+from .shared import QUIET, VERBOSE
+
+PATIENCE = 1.0  # seconds between the plain lines that say what is going on, and before the first of them
+PLAIN_WIDTH = 110
+#: What an artist asks first, in this order; the other rows are printed if verbose.
+FIRST_ROWS = ("charts", "overlap", "flipped", "texel density", "seam length", "QC distortion", "cones")
+
+
+class Console:
+    """Progress while a command runs, what came out when it is done; nothing if quiet.
+
+    Progress is a bar in a terminal, else a line about every second, also within long steps; what is done, or fails,
+    within the first second says nothing of it. If verbose, it is a line for every step.
+
+    Attributes:
+        seconds: wall time of each stage.
+    """
+
+    def __init__(self, talk: str | None = None) -> None:
+        self.quiet, self.verbose = talk == QUIET, talk == VERBOSE
+        self._stages = Stages(self.progress)
+        self.seconds = self._stages.seconds
+        self._start = time.perf_counter()
+        self._last_line = 0.0
+        self._now = ("", 0.0)
+        self._lock = threading.Lock()
+        self._over = threading.Event()
+        self._bar: Progress | None = None
+        if talk is None and sys.stderr.isatty():
+            self._bar = Progress(
+                SpinnerColumn(),
+                TextColumn("{task.description:28}"),
+                BarColumn(),
+                TimeElapsedColumn(),
+                console=RichConsole(stderr=True),
+                transient=True,
+            )
+            self._task = self._bar.add_task("", total=1.0)
+
+    def __enter__(self) -> Console:
+        if self._bar:
+            self._bar.start()
+        elif not self.quiet and not self.verbose:
+            threading.Thread(target=self._remind, daemon=True).start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with self._lock:
+            self._over.set()
+        if self._bar:
+            self._bar.stop()
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the start."""
+        return time.perf_counter() - self._start
+
+    def progress(self, stage: str, fraction: float) -> None:
+        """Show what is being done, and the fraction of the whole that is done."""
+        if self._bar:
+            self._bar.update(self._task, description=stage, completed=fraction)
+            return
+        with self._lock:
+            self._now = (stage, fraction)
+            if not self.quiet and (self.verbose or self.elapsed - self._last_line > PATIENCE):
+                self._tell()
+
+    def _tell(self) -> None:
+        stage, fraction = self._now
+        self._last_line = self.elapsed
+        click.echo(f"{self.elapsed:6.1f} s  {fraction:4.0%}  {stage}", err=True)
+
+    def _remind(self) -> None:
+        """Say again what is being done, where nothing has been said for a while."""
+        while not self._over.wait(PATIENCE / 4):
+            with self._lock, suppress(OSError, ValueError):  # Whoever was to read it may be gone.
+                late = self.elapsed - self._last_line > (2 * PATIENCE if self._last_line else PATIENCE)
+                if late and self._now[0] and not self._over.is_set():
+                    self._tell()
+
+    def part(self, begin: float, end: float) -> Listener:
+        """Return a listener to a part of the work, which makes up these fractions of the whole."""
+        return lambda stage, fraction: self.progress(stage, begin + (end - begin) * fraction)
+
+    @contextmanager
+    def stage(self, name: str, done: float) -> Iterator[None]:
+        """Show and time a stage, at the beginning of which so much of the whole is done."""
+        self._stages.done = done
+        with self._stages(name):
+            yield
+
+    def say(self, lines: Iterable[str]) -> None:
+        """Print lines of what came out."""
+        if self.quiet:
+            return
+        if self._bar:
+            self._bar.stop()
+        for line in lines:
+            click.echo(line)
+        self._last_line = self.elapsed
+        if self._bar:
+            self._bar.start()
+
+    def finish(self, written: Sequence[Path], result: Flattening | None = None) -> None:
+        """Print the notes on a result if there is one, what was written, its measures, and where the time went."""
+        with self._lock:
+            self._over.set()
+        if self._bar:
+            self._bar.stop()
+            self._bar = None
+        if result is not None:
+            self.say(f"note: {note}" for note in result.notes)
+        self.say(f"wrote {path}" for path in written)
+        if result is not None:
+            self.table(self._result_rows(result))
+        if self.seconds:
+            self.say([f"time           {self._spent(() if result is None else result.solvers)}"])
+
+    def _spent(self, solvers: Sequence[str]) -> str:
+        each = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in self.seconds.items())
+        by = f" (solved by {', '.join(solvers)})" if solvers else ""
+        return f"{sum(self.seconds.values()):.2f} s: {each}{by}"
+
+    def _result_rows(self, result: Flattening) -> list[tuple[str, str, str]]:
+        """Return what an artist wants to know; if verbose, all measures and how the result was found."""
+        from ...result.from_uv import shown_rows
+
+        rows = {row[0]: row for row in shown_rows(result)}
+        first = [rows.pop(name) for name in FIRST_ROWS if name in rows]
+        if not self.verbose:
+            return first
+        found = asdict(result.solve)
+        return [
+            *first,
+            *rows.values(),
+            *((name.replace("_", " "), f"{value:.3g}", "") for name, value in found.items()),
+        ]
+
+    def table(self, rows: Iterable[tuple[str, str, str]]) -> None:
+        """Print a table of (measure, value, meaning)."""
+        if self.quiet:
+            return
+        if self._bar:
+            self._bar.stop()
+            self._bar = None
+        table = Table(box=None, show_header=False, pad_edge=False)
+        table.add_column(style="bold")
+        table.add_column()
+        table.add_column(style="dim")
+        for row in rows:
+            table.add_row(*row)
+        width = None if sys.stdout.isatty() else PLAIN_WIDTH
+        RichConsole(highlight=False, markup=False, width=width).print(table)

@@ -1,0 +1,94 @@
+"""`coneflat measure`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .shared import QUIET, check_required, input_options, require_option, talk_options
+
+if TYPE_CHECKING:
+    from ...result.measure_uv import UVMeasures
+    from ...result.report import Row
+
+
+@click.command(short_help="Measure the UVs that a file has, of any tool.")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--report", type=click.Path(path_type=Path), help="Write all measures to this JSON file.")
+@click.option("--json", "as_json", is_flag=True, help="Print all measures as JSON instead of a table.")
+@require_option
+@input_options
+@talk_options
+def measure(
+    file: Path,
+    report: Path | None,
+    as_json: bool,
+    required: tuple[str, ...],
+    repair: bool,
+    weld: bool | None,
+    talk: str | None,
+) -> None:
+    """Measure the UVs of FILE: a mesh with UVs (.obj, .ply, .gltf, .glb), whatever wrote it, or a result (.npz).
+
+    \b
+    Examples:
+      coneflat measure horse_uv.obj
+      coneflat measure asset.glb --json
+      coneflat measure asset.glb --require flipped=0,overlap=0 --require "qc_mean<=1.1"
+    """
+    from ...files.atomic import atomic_write, check_target
+    from ...result.mapped import as_mapped
+    from ...result.measure_uv import MEASURED, measure_mapped
+    from ...result.requirements import parse_requirements
+    from .console import Console
+    from .run import require_distinct
+
+    requirements = parse_requirements(required, MEASURED)
+    if report is not None:
+        check_target(report)
+    require_distinct({"input": file, "report": report})
+    with Console(talk) as console:
+        with console.stage("read", 0.0):
+            mapped = as_mapped(file, weld=weld)
+        with console.stage("measure", 0.3):
+            measured = measure_mapped(mapped, strict=not repair)
+        found = measured.report()
+        if report is not None:
+            with atomic_write(report, "w") as stream:
+                json.dump(found, stream, indent=2)
+                stream.write("\n")
+        if as_json and talk != QUIET:
+            click.echo(json.dumps(found, indent=2))
+        elif not as_json:
+            console.say(f"note: {note}" for note in measured.notes)
+            console.table(rows_of_measures(measured))
+            console.finish([] if report is None else [report])
+    check_required(requirements, found)
+
+
+def rows_of_measures(measured: UVMeasures) -> list[Row]:
+    """Return the rows of the table of measures of UVs."""
+    from ...result.report import map_rows, number_text, packing_row
+    from .console import FIRST_ROWS
+
+    counts, of_map = measured.counts, map_rows(measured.distortion)
+    missing = ""
+    if counts["triangles_without_uv"]:
+        missing = f"; {counts['triangles_without_uv']:,} without UVs"
+    tiles = "" if counts["tiles"] == 1 else f" of {counts['tiles']:,} unit squares with charts"
+    return [
+        ("triangles", f"{counts['triangles']:,}", f"of {counts['polygons']:,} polygons, as fans{missing}"),
+        *(of_map.pop(name) for name in FIRST_ROWS if name in of_map),
+        *(of_map.pop(name) for name in ("area distortion", "degenerate")),
+        packing_row(counts["packing_efficiency"], tiles),
+        ("outside", f"{counts['outside']:,}", "triangles that reach out of the unit square"),
+        *of_map.values(),
+        (
+            "angle error",
+            number_text(counts["angle_sum_error"], ".1e"),
+            "radians missing around points inside charts, the most",
+        ),
+    ]

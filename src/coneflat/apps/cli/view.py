@@ -1,0 +1,81 @@
+"""`coneflat view`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from .shared import again_option, input_options, talk_options, up_option
+
+
+@click.command(short_help="Show a mesh and its layout in the browser.")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Page to write, .html.  [default: FILE's name with _view, opened in the browser]",
+)
+@click.option(
+    "--texture", type=click.Path(path_type=Path), help="PNG, JPEG, GIF or WebP picture to lay on the model."
+)
+@click.option(
+    "--show",
+    type=click.Choice(["checker", "picture", "charts", "qc", "area", "curvature", "flat", "plain"]),
+    help="What the page shows first.  [default: checker, or picture with --texture]",
+)
+@up_option
+@again_option
+@input_options
+@click.option(
+    "--most-triangles",
+    type=int,
+    default=500_000,
+    show_default=True,
+    help="Thin a larger mesh to so many, for display only.",
+)
+@talk_options
+def view(
+    file: Path,
+    output: Path | None,
+    texture: Path | None,
+    show: str | None,
+    up: str,
+    again: bool,
+    repair: bool,
+    weld: bool | None,
+    most_triangles: int,
+    talk: str | None,
+) -> None:
+    """Write a page, one HTML file, that shows FILE and its layout side by side.
+
+    FILE is a result, .npz as `coneflat flatten -o` writes it, or a mesh (.obj, .ply, .stl, .off, .gltf, .glb): the
+    UVs that it has are shown; without, it is flattened first with default options, without overlaps.
+
+    \b
+    Examples:
+      coneflat view horse.ply
+      coneflat view horse_uv.obj --show qc
+      coneflat view horse.npz -o horse.html --show qc
+      coneflat view hand.obj -o hand.html --texture leather.jpg
+    """
+    from ...view.page.picture import read_picture
+    from ...view.page.webpage import check_page, open_page, page_of, write_page
+    from .console import Console
+    from .run import FLATTENED, open_result
+
+    # What can fail at the end is looked at before the work.
+    page = check_page(Path(f"{file.stem}_view.html") if output is None else output)
+    if texture is not None:
+        read_picture(texture)
+    with Console(talk) as console:
+        result = open_result(file, console, again=again, repair=repair, weld=weld)
+        with console.stage("page", FLATTENED):
+            text = page_of(
+                result, name=file.name, texture=texture, up=up, show=show, most_triangles=most_triangles
+            )
+            write_page(text, page)
+        console.finish([page], result)
+        if output is None and not open_page(page):
+            console.say(["open it in any browser"])

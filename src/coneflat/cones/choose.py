@@ -1,0 +1,229 @@
+"""Cones of a connected mesh in the way that the options name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from scipy.sparse import csc_matrix
+
+from .._arrays import BoolArray, FloatArray
+from ..geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
+from ..geometry.operators import vertex_areas
+from ..geometry.ties import tie_key
+from ..input.constraints import Wishes
+from ..mesh import TriangleMesh
+from ..options import Options
+from ..progress import Stages
+from ..threads import HUGE
+from . import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
+
+if TYPE_CHECKING:
+    from .cone_search import ConeSearch
+
+# The angle of a cone for which each triangle around it has room on its straight sides: less than half a turn, as not
+# all of them can be spread alike.
+ROOM = 0.6 * np.pi
+# On meshes of so many vertices, a neighbour is as good a place: corners of cones there, all widened alike, must not
+# exceed this, or the straight sides of a triangle may have no room for one, and the search has to be repeated.
+FINE, WIDEST = 30_000, 0.95 * np.pi
+# Up to so many corners of a polyhedron are all made cones. Below so many radians a vertex is none.
+FEW, FLAT = 24, 1e-6
+# How much larger E may get for the sake of rotations along handles.
+DEARER = 1.15
+
+#: Returns what loops across the handles turn by in the metric that a solution leads to, radians.
+Turned: TypeAlias = Callable[[ConeSolution], FloatArray]
+
+
+@dataclass(eq=False)
+class Surface:
+    """A connected mesh with what the choice of cones needs of its metric.
+
+    Attributes:
+        mesh: the mesh.
+        lengths: (m, 3) side lengths, with which every triangle has area.
+        laplacian: (n, n) cotangent Laplacian.
+        curvature: (n,) angle defect, radians.
+        areas: (n,) vertex areas.
+        widest: (n,) the widest corner at each vertex as a share of all there.
+        search: the search for cones that has been opened on it, if any.
+    """
+
+    mesh: TriangleMesh
+    lengths: FloatArray
+    laplacian: csc_matrix
+    curvature: FloatArray
+    areas: FloatArray
+    widest: FloatArray
+    search: ConeSearch | None = None
+
+    @classmethod
+    def of(cls, mesh: TriangleMesh, lengths: FloatArray) -> Surface:
+        """Return a mesh with what follows from its lengths."""
+        angles, n = corner_angles(lengths), len(mesh.vertices)
+        curvature = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+        laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths), n)
+        widest = np.zeros(n)
+        np.maximum.at(widest, mesh.faces.ravel(), angles.ravel())
+        widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
+        return cls(mesh, lengths, laplacian, curvature, vertex_areas(mesh.faces, lengths, n), widest)
+
+
+def pursues(mesh: TriangleMesh, options: Options) -> bool:
+    """Whether the pursuit finds the cones of a mesh."""
+    is_prescribed = options.boundary_kind in ("disk", "polygon") and mesh.is_boundary_vertex.any()
+    return options.cone_choice == "pursuit" or (
+        options.cone_choice == "auto"
+        and (options.wishes_cones or not (is_prescribed or is_riddled(mesh, options)))
+    )
+
+
+def is_riddled(mesh: TriangleMesh, options: Options) -> bool:
+    """Whether a mesh has so many handles, and needs so many cones for them, that few of them are no aim."""
+    from .cone_search import MOST_CONES
+
+    if options.cone_choice != "auto" or options.wishes_cones or mesh.is_boundary_vertex.any():
+        return False
+    # Each handle but one takes two cones of 4 pi.
+    return -mesh.euler_characteristic > MOST_CONES // 2
+
+
+def choose_cones(
+    surface: Surface, wishes: Wishes, options: Options, stages: Stages, turned: Turned | None = None
+) -> ConeSolution:
+    """Return cones with their curvatures and linear log scale; `turned` is asked where these are quantised."""
+    mesh = surface.mesh
+    if pursues(mesh, options):
+        corners = corners_alone(surface, wishes, options)
+        return _pursued(surface, wishes, options, stages, turned) if corners is None else corners
+    given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
+    is_greedy = options.cone_choice == "greedy" or is_riddled(mesh, options)
+    if is_greedy:
+        solution = greedy_cones(
+            *given,
+            epsilon=options.epsilon,
+            max_cones=options.max_cones,
+            tie_key=tie_key(mesh.vertices),
+            progress=stages.tell,
+        )
+    elif len(wishes.cones) and np.isfinite(wishes.cones.curvatures).all():
+        solution = cones_with_curvature(*given, wishes.cones.vertices, wishes.cones.curvatures)
+    else:
+        solution = cones_at(*given, wishes.cones.vertices)
+    if options.scale_at_cones and options.method == "exact":
+        check_enough(len(solution.cones), mesh)
+    else:
+        advice = "allow more of them (--max-cones)" if is_greedy else "add cones or move them"
+        check_feasible(solution.cones, solution.curvatures, wishes.names, advice)
+    return solution
+
+
+def corners_alone(surface: Surface, wishes: Wishes, options: Options) -> ConeSolution | None:
+    """Return a polyhedron's corners as cones if they are few: it unfolds without any distortion. Else None."""
+    if options.cone_choice != "auto" or options.wishes_cones or options.boundary_kind == "straight":
+        return None
+    mesh, curvature = surface.mesh, surface.curvature
+    corners = np.flatnonzero((np.abs(curvature) > FLAT) & ~mesh.is_boundary_vertex)
+    angles = 2 * np.pi - curvature[corners]
+    most = FEW if options.max_cones is None else min(options.max_cones, FEW)
+    if not 0 < len(corners) <= most or not wishes.is_allowed[corners].all():
+        return None
+    if angles.min() < options.min_cone_angle or angles.max() > (options.max_cone_angle or np.inf):
+        return None
+    given = surface.laplacian, curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
+    return cones_with_curvature(*given, corners, curvature[corners])
+
+
+def _pursued(
+    surface: Surface, wishes: Wishes, options: Options, stages: Stages, turned: Turned | None
+) -> ConeSolution:
+    """Return the fewest cones for the distortion allowed, or the best of the number asked for."""
+    from ..geometry.handles import open_turning
+    from .align import align_handles
+    from .pursuit import pursue
+    from .quantise import quantise_cones
+
+    mesh = surface.mesh
+    only = only_choice(surface, wishes, options)
+    if only is not None:
+        return only
+    search = search_on(surface, wishes, options, stages)
+
+    distortion, count = options.distortion, options.cone_count
+    if options.quantum is None:
+        found = pursue(search, distortion=distortion, count=count, most=options.max_cones).solution
+    else:
+        quantised = quantise_cones(
+            search, options.quantum, distortion=distortion, count=count, most=options.max_cones
+        )
+        if turned is not None and mesh.genus():
+            by_scale = open_turning(mesh).by_log_scale(surface.lengths)
+            bound = quantised.distortion * DEARER
+            bound = bound if count is not None else max(distortion, bound)
+            quantised = align_handles(search, quantised, by_scale, turned, bound)
+        found = quantised.solution
+    return replace(found, cones=found.cones[~mesh.is_boundary_vertex[found.cones]])
+
+
+def only_choice(surface: Surface, wishes: Wishes, options: Options) -> ConeSolution | None:
+    """Return the solution without cones where no vertex may be one, and none need be; else None."""
+    mesh = surface.mesh
+    takes_rest = _takes_rest(mesh, wishes, options)
+    if (wishes.is_allowed & ~takes_rest).any() or not (takes_rest.any() or mesh.euler_characteristic == 0):
+        return None
+    given = surface.laplacian, surface.curvature, takes_rest, mesh.euler_characteristic
+    return cones_at(*given, np.empty(0, dtype=np.int64))
+
+
+def _takes_rest(mesh: TriangleMesh, wishes: Wishes, options: Options) -> BoolArray:
+    """Return (n,) the boundary vertices that take what curvature the cones leave.
+
+    Corners of a straightened boundary are part of the trade, like the cones inside; but not on marked seams.
+    """
+    if options.boundary_kind != "straight":
+        return mesh.is_boundary_vertex
+    if wishes.on_marks is None:
+        return np.zeros(len(mesh.vertices), dtype=bool)
+    return mesh.is_boundary_vertex & wishes.on_marks
+
+
+def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages) -> ConeSearch:
+    """Return a search for cones as the options and the user's wishes have it.
+
+    One that is open on the surface goes on: only where cones are allowed may have changed.
+    """
+    from .pursuit import open_search
+
+    mesh = surface.mesh
+    is_straight = options.boundary_kind == "straight" and mesh.is_boundary_vertex.any()
+    room = (
+        ROOM * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)) + np.pi * mesh.is_boundary_vertex
+    )
+    if surface.search is not None:
+        surface.search.restrict(~surface.search.is_boundary & wishes.is_allowed)
+        return surface.search
+    if len(room) >= FINE:
+        room = np.minimum(room, WIDEST / surface.widest)
+    search = open_search(
+        surface.laplacian,
+        surface.curvature,
+        surface.areas,
+        _takes_rest(mesh, wishes, options),
+        mesh.euler_characteristic,
+        tie_key=tie_key(mesh.vertices),
+        # A corner of angle a has a curvature of pi - a: cones inside keep to the same bound.
+        min_cone_angle=options.min_cone_angle + (np.pi if is_straight else 0.0),
+        max_cone_angle=options.max_cone_angle,
+        positive_only=options.positive_only,
+        weights=wishes.weights,
+        required=wishes.required.vertices,
+        allowed=wishes.is_allowed,
+        room=None if options.refine else room.astype(np.float64),
+    )
+    search.tell = stages.tell
+    if len(mesh.faces) <= HUGE:  # else it holds too much memory
+        surface.search = search
+    return search

@@ -1,1 +1,0 @@
-"""From target curvature to a flat metric: a file per method."""

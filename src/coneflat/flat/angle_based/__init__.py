@@ -1,0 +1,1 @@
+"""Angle based flattening, linear and to the end."""

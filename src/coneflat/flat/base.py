@@ -1,0 +1,183 @@
+"""What every method gives to the pipeline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from .._arrays import FloatArray, IntArray
+from ..cones import ConeSolution
+from ..errors import ConvergenceError, MetricError
+from ..geometry import angle_defect, double_areas, edge_lengths
+from ..geometry.planar import heights, sides_between, signed_angles, signed_double_areas
+from ..mesh import TriangleMesh
+from ..quality.statistics import SolveFigures
+from ..text import plural
+
+# Height over longest side below which a triangle counts as flat, neither upright nor upside down: coordinates are
+# good to about 1e-12 of an edge.
+FLAT = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class LaidOut:
+    """A connected mesh with its layout.
+
+    Attributes:
+        mesh: the mesh that was laid out: the one that was given, or its refinement, whose vertices are those of
+            the given one followed by new ones.
+        face_origin: (m,) the given face of each of its faces.
+        points: (c, 2) points of the plane, model units.
+        corners: (m, 3) index into `points` of every triangle corner.
+        chart: (m,) the chart of each triangle, from 0; charts have no points in common and may lie over each other.
+            None for one chart.
+        cones: (s,) vertices.
+        seams: (k, 2) vertex pairs.
+        log_scale: (n,) phi; flat lengths are about l * exp(phi).
+        target, curvature: (n,) curvature wanted and reached, radians.
+        figures: how it was found.
+        notes: what falls short, one sentence each.
+    """
+
+    mesh: TriangleMesh
+    face_origin: IntArray
+    points: FloatArray
+    corners: IntArray
+    cones: IntArray
+    seams: IntArray
+    log_scale: FloatArray
+    target: FloatArray
+    curvature: FloatArray
+    figures: SolveFigures
+    chart: IntArray | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def area(self) -> float:
+        """The area of the mesh in space."""
+        return float(double_areas(edge_lengths(self.mesh.vertices, self.mesh.faces)).sum() / 2)
+
+
+class FlatMetric(Protocol):
+    """A flat metric on a connected mesh."""
+
+    def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
+        """Lay the mesh out.
+
+        Args:
+            disk: the mesh, cut open.
+            seams: (k,) the edges along which it was cut.
+        """
+        ...
+
+
+def laid_out_curvature(mesh: TriangleMesh, corners: FloatArray) -> FloatArray:
+    """Return (n,) the curvature of triangles with given corners (m, 3, 2): a full or half turn less their angles.
+
+    Those of triangles that are upside down count as negative. Where triangles wind around a vertex twice, the
+    curvature is a full turn less than it seems.
+    """
+    sides = sides_between(corners)
+    angles = signed_angles(sides)
+    is_flat = np.abs(heights(sides)) < FLAT
+    angles[is_flat] = np.abs(angles[is_flat])
+    return angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+
+
+def all_faces(mesh: TriangleMesh) -> IntArray:
+    """Return (m,) the numbers of a mesh's faces, which are their own origin."""
+    return np.arange(len(mesh.faces))
+
+
+def off_by(residual: float, unit: str = " rad") -> str:
+    """Return the part of a message that says by how much something is missed."""
+    if not np.isfinite(residual):
+        return "off by more than double precision can hold"
+    return f"off by {residual:.2g}{unit}"
+
+
+def failure_notes(
+    failure: str | None, accepted: bool, instead: str = "--method exact is surer"
+) -> tuple[str, ...]:
+    """Return how a solve fell short as notes, if it is accepted all the same.
+
+    Args:
+        failure: a clause, or None if it did not fall short.
+        accepted: the best effort will do.
+        instead: what else to try.
+
+    Raises:
+        ConvergenceError: it will not.
+    """
+    if failure is None:
+        return ()
+    if not accepted:
+        raise ConvergenceError(
+            f"{failure}; --best-effort takes it as it is, {instead}, other cones, --repair or remeshing may help"
+        )
+    return (f"{failure[0].upper()}{failure[1:]}.",)
+
+
+# Areas below so much of the mean are taken as so much, where a logarithm is wanted.
+TINY = 1e-12
+
+
+def laid_out_at(
+    points: FloatArray,
+    mesh: TriangleMesh,
+    disk: TriangleMesh,
+    seams: IntArray,
+    lengths: FloatArray,
+    solution: ConeSolution,
+    figures: SolveFigures | None = None,
+    notes: tuple[str, ...] = (),
+) -> LaidOut:
+    """Return a layout of a mesh's own triangles, at the mesh's area, with the scale and curvature that it has.
+
+    Args:
+        points: (c, 2) of the disk's vertices, at any scale, not upside down.
+        mesh: connected.
+        disk: the mesh cut open.
+        seams: (k,) the edges along which it was cut.
+        lengths: (m, 3) side lengths, with which every triangle has area.
+        solution: the cones and what was asked of them.
+        figures, notes: how it was found, and what falls short.
+
+    Raises:
+        MetricError: the layout has no area.
+    """
+    corners = points[disk.faces]
+    doubles = np.abs(signed_double_areas(corners))
+    if not doubles.sum() > 0:
+        raise MetricError(
+            f"all {plural(len(corners), 'triangle')} of the layout lie on a line: use method 'exact'"
+        )
+    before = double_areas(lengths)
+    factor = float(np.sqrt(before.sum() / doubles.sum()))
+    curvature = laid_out_curvature(mesh, corners)
+    return LaidOut(
+        mesh=mesh,
+        face_origin=all_faces(mesh),
+        points=points * factor,
+        corners=disk.faces,
+        cones=solution.cones,
+        seams=mesh.edges[seams],
+        log_scale=_log_scale(mesh, before, doubles * factor**2),
+        # The boundary is free: what comes out there is what was wanted.
+        target=np.where(mesh.is_boundary_vertex, curvature, solution.target),
+        curvature=curvature,
+        figures=SolveFigures() if figures is None else figures,
+        notes=notes,
+    )
+
+
+def _log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) -> FloatArray:
+    """Return (n,) half the log of the ratio of areas around each vertex."""
+    ratio = []
+    for areas in (before, after):
+        around = np.bincount(mesh.faces.ravel(), np.repeat(areas, 3), minlength=len(mesh.vertices))
+        ratio.append(np.maximum(around, TINY * around.mean()))
+    log_scale: FloatArray = np.log(ratio[1] / ratio[0]) / 2
+    return log_scale

@@ -1,0 +1,1 @@
+"""Circle patterns: the flat metric of circles that meet at given angles."""

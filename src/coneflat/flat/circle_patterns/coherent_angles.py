@@ -1,0 +1,165 @@
+"""The nearest angles that a circle pattern can have: the quadratic program of Kharevych et al. 2006."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csc_matrix, csr_matrix, identity
+
+from ..._arrays import BoolArray, FloatArray, IntArray
+from ...geometry.intrinsic import IntrinsicTriangulation
+from ...solver import factorize
+from .descent import descend
+
+# Angles may shrink to this part of what they were, or to this many radians where that is less; but never below the
+# last, radians.
+LEAST_PART, LARGEST_LEAST, LEAST_ANGLE = 0.5, 0.02, 1e-5
+# Circles that meet at a smaller angle, radians, become one, as neighbours around a planar quad that is inscribed in a
+# circle are. The equations would be as steep as this is small. Less than the least angle: so circles that are
+# one never close a ring, as the angles that are left in a ring sum to what they meet at.
+ONE_CIRCLE = 1e-6
+# Largest error of a sum of angles, radians; it sums to that of curvature.
+TOLERANCE = 1e-10
+# Rounds in which circles are made one, and Newton steps in each.
+ROUNDS, MAX_STEPS = 4, 40
+# Damping of a step, relative to its residual, where rank is wanting.
+DAMPING, LARGEST_DAMPING, LEAST_DAMPING = 1e-5, 1e-6, 1e-13
+
+
+@dataclass(frozen=True, eq=False)
+class CoherentAngles:
+    """Angles of a circle pattern.
+
+    Attributes:
+        angles: (3m,) opposite each half-edge, radians.
+        is_inside: (3m,) True for half-edges between triangles of one circle.
+        residual: the largest error of a sum of angles, radians.
+        steps: Newton steps.
+    """
+
+    angles: FloatArray
+    is_inside: BoolArray
+    residual: float
+    steps: int
+
+    @property
+    def converged(self) -> bool:
+        """Whether the angles sum to what they should."""
+        return self.residual <= TOLERANCE
+
+
+def coherent_angles(
+    triangulation: IntrinsicTriangulation, angles: FloatArray, sums: FloatArray, is_summed: BoolArray
+) -> CoherentAngles:
+    """Return the angles nearest to given ones, in the sum of squares, that belong to a flat circle pattern.
+
+    They are positive, sum to pi in triangles and to what is wanted at vertices, and the two opposite an edge sum
+    to pi at most: the paper's quadratic program. Angles at a boundary are free.
+
+    Args:
+        triangulation: connected.
+        angles: (3m,) opposite each half-edge, radians.
+        sums: (n,) what the angles at a vertex are to sum to.
+        is_summed: (n,) the vertices where that is asked.
+
+    Notes:
+        Without the sums, each edge has a problem of its own, to project two angles to a triangle. The sums
+        are equations, whose multipliers minimise a convex function that has what they are off by for its gradient;
+        its second derivative jumps where bounds begin or cease to hold, which Newton's method does not mind.
+        Where none holds, the first step is the least squares solution.
+    """
+    count = len(angles)
+    rows = triangulation.face_count
+    summed = np.flatnonzero(is_summed)
+    number = np.full(triangulation.vertex_count, -1, dtype=np.int64)
+    number[summed] = rows + np.arange(len(summed))
+    row = np.concatenate([np.arange(count) // 3, number[triangulation.faces.ravel()]])
+    column = np.tile(np.arange(count), 2)
+    wanted = row >= 0
+    equations = csr_matrix(
+        (np.ones(int(wanted.sum())), (row[wanted], column[wanted])), shape=(rows + len(summed), count)
+    )
+    right = np.concatenate([np.full(rows, np.pi), sums[summed]])
+
+    least = np.clip(LEAST_PART * angles, LEAST_ANGLE, LARGEST_LEAST)
+    problem = _Dual(
+        angles,
+        least,
+        triangulation.twin,
+        np.zeros(count, dtype=bool),
+        equations,
+        right,
+        bool(is_summed.all()),
+    )
+    found = descend(problem, np.zeros(len(right)), TOLERANCE, MAX_STEPS)
+    steps = found.steps
+    for _ in range(ROUNDS):
+        near = problem.nearly_one_circle(found.place)
+        if found.largest > TOLERANCE or not near.any():
+            break
+        problem.is_inside = problem.is_inside | near
+        found = descend(problem, found.place, TOLERANCE, MAX_STEPS)
+        steps += found.steps
+    is_inside = problem.is_inside | problem.nearly_one_circle(found.place)
+    return CoherentAngles(problem.project(found.place)[0], is_inside, found.largest, steps)
+
+
+@dataclass(eq=False)
+class _Dual:
+    """A convex function of the multipliers of equations A x = b, for x nearest to c within bounds."""
+
+    angles: FloatArray
+    least: FloatArray
+    twin: IntArray
+    is_inside: BoolArray
+    equations: csr_matrix
+    right: FloatArray
+    is_closed: bool  # then the last of the equations follows from the others
+
+    def project(self, place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the angles for multipliers, and their derivatives by those before bounds: own and across."""
+        free = self.angles + self.equations.T @ place
+        is_inner = self.twin >= 0
+        other = np.where(is_inner, self.twin, 0)
+        bounded = np.maximum(free, self.least)
+        too_wide = is_inner & (self.is_inside | (bounded + bounded[other] > np.pi))
+        half = (free - free[other]) / 2
+        low, high = self.least - np.pi / 2, np.pi / 2 - self.least[other]
+        slides = too_wide & (low < half) & (half < high)
+        angles = np.where(too_wide, np.pi / 2 + np.clip(half, low, high), bounded)
+        own = np.where(too_wide, 0.5 * slides, free > self.least)
+        return angles, own, np.where(slides, -0.5, 0.0)
+
+    def nearly_one_circle(self, place: FloatArray) -> BoolArray:
+        """Return (3m,) where two different circles are nearly one."""
+        angles = self.project(place)[0]
+        near: BoolArray = (self.twin >= 0) & ~self.is_inside
+        near &= np.pi - (angles + angles[self.twin]) < ONE_CIRCLE
+        return near
+
+    def downhill(self, place: FloatArray) -> FloatArray:
+        """Return by how much each sum falls short."""
+        short: FloatArray = self.right - self.equations @ self.project(place)[0]
+        return short
+
+    def newton_step(self, place: FloatArray, residual: FloatArray) -> FloatArray:
+        """Return the step, damped as much as the residual is large."""
+        _, own, across = self.project(place)
+        slots = np.flatnonzero(across)
+        every = np.arange(len(own))
+        derivative = csr_matrix(
+            (
+                np.concatenate([own, across[slots]]),
+                (np.concatenate([every, slots]), np.concatenate([every, self.twin[slots]])),
+            ),
+            shape=(len(own), len(own)),
+        )
+        used = len(residual) - self.is_closed
+        damping = np.clip(DAMPING * np.abs(residual[:used]).max(), LEAST_DAMPING, LARGEST_DAMPING)
+        equations = self.equations[:used]
+        matrix = csc_matrix(equations @ derivative @ equations.T + damping * identity(used, format="csr"))
+        matrix.sort_indices()
+        step = np.zeros_like(residual)
+        step[:used] = factorize(matrix).solve(residual[:used])
+        return step

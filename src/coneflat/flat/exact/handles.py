@@ -1,0 +1,138 @@
+"""Exact metrics whose rotations along handles are multiples of a quantum.
+
+With the cones given, an exactly conformal metric has no freedom left, and its rotations along the handles are what
+they are (Abel and Jacobi). Here the conformal structure is changed: edge lengths, as little as can be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csc_matrix
+
+from ..._arrays import BoolArray, FloatArray, IntArray
+from ...cones import ConeSolution
+from ...errors import ConvergenceError
+from ...geometry import corner_angles, double_areas
+from ...geometry.handles import Turning, curvature_by_log_lengths, edge_means, off_multiple
+from ...geometry.triangles import slacks
+from ...mesh import TriangleMesh
+from ...solver import factorize
+from .flatten import ExactChoices, ExactFlatMetric, exact_flattening
+
+# Steps at most, and radians at which to stop; it takes six or so if the cones are well placed.
+STEPS, TOLERANCE = 60, 1e-11
+# Largest change of the log of a length in one step: from there on, what is least is found anew.
+LARGEST_CHANGE = 0.2
+# A step of less than this part of the whole is too little: triangles are as flat as can be.
+LEAST_PART = 1e-3
+# What scaling counts in the norm of a strain, relative to shear: next to nothing, for it can be undone conformally.
+SCALING = 1e-3
+# Shear at cones turns loops best, for it amounts to moving the cones; but little room has to bear much of it then.
+# So many rings around them are spared by counting it so many times.
+RINGS, SPARED = 3, 1e3
+
+
+def corrected_flattening(
+    lengths: FloatArray, solution: ConeSolution, choices: ExactChoices, turning: Turning, quantum: float
+) -> ExactFlatMetric:
+    """Return a flat metric with the cones of a solution whose rotations along handles are multiples of a quantum.
+
+    For each loop there is a change of edge lengths that turns it and no other, with the least shear. Large changes are
+    made in steps; the last ones, on the few rotations, are Broyden's.
+
+    Args:
+        lengths: (m, 3) side lengths.
+        solution, choices: as for `exact_flattening`.
+        turning: of the mesh's handles.
+        quantum: radians.
+
+    Raises:
+        ConvergenceError: the rotations did not get there.
+    """
+    mesh = turning.mesh
+    metric = exact_flattening(mesh, lengths, solution, choices)
+    off = off_multiple(turning.of_flat(metric.straight()), quantum)
+    fixed = choices.is_open(mesh)
+    changes = None
+    for _ in range(STEPS):
+        if np.abs(off).max() <= TOLERANCE:
+            return metric
+        if changes is None:
+            sides = np.abs(metric.straight().sides).reshape(-1, 3)
+            changes = least_changes(turning, sides, shear_norm(mesh, lengths, solution.cones), fixed)
+            inverse = np.eye(len(off))
+        step = -inverse @ off
+        part = min(1.0, LARGEST_CHANGE / np.abs(changes @ step).max())
+        sheared = _sheared(mesh, lengths, part * (changes @ step))
+        while part > LEAST_PART and not slacks(sheared).min() > 0:
+            part /= 2
+            sheared = _sheared(mesh, lengths, part * (changes @ step))
+        if part <= LEAST_PART:
+            break
+        lengths = sheared
+        solution = replace(solution, log_scale=metric.solved.log_scale)
+        metric = exact_flattening(mesh, lengths, solution, choices)
+        before, off = off, off_multiple(turning.of_flat(metric.straight()), quantum)
+        if part < 1:
+            changes = None
+            continue
+        gained = inverse @ (off - before)
+        inverse += np.outer(step - gained, step @ inverse) / (step @ gained)
+    raise ConvergenceError(
+        f"rotations along handles did not get to multiples of {quantum / np.pi:.4g} pi: they are off by "
+        f"{np.abs(off).max():.2g} rad; other cones (--distortion, --cone-count) may help"
+    )
+
+
+def _sheared(mesh: TriangleMesh, lengths: FloatArray, change: FloatArray) -> FloatArray:
+    return lengths * np.exp(change[mesh.halfedge_edges]).reshape(-1, 3)
+
+
+def least_changes(turning: Turning, sides: FloatArray, norm: csc_matrix, fixed: BoolArray) -> FloatArray:
+    """Return (e, 2 genus) changes of the logs of edge lengths, each of which turns one loop by a radian at first.
+
+    Args:
+        turning: of the loops.
+        sides: (m, 3) lengths in the present flat metric.
+        norm: (e, e) of the changes.
+        fixed: (n,) vertices where conformal scaling is held, the others compensating what changes of curvature.
+    """
+    mesh = turning.mesh
+    fixed = fixed.copy()
+    fixed[0] |= not fixed.any()
+    by_lengths = turning.by_log_lengths(sides)
+    means = edge_means(mesh)[:, ~fixed]
+    curvature = curvature_by_log_lengths(mesh, sides)[~fixed]
+    by_scale = np.asarray((by_lengths @ means).todense()).T
+    answer = factorize(csc_matrix(curvature @ means)).solve(np.ascontiguousarray(by_scale))
+    slopes = np.asarray(by_lengths.todense()).T - curvature.T @ answer
+    eased = factorize(norm).solve(slopes)
+    result: FloatArray = eased @ np.linalg.inv(slopes.T @ eased)
+    return result
+
+
+def shear_norm(mesh: TriangleMesh, lengths: FloatArray, cones: IntArray) -> csc_matrix:
+    """Return (e, e) the matrix of the area integral of the squared shear by the changes of the logs of edge lengths.
+
+    In each triangle, sides of directions t change by m + a cos 2t + b sin 2t; (a, b) is the shear.
+    """
+    angles = corner_angles(lengths)
+    # Directions of sides 0, 1, 2, walking around: each turns by the outer angle between them.
+    directions = np.stack(
+        [np.zeros(len(angles)), np.pi - angles[:, 2], 2 * np.pi - angles[:, 2] - angles[:, 0]], axis=1
+    )
+    harmonics = np.stack([np.ones_like(directions), np.cos(2 * directions), np.sin(2 * directions)], axis=2)
+    parts = np.linalg.inv(harmonics)  # (m, 3, 3): from the changes of the sides to m, a, b
+    near = np.zeros(len(mesh.vertices), dtype=bool)
+    near[cones] = True
+    for _ in range(RINGS - 1):
+        near[mesh.edges[near[mesh.edges].any(axis=1)]] = True
+    is_spared = near[mesh.faces].any(axis=1)
+    norms = (double_areas(lengths) * np.where(is_spared, SPARED, 1.0))[:, None] * [SCALING, 1.0, 1.0]
+    blocks = np.einsum("fki,fk,fkj->fij", parts, norms, parts)
+    edges = mesh.halfedge_edges.reshape(-1, 3)
+    rows, columns = np.repeat(edges, 3, axis=1), np.tile(edges, (1, 3))
+    shape = (len(mesh.edges), len(mesh.edges))
+    return csc_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=shape)

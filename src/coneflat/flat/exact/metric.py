@@ -1,0 +1,278 @@
+"""The exact discrete conformal metric of given curvatures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..._arrays import BoolArray, FloatArray, IntArray
+from ...errors import CurvatureError
+from ...geometry.intrinsic import IntrinsicTriangulation, intrinsic_triangulation
+from ...geometry.triangles import double_areas
+from ...mesh import TriangleMesh
+from .newton import ConformalProblem, State, minimize
+from .preconditioner import Inverse
+
+# How far, in radians, prescribed curvatures may miss Gauss-Bonnet; decimals typed by hand are good to more.
+SUM_TOLERANCE = 1e-8
+# A first guess of phi with a wider range than this makes lengths whose squares overflow.
+WIDEST_RANGE = 1000.0
+
+
+@dataclass(frozen=True, eq=False)
+class ExactMetric:
+    """A metric of prescribed curvature, discretely conformal to the input.
+
+    Attributes:
+        log_scale: (n,) phi.
+        curvature: (n,) curvature reached, radians; at fixed vertices the one that came out.
+        triangulation: the triangulation on which the metric lives, Delaunay in it, with its flat lengths in
+            model units times exp(phi).
+        flips: half-edges flipped on the way there from the input's triangles, in order.
+        euclidean_flips: how many of them made the input Delaunay; the others happened during the solve.
+        steps: Newton steps.
+        residual: largest curvature error, radians, over the vertices with a target.
+        worst_vertex: where it is.
+        converged: whether the residual is within the tolerance and every triangle has area.
+        doubled: whether the triangulation is that of the surface glued to its mirror image; the first m
+            triangles are the input's.
+    """
+
+    log_scale: FloatArray
+    curvature: FloatArray
+    triangulation: IntrinsicTriangulation
+    flips: IntArray
+    euclidean_flips: int
+    steps: int
+    residual: float
+    worst_vertex: int
+    converged: bool
+    doubled: bool
+
+    @property
+    def ptolemy_flips(self) -> int:
+        """The number of flips during the solve."""
+        return len(self.flips) - self.euclidean_flips
+
+
+def exact_metric(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    target: FloatArray,
+    *,
+    fixed: BoolArray | None = None,
+    fixed_log_scale: FloatArray | float = 0.0,
+    start: FloatArray | None = None,
+    preconditioner: Inverse | None = None,
+    tolerance: float = 1e-10,
+    delaunay: bool = True,
+    max_steps: int = 200,
+    kind: type[ConformalProblem] = ConformalProblem,
+) -> ExactMetric:
+    """Return the metric l_ij exp((phi_i + phi_j) / 2) whose curvature is the target.
+
+    Args:
+        mesh: the mesh.
+        lengths: (m, 3) side lengths, model units; the triangles must have area.
+        target: (n,) curvature in radians; not used at fixed vertices.
+        fixed: (n,) True for vertices whose log scale is given and whose curvature comes out: cones with
+            phi = 0, a free boundary. None: all curvatures are prescribed, and phi, then known up to a
+            constant, is chosen to keep the total area.
+        fixed_log_scale: (n,) or one number, phi at the fixed vertices.
+        start: (n,) first guess of phi; the linear solution is a good one.
+        preconditioner: solves for the Laplacian of the mesh, zero at the fixed vertices, if something does
+            already: then less is factorized.
+        tolerance: curvature error, radians, that counts as converged. The solve goes on as far as rounding
+            permits.
+        delaunay: flip the input to its intrinsic Delaunay triangulation first. Without it, the conformal
+            class is that of the input's own triangles; the same on Delaunay meshes.
+        max_steps: Newton steps after which the best metric so far is returned; counted anew if the surface
+            has to be doubled.
+        kind: what scales the lengths: factors at the vertices, or the radii of circles there
+            (`coneflat.conformal.packing.PackingProblem`).
+
+    Raises:
+        CurvatureError: a target is 2 pi or more inside, pi or more on the boundary, or the targets of a
+            component without fixed vertices miss Gauss-Bonnet.
+
+    Notes:
+        Springborn, Schroeder, Pinkall, "Conformal equivalence of triangle meshes", 2008, with the flips of
+        Springborn, "Ideal hyperbolic polyhedra and discrete uniformization", 2019, and of Gillespie,
+        Springborn, Crane, "Discrete conformal equivalence of polyhedral surfaces", 2021. With flips a metric
+        exists for every target that passes the checks. At a boundary the theorem needs the edges of the
+        boundary to flip, too: where the solution has broken triangles there, the surface is glued to its
+        mirror image and solved again.
+    """
+    n = len(mesh.vertices)
+    fixed = np.zeros(n, dtype=bool) if fixed is None else np.asarray(fixed, dtype=bool)
+    target, pinned = checked_target(mesh, np.asarray(target, dtype=np.float64), fixed)
+    log_scale = np.zeros(n) if start is None else np.array(start, dtype=np.float64)
+    log_scale[fixed] = np.broadcast_to(np.asarray(fixed_log_scale, dtype=np.float64), (n,))[fixed]
+
+    plain = np.where(fixed, log_scale, 0.0)
+    if not np.ptp(log_scale) <= WIDEST_RANGE:
+        log_scale = plain
+    flat_turn = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
+    copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
+    doubled, steps = False, 0
+
+    def solved_from(first: FloatArray) -> tuple[ConformalProblem, State, IntArray, int]:
+        """Return the problem, its best state, the vertices it is about, and how many flips made it Delaunay."""
+        triangulation, original = intrinsic_triangulation(mesh, lengths), np.arange(n)
+        if doubled:
+            triangulation, original = double(triangulation)
+            problem = kind(
+                triangulation,
+                np.full(len(original), 2 * np.pi),
+                (copies * target)[original],
+                fixed[original],
+                np.concatenate([pinned, np.zeros(len(original) - n, dtype=bool)]),
+            )
+        else:
+            problem = kind(triangulation, flat_turn, target, fixed, pinned, preconditioner)
+        euclidean = problem.prepare(delaunay)
+        return problem, minimize(problem, first[original], tolerance, max_steps), original, euclidean
+
+    problem, state, original, euclidean = solved_from(log_scale)
+    steps += problem.steps
+    if not _is_solved(state, tolerance) and mesh.is_boundary_vertex.any():
+        doubled = True
+        problem, state, original, euclidean = solved_from(log_scale)
+        steps += problem.steps
+    if not _is_solved(state, tolerance) and (log_scale != plain).any():
+        # A first guess may lie so far off, on a field of spikes say, that nothing is left of the triangles there. The
+        # input's own scale is finite.
+        again = solved_from(plain)
+        steps += again[0].steps
+        if again[1].largest < state.largest:
+            problem, state, original, euclidean = again
+    if doubled:
+        state.curvature[:n] /= copies
+    if pinned.any():
+        state.log_scale = _keep_area(mesh, lengths, problem, state.log_scale, original)
+    return _finish(problem, state, n, euclidean, steps, tolerance, doubled)
+
+
+def _is_solved(state: State, tolerance: float) -> bool:
+    return state.largest <= tolerance and state.broken == 0
+
+
+def _keep_area(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    problem: ConformalProblem,
+    log_scale: FloatArray,
+    original: IntArray,
+) -> FloatArray:
+    """Return phi, shifted on each component without fixed vertices so that its total area stays the same.
+
+    original: (n,) for each vertex of the problem the vertex of the mesh that it is, or is a copy of.
+    """
+    count, labels = mesh.components
+    component = labels[original]
+    free = np.ones(count, dtype=bool)
+    free[component[problem.fixed]] = False
+    centre = np.full(count, -np.inf)
+    np.maximum.at(centre, component, log_scale)
+    log_scale = log_scale - np.where(free, centre, 0.0)[component]
+    faces = problem.triangulation.faces
+    metric = problem.flat_lengths(log_scale).reshape(-1, 3)
+    before = np.bincount(labels[mesh.faces[:, 0]], weights=double_areas(lengths), minlength=count)
+    after = np.bincount(component[faces[:, 0]], weights=double_areas(metric), minlength=count)
+    copies = len(metric) / len(lengths)  # 2 if the surface was doubled
+    # Where nothing is left of the area, the metric is refused: any shift will do.
+    is_left = np.isfinite(after) & (after > 0)
+    shift = np.log(copies * before / np.where(is_left, after, copies * before)) / 2
+    shifted: FloatArray = log_scale + np.where(free, shift, 0.0)[component]
+    return shifted
+
+
+def _finish(
+    problem: ConformalProblem,
+    state: State,
+    n: int,
+    euclidean: int,
+    steps: int,
+    tolerance: float,
+    doubled: bool,
+) -> ExactMetric:
+    """Put the metric on the triangulation and collect the report."""
+    triangulation = problem.triangulation
+    triangulation.length = problem.flat_lengths(state.log_scale)
+    residual = np.abs(state.residual[:n])
+    records = problem.records
+    return ExactMetric(
+        log_scale=state.log_scale[:n],
+        curvature=state.curvature[:n],
+        triangulation=triangulation,
+        flips=np.concatenate(records) if records else np.empty(0, dtype=np.int64),
+        euclidean_flips=euclidean,
+        steps=steps,
+        residual=state.largest,
+        worst_vertex=int(residual.argmax()),
+        converged=_is_solved(state, tolerance),
+        doubled=doubled,
+    )
+
+
+def checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> tuple[FloatArray, BoolArray]:
+    """Return a target that satisfies Gauss-Bonnet to rounding, and a pinned vertex a component, if needed."""
+    on_boundary = mesh.is_boundary_vertex
+    for where, limit, name, place in (
+        (~on_boundary, 2 * np.pi, "2 pi", "inside"),
+        (on_boundary, np.pi, "pi", "on the boundary"),
+    ):
+        bad = np.flatnonzero(where & ~fixed & ~(target < limit * (1 - 1e-12)))
+        if len(bad):
+            worst = bad[np.argmax(target[bad])]
+            raise CurvatureError(
+                f"no metric has a curvature of {name} or more {place}: vertex {worst} is to have "
+                f"{target[worst] / np.pi:.6g} pi ({len(bad)} such); ask for less"
+            )
+    pinned = np.zeros(len(target), dtype=bool)
+    count, component = mesh.components
+    target = target.copy()
+    for label in np.setdiff1d(np.arange(count), component[fixed]):
+        inside = component == label
+        faces = int(inside[mesh.faces[:, 0]].sum())
+        edges = int(inside[mesh.edges[:, 0]].sum())
+        vertices = int(inside.sum())
+        euler = vertices - edges + faces
+        excess = float(target[inside].sum()) - 2 * np.pi * euler
+        if not abs(excess) <= SUM_TOLERANCE:
+            raise CurvatureError(
+                f"curvatures must sum to 2 pi times the Euler characteristic, {2 * euler} pi, but the input "
+                f"sums to {target[inside].sum() / np.pi:.9g} pi; change one cone by {-excess / np.pi:.6g} pi"
+            )
+        target[inside] -= excess / vertices
+        pinned[np.flatnonzero(inside)[0]] = True
+    return target, pinned
+
+
+def double(triangulation: IntrinsicTriangulation) -> tuple[IntrinsicTriangulation, IntArray]:
+    """Return the double of a bounded triangulation, and which vertex each of its vertices is a copy of.
+
+    Triangles and vertices keep their numbers; triangle m + f mirrors triangle f, with its sides 1 and 2
+    exchanged; boundary vertices are their own images. Edges of the boundary become inner edges, which can be
+    flipped: no obtuse angle opposite a boundary edge is in the way of a Delaunay triangulation any more.
+    """
+    twin, tail, n = triangulation.twin, triangulation.tail, triangulation.vertex_count
+    slots = np.arange(len(twin))
+    head = tail[slots - slots % 3 + (slots + 1) % 3]
+    mirror = len(twin) + slots - slots % 3 + np.array([0, 2, 1])[slots % 3]
+    outer = twin < 0
+    inside = np.ones(n, dtype=bool)
+    inside[tail[outer]] = False
+    inside[head[outer]] = False
+    image = np.arange(n)
+    image[inside] = n + np.arange(inside.sum())
+
+    both = 2 * len(twin)
+    new_twin, new_tail, length = np.empty(both, np.int64), np.empty(both, np.int64), np.empty(both)
+    new_twin[slots] = np.where(outer, mirror, twin)
+    new_twin[mirror] = np.where(outer, slots, mirror[twin])
+    new_tail[slots], new_tail[mirror] = tail, image[head]
+    length[slots] = length[mirror] = triangulation.length
+    original = np.concatenate([np.arange(n), np.flatnonzero(inside)])
+    return IntrinsicTriangulation(new_twin, new_tail, length, len(original)), original

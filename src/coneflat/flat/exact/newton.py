@@ -1,0 +1,313 @@
+"""Newton's method on the convex energy of discrete conformal maps, with edge flips."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csc_matrix
+
+from ..._arrays import BoolArray, FloatArray, IntArray
+from ...compiled import compiled
+from ...errors import MetricError
+from ...geometry.delaunay import make_delaunay
+from ...geometry.intrinsic import IntrinsicTriangulation
+from ...mesh import NEXT
+from ...solver import Factor, factorize
+from .hessian import HessianPattern
+from .preconditioner import HeldInverse, Inverse, conjugate_gradients, corrected
+
+# Residual, radians, below which nothing is left to gain: the rounding of a sum of a few angles.
+GOAL = 1e-13
+# Largest change of phi in one step. Beyond e^5 in length the quadratic model says nothing any more.
+LARGEST_STEP = 5.0
+# A step is solved for to the accuracy of the residual, but to this at least: more is lost to the next.
+COARSEST = 0.05
+# Log scales that differ by less than this have nearly the same Hessian.
+NEARLY = 0.05
+# A step of this share of phi is lost in the sum: triangles are too thin for the tolerance.
+ROUNDING = 2.0**-52
+# Halvings of a step after which it is taken for rounding: the change is then below 1e-9 of the first trial.
+HALVINGS = 30
+# The same where the surface can be doubled instead of creeping along triangles that are about to break.
+HALVINGS_BOUNDED = 6
+
+
+@dataclass(eq=False)
+class State:
+    """Curvature at a log scale, on the triangulation that is Delaunay for it."""
+
+    log_scale: FloatArray
+    curvature: FloatArray
+    cots: FloatArray
+    broken: int
+    residual: FloatArray
+
+    @property
+    def largest(self) -> float:
+        """The largest residual, radians; infinite where the scale is beyond double precision."""
+        largest = float(np.abs(self.residual).max(initial=0.0))
+        return largest if np.isfinite(largest) else np.inf
+
+
+def centred(log_scale: FloatArray) -> FloatArray:
+    """Return a log scale with its middle at 0: neither huge nor tiny factors overflow, and angles see ratios only."""
+    middle: FloatArray = log_scale - (log_scale.max() + log_scale.min()) / 2
+    return middle
+
+
+@dataclass(eq=False)
+class ConformalProblem:
+    """Find phi, so that the curvature of l_ij exp((phi_i + phi_j) / 2) is the target.
+
+    K(phi) - target is the gradient of a convex energy (Springborn, Schroeder, Pinkall 2008, Eq. 7), whose
+    Hessian is the cotangent Laplacian of the scaled metric; flipped to Delaunay, the energy is defined
+    for every phi and twice continuously differentiable (Springborn 2019; Gu, Luo, Sun, Wu 2018).
+
+    Attributes:
+        triangulation: lengths l; flipped in place.
+        flat_turn: (n,) 2 pi inside, pi on the boundary.
+        target: (n,) curvature, radians; not used at fixed vertices.
+        fixed: (n,) True where phi is given.
+        pinned: (n,) True for one vertex of each component without fixed ones.
+        records: half-edges flipped so far.
+        preconditioner: solves for the Laplacian of a metric that is similar, zero at fixed vertices; may be none.
+        steps: Newton steps so far.
+        last: the state evaluated last, the one the triangulation belongs to.
+    """
+
+    triangulation: IntrinsicTriangulation
+    flat_turn: FloatArray
+    target: FloatArray
+    fixed: BoolArray
+    pinned: BoolArray
+    preconditioner: Inverse | None = None
+    records: list[IntArray] = field(default_factory=list)
+    steps: int = 0
+    last: State | None = None
+    _pattern: HessianPattern | None = None
+    _factor: Factor | None = None
+    _known: tuple[Inverse, FloatArray, Inverse] | None = None
+
+    @cached_property
+    def is_bounded(self) -> bool:
+        """Whether there is a boundary, where edges cannot be flipped and triangles may stay broken."""
+        return bool((self.triangulation.twin < 0).any())
+
+    def prepare(self, delaunay: bool) -> int:
+        """Flip the input to Delaunay in its own metric, if so wanted; return the number of flips."""
+        if not delaunay:
+            return 0
+        self.records.append(make_delaunay(self.triangulation))
+        return len(self.records[0])
+
+    def flat_lengths(self, log_scale: FloatArray) -> FloatArray:
+        """Return (3m,) the scaled lengths, the same bits on both sides of an edge."""
+        tail = self.triangulation.tail
+        head = tail.reshape(-1, 3)[:, NEXT].ravel()
+        # Multiplication commutes, and the background lengths agree.
+        return self.triangulation.length * np.exp((log_scale[tail] + log_scale[head]) / 2)
+
+    def sum_angles(self, log_scale: FloatArray, sums: FloatArray, cots: FloatArray) -> int:
+        """Fill the (n,) angle sums and (3m,) weights of the scaled metric; return the number of broken triangles."""
+
+        scale = np.exp(centred(log_scale) / 2)
+        return sum_angles(self.triangulation.tail, self.triangulation.length, scale, sums, cots)
+
+    def flip(self, log_scale: FloatArray, suspects: IntArray | None) -> IntArray:
+        """Flip to Delaunay in the scaled metric, from some half-edges or all; return the half-edges flipped."""
+        return make_delaunay(self.triangulation, log_scale, suspects=suspects)
+
+    def evaluate(self, log_scale: FloatArray) -> State:
+        """Flip to Delaunay in the scaled metric and return the curvature there."""
+
+        sums = np.empty(len(log_scale))
+        cots = np.empty(len(self.triangulation.tail))
+        broken = self.sum_angles(log_scale, sums, cots)
+        # The cotangents are needed anyway and tell at a glance where there is nothing to flip.
+        found = np.empty(len(cots), dtype=np.int64)
+        suspects = found[: find_negative_weights(self.triangulation.twin, cots, found)]
+        if broken or len(suspects):
+            flipped = self.flip(log_scale, None if broken else suspects)
+            if len(flipped):
+                self.records.append(flipped)
+                self._pattern = None
+                broken = self.sum_angles(log_scale, sums, cots)
+        curvature = self.flat_turn - sums
+        residual = np.where(self.fixed, 0.0, self.target - curvature)
+        if not self.fixed.any() and np.count_nonzero(self.pinned) == 1:
+            # Gauss-Bonnet holds but for the rounding of 2 pi at every vertex, which no scale can take away.
+            residual -= residual.mean()
+        self.last = State(log_scale, curvature, cots, broken, residual)
+        return self.last
+
+    def direction(self, state: State) -> tuple[FloatArray, bool]:
+        """Return the Newton direction of the state just evaluated, 0 at fixed vertices, and whether it is exact.
+
+        Raises:
+            MetricError: the Hessian is singular in double precision.
+        """
+        if self._pattern is None:
+            self._pattern = HessianPattern(self.triangulation)
+        self.steps += 1
+        if self.preconditioner is not None:
+            accuracy = min(max(state.largest, GOAL / state.largest / 4), COARSEST)
+            hessian = self._pattern.matrix(state.cots, self.fixed)
+            inverse = self._corrected(self.preconditioner, hessian, state.log_scale)
+            step = conjugate_gradients(hessian, state.residual, inverse, accuracy)
+            if step is not None:
+                return np.where(self.fixed, 0.0, step), False
+        held = self.fixed | self.pinned
+        hessian = self._pattern.matrix(state.cots, held)
+        self._factor = factorize(hessian, self._factor)
+        self.preconditioner = HeldInverse(self._factor, hessian, held)
+        return self.preconditioner.solve(state.residual), True
+
+    def _corrected(self, inverse: Inverse, hessian: csc_matrix, log_scale: FloatArray) -> Inverse:
+        """Return an inverse corrected for the Hessian, or for one that was nearly the same."""
+        if (
+            self._known is None
+            or self._known[0] is not inverse
+            or np.ptp(log_scale - self._known[1]) > NEARLY
+        ):
+            self._known = inverse, log_scale, corrected(inverse, hessian, self.fixed)
+        return self._known[2]
+
+
+def minimize(problem: ConformalProblem, log_scale: FloatArray, tolerance: float, max_steps: int) -> State:
+    """Return the state with the least residual that Newton's method reaches.
+
+    The line search looks at the slope of the energy along the step, (K - target) . d, not at its values,
+    whose rounding hides what a step gains near the end. It halves the step while the slope is positive. The
+    energy being convex, a step with a slope below zero stops short of the minimum along the line, so the
+    energy has fallen, and by at least half of what was to be had when the step before it, twice as long,
+    went beyond. The slope is negative at length 0 and continuous: some length is accepted. A step beyond the
+    minimum is taken only if it halves the least residual so far, which can happen but finitely often. So the
+    search can neither stall nor cycle.
+
+    On a bounded surface the theory does not hold, since edges of the boundary are not flipped; there no
+    state with broken triangles is accepted, and the search ends early if it finds no other.
+    """
+    bounded = problem.is_bounded
+    state = best = problem.evaluate(log_scale)
+    if bounded and state.broken:
+        state = best = problem.evaluate(np.where(problem.fixed, log_scale, 0.0))
+    while best.largest > GOAL and not (bounded and state.broken) and problem.steps < max_steps:
+        if problem.last is not state:  # the Hessian needs the triangulation of its own metric
+            state = problem.evaluate(state.log_scale)
+        try:
+            step, is_exact = problem.direction(state)
+        except MetricError:  # singular in double precision: the best so far has to do
+            break
+        if best.largest > tolerance and np.abs(step).max() <= ROUNDING * np.abs(state.log_scale).max():
+            break
+        halvings = 0
+        if best.largest > tolerance:
+            halvings = HALVINGS_BOUNDED if bounded else HALVINGS
+        trial = search_line(problem, state, step, best.largest, halvings)
+        if trial is None:
+            if is_exact or best.largest <= tolerance:
+                break
+            problem.preconditioner = None
+            continue
+        gained = trial.largest <= best.largest / 2
+        state = trial
+        if state.largest < best.largest:
+            best = state
+        if best.largest <= tolerance and not gained:
+            break
+    return best if best is problem.last else problem.evaluate(best.log_scale)
+
+
+def search_line(
+    problem: ConformalProblem, state: State, step: FloatArray, least: float, halvings: int
+) -> State | None:
+    """Return the first trial accepted; None if there is none."""
+    reach = float(np.abs(step).max(initial=0.0))
+    if not np.isfinite(reach) or reach == 0.0:
+        return None
+    length = min(1.0, LARGEST_STEP / reach)
+    for _ in range(halvings + 1):
+        place = state.log_scale + length * step
+        if np.array_equal(place, state.log_scale):  # shorter than rounding
+            return None
+        trial = problem.evaluate(place)
+        slope = -float(trial.residual @ step)
+        if (slope <= 0 or trial.largest <= least / 2) and not (problem.is_bounded and trial.broken):
+            return trial
+        length /= 2
+    return None
+
+
+@compiled
+def add_angles(
+    i: int, j: int, k: int, a: float, b: float, c: float, angle_sum: FloatArray
+) -> tuple[bool, float, float, float, float]:
+    """Add the angles of a triangle with sides a, b, c opposite i, j, k to the sums there.
+
+    Where the triangle inequality is broken they are pi and 0, pi opposite the side that is too long. Returns whether it
+    is, four times the area, and the cotangents at i, j, k; these are 0 then.
+    """
+    slack_a = min(b, c) - (a - max(b, c))
+    slack_b = min(c, a) - (b - max(c, a))
+    slack_c = min(a, b) - (c - max(a, b))
+    if min(slack_a, slack_b, slack_c) <= 0.0:
+        wide = i if slack_a <= 0.0 else (j if slack_b <= 0.0 else k)
+        angle_sum[wide] += math.pi
+        return True, 0.0, 0.0, 0.0, 0.0
+    perimeter = a + b + c
+    root = math.sqrt(perimeter * slack_a * slack_b * slack_c)
+    angle_i = 2 * math.atan2(root, perimeter * slack_a)
+    angle_j = 2 * math.atan2(root, perimeter * slack_b)
+    angle_sum[i] += angle_i
+    angle_sum[j] += angle_j
+    angle_sum[k] += math.pi - angle_i - angle_j  # a third of the time less, and as exact as their sum is
+    return (
+        False,
+        root,
+        (perimeter * slack_a - slack_b * slack_c) / (2 * root),
+        (perimeter * slack_b - slack_c * slack_a) / (2 * root),
+        (perimeter * slack_c - slack_a * slack_b) / (2 * root),
+    )
+
+
+@compiled
+def sum_angles(
+    tail: IntArray, length: FloatArray, scale: FloatArray, angle_sum: FloatArray, cots: FloatArray
+) -> int:
+    """Fill the angle sum at each vertex and the cotangent opposite each half-edge.
+
+    A side from i to j has the length length * scale_i * scale_j. Where the triangle inequality is broken the
+    angles are those of the convex extension (Springborn, Schroeder, Pinkall 2008, Section 5.1): pi opposite
+    the side that is too long, 0 at the others, and no cotangents. Returns the number of broken triangles.
+    """
+    broken = 0
+    angle_sum[:] = 0.0
+    for h in range(0, len(tail), 3):
+        # The corner opposite side i is at the tail of side i + 2.
+        j, k, i = tail[h], tail[h + 1], tail[h + 2]
+        a = length[h] * scale[j] * scale[k]
+        b = length[h + 1] * scale[k] * scale[i]
+        c = length[h + 2] * scale[i] * scale[j]
+        largest = max(a, b, c)
+        a /= largest
+        b /= largest
+        c /= largest
+        is_broken, _, cots[h], cots[h + 1], cots[h + 2] = add_angles(i, j, k, a, b, c, angle_sum)
+        broken += is_broken
+    return broken
+
+
+@compiled
+def find_negative_weights(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
+    """Write a half-edge of each edge whose cotangents sum to less than 0, so is not Delaunay; return their number."""
+    count = 0
+    for h in range(len(twin)):
+        t = twin[h]
+        # The margin is the rounding of the cotangents; the test that decides on a flip has its own.
+        if t > h and cots[h] + cots[t] < -1e-13 * (abs(cots[h]) + abs(cots[t])):
+            found[count] = h
+            count += 1
+    return count

@@ -1,0 +1,143 @@
+"""How much of the plane overlapping triangles cover."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..mesh import NEXT, sort_pairs
+
+# Crossings of horizontal lines with sides that are sorted at a time, to bound the memory.
+AT_A_TIME = 2_000_000
+# Of these crossings, about a minute: with more the areas are not computed.
+MOST_CROSSINGS = 200_000_000
+# Pixels along a side of the box around all, where areas are counted in pixels.
+RASTER = 2048
+
+
+def covered_twice(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
+    """Return the area inside at least two triangles, and that inside at least one.
+
+    Args:
+        corners: (m, 3, 2) of the triangles, counterclockwise or without area.
+        pairs: (k, 2) all that overlap.
+
+    Returns:
+        Both NaN where it would take too long, as of long triangles in all directions.
+
+    Notes:
+        How many triangles cover a point is the winding number of their sides about it, where those that two
+        triangles share cancel. On a horizontal line it changes where it crosses a side, and between the heights
+        at which sides end or cross, the lengths of line that are covered once, twice, thrice are linear in the
+        height: their value in the middle, times the difference in height, is an area without error but for
+        rounding. Only triangles that overlap others count, the outline of what they cover is short, and its
+        sides cross in those pairs alone.
+    """
+    edges = corners[:, NEXT] - corners
+    total = float(_cross(edges[:, 0], edges[:, 1]).sum()) / 2
+    if not len(pairs):
+        return 0.0, total
+    used, index = np.unique(pairs, return_inverse=True)
+    corners, pairs = corners[used], index.reshape(-1, 2)
+    corners = corners - corners.min(axis=(0, 1))
+    steps = _outline(corners)
+    twice, more = _sweep(corners, steps, _crossings(corners, steps != 0, pairs))
+    return twice, total - more
+
+
+def layers_of_raster(corners: FloatArray) -> tuple[float, float]:
+    """Return about the area inside at least two triangles, and that inside at least one, by counting pixels.
+
+    corners: (m, 3, 2) of the triangles, either way around.
+    """
+    from .raster import count_steps
+
+    low = corners.min(axis=(0, 1))
+    size = corners.max(axis=(0, 1)) - low
+    if not size.min() > 0:
+        return 0.0, 0.0
+    steps = np.zeros((RASTER, RASTER + 1), dtype=np.int64)
+    count_steps(np.ascontiguousarray((corners - low) * (RASTER / size)), steps)
+    layers = np.cumsum(steps, axis=1)
+    pixel = float(np.prod(size / RASTER))
+    return int(np.count_nonzero(layers > 1)) * pixel, int(np.count_nonzero(layers)) * pixel
+
+
+def _cross(one: FloatArray, two: FloatArray) -> FloatArray:
+    product: FloatArray = one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]
+    return product
+
+
+def _outline(corners: FloatArray) -> IntArray:
+    """Return (m, 3) how often the side from each corner is in the outline, those with the same ends added up.
+
+    One side of each number of equal ones stands for all: positive as it runs, negative the other way.
+    """
+    _, ends = np.unique(corners.reshape(-1, 2) @ np.array([1, 1j]), return_inverse=True)
+    tails, heads = ends, ends.reshape(-1, 3)[:, NEXT].ravel()
+    order, first = sort_pairs(tails, heads, len(ends))
+    ways = np.where(tails < heads, 1, -1)
+    sides = order[first]
+    steps = np.zeros(len(ends), dtype=np.int64)
+    steps[sides] = np.add.reduceat(ways[order], np.flatnonzero(first)) * ways[sides]
+    return steps.reshape(-1, 3)
+
+
+def _crossings(corners: FloatArray, on_outline: BoolArray, pairs: IntArray) -> FloatArray:
+    """Return the heights at which sides on the outline of overlapping triangles cross."""
+    heights = []
+    for i in range(3):
+        for j in range(3):
+            one, two = pairs[on_outline[pairs[:, 0], i] & on_outline[pairs[:, 1], j]].T
+            start, way = corners[one, i], corners[one, NEXT[i]] - corners[one, i]
+            other, across = corners[two, j], corners[two, NEXT[j]] - corners[two, j]
+            slope = _cross(way, across)
+            with np.errstate(divide="ignore", invalid="ignore"):  # parallel sides
+                here = _cross(other - start, across) / slope
+                there = _cross(other - start, way) / slope
+            meet = (here > 0) & (here < 1) & (there > 0) & (there < 1)
+            heights.append(start[meet, 1] + here[meet] * way[meet, 1])
+    return np.concatenate(heights)
+
+
+def _sweep(corners: FloatArray, steps: IntArray, crossings: FloatArray) -> tuple[float, float]:
+    """Return the area with winding number 2 and more, and the sum of the areas with 2, 3, 4 ... and more.
+
+    Args:
+        corners: (m, 3, 2).
+        steps: (m, 3) how often the side from each corner to the next counts.
+        crossings: heights at which sides that count cross.
+    """
+    start, end, step = corners[steps != 0], corners[:, NEXT][steps != 0], steps[steps != 0]
+    falls = end[:, 1] < start[:, 1]
+    low, high = np.where(falls[:, None], end, start), np.where(falls[:, None], start, end)
+    step, way = np.where(falls, step, -step), high - low
+    heights = np.unique(np.concatenate([low[:, 1], high[:, 1], crossings]))
+    first, last = np.searchsorted(heights, low[:, 1]), np.searchsorted(heights, high[:, 1])
+    if int((last - first).sum()) > MOST_CROSSINGS:
+        return float("nan"), float("nan")
+    twice = more = 0.0
+    for begin, stop in _blocks(first, last, len(heights)):
+        bottom = np.maximum(first, begin)
+        count = np.maximum(np.minimum(last, stop) - bottom, 0)
+        side = np.repeat(np.arange(len(count)), count)
+        strip = np.arange(len(side)) - np.repeat(np.cumsum(count) - count - bottom, count)
+        above = (heights[strip] + heights[strip + 1]) / 2 - low[side, 1]
+        x = low[side, 0] + way[side, 0] * (above / way[side, 1])
+        order = np.lexsort((x, strip))
+        layers = np.cumsum(step[side[order]])[:-1]  # 0 at the end of each strip
+        areas = np.diff(x[order]) * np.diff(heights)[strip[order[:-1]]]
+        twice += float(areas[layers > 1].sum())
+        more += float((areas * np.maximum(layers - 1, 0)).sum())
+    return twice, more
+
+
+def _blocks(first: IntArray, last: IntArray, count: int) -> Iterator[tuple[int, int]]:
+    """Yield ranges of strips between `count` heights that sides from `first` to `last` cross only so many times."""
+    begun = np.bincount(first, minlength=count) - np.bincount(last, minlength=count)
+    crossed = np.cumsum(np.cumsum(begun))
+    cuts = np.searchsorted(crossed, np.arange(AT_A_TIME, crossed[-1], AT_A_TIME))
+    yield from pairwise(np.unique(np.concatenate([[0], cuts, [count - 1]])).tolist())

@@ -1,0 +1,177 @@
+"""Loops across the handles of a connected mesh, by which the rotation along each is measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csc_matrix, csr_matrix
+
+from .._arrays import FloatArray, IntArray
+from ..mesh import TriangleMesh
+from . import cotangents
+from .graph import MultiGraph
+from .intrinsic import halfedge_twins
+from .straight import FlatTriangles
+from .ties import tie_key
+
+
+def handle_loops(mesh: TriangleMesh, holes: bool = False) -> list[IntArray]:
+    """Return 2 genus closed strips of triangles that no cut along one of them, or at a boundary, makes shorter.
+
+    Each is given by the half-edges that it crosses, in order: out of the triangle of one, over it, into the triangle
+    of its twin, which is that of the next. A tree of shortest ways between triangles and a tree of edges that these
+    do not cross leave 2 genus edges (tree-cotree, D. Eppstein 2003); each closes a loop.
+
+    Args:
+        mesh: connected.
+        holes: have loops around all but one of the boundary's loops, too, so that any closed strip is a sum of
+            these and of those around inner vertices.
+    """
+    if not mesh.genus() and not (holes and mesh.boundary_loops[0] > 1):
+        return []
+    inside = np.flatnonzero(~mesh.is_boundary_edge)
+    across = mesh.edge_halfedges[inside]
+    middles = mesh.vertices[mesh.faces].mean(axis=1)
+    one, two = across.T // 3
+    dual = MultiGraph(len(mesh.faces), one, two, np.linalg.norm(middles[one] - middles[two], axis=1))
+    root = int(np.argmax(tie_key(mesh.vertices)[mesh.faces].sum(axis=1)))
+    _, before, _ = dual.shortest_paths(np.array([root]))
+    reached = np.flatnonzero(before >= 0)
+    in_tree = np.zeros(len(inside), dtype=bool)
+    in_tree[dual.edges_between(reached, before[reached])] = True
+
+    node_of = _contract_loops(mesh, holes)
+    left = np.flatnonzero(~in_tree)
+    ends = node_of[mesh.edges[inside[left]]]
+    primal = MultiGraph(len(node_of), ends[:, 0], ends[:, 1], np.ones(len(left)))
+    closes = np.ones(len(left), dtype=bool)
+    closes[primal.minimum_spanning_tree()] = False
+    return [_loop(dual, across, before, edge) for edge in left[closes]]
+
+
+def _contract_loops(mesh: TriangleMesh, together: bool) -> IntArray:
+    """Return (n,) a node for each vertex, the same for all of a boundary loop, or of the boundary: its first."""
+    count, loop = mesh.boundary_loops
+    if together:
+        loop = np.minimum(loop, 0)
+    node_of = np.arange(len(mesh.vertices))
+    on_loop = np.flatnonzero(loop >= 0)
+    representative = np.full(count, len(mesh.vertices))
+    np.minimum.at(representative, loop[on_loop], on_loop)
+    node_of[on_loop] = representative[loop[on_loop]]
+    return node_of
+
+
+def _loop(dual: MultiGraph, across: IntArray, before: IntArray, edge: int) -> IntArray:
+    """Return the half-edges that the loop over an edge and back through the tree crosses."""
+    start, end = across[edge] // 3
+    there, back = _way(start, before), _way(end, before)
+    # What both ways to the root share is not walked to and fro.
+    while len(there) > 1 and len(back) > 1 and there[-2] == back[-2]:
+        there.pop(), back.pop()
+    out, home = np.array(there[::-1]), np.array(back)
+    edges = dual.edges_between(out[:-1], out[1:]), np.array([edge]), dual.edges_between(home[:-1], home[1:])
+    pairs = across[np.concatenate(edges)]
+    faces = np.concatenate([out, home[:-1]])
+    return np.where(pairs[:, 0] // 3 == faces, pairs[:, 0], pairs[:, 1])
+
+
+def _way(face: int, before: IntArray) -> list[int]:
+    """Return the faces from one to the root of the tree."""
+    way = [int(face)]
+    while before[way[-1]] >= 0:
+        way.append(int(before[way[-1]]))
+    return way
+
+
+def corner_signs(loop: IntArray, twin: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return the corners (k,) that a loop turns about, one in each triangle, and +1 where it does so to the left.
+
+    The turning of a loop is the sum of the angles there, with these signs.
+
+    Args:
+        loop: (k,) half-edges crossed.
+        twin: (3m,) the half-edge on the other side.
+    """
+    entry, leave = twin[np.roll(loop, 1)] % 3, loop % 3
+    return loop - leave + (3 - entry - leave), np.where(entry == (leave + 1) % 3, 1.0, -1.0)
+
+
+FULL_TURN = 2 * np.pi
+
+
+def off_multiple(angles: FloatArray, quantum: float) -> FloatArray:
+    """Return what angles are above the nearest multiple of a quantum, radians."""
+    return angles - quantum * np.round(angles / quantum)
+
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """The turning of loops across the handles of a connected mesh.
+
+    Attributes:
+        mesh: the mesh.
+        loops: the half-edges that each of the 2 genus loops crosses.
+        signs: (2 genus, 3m) of the corner angles in the sum.
+    """
+
+    mesh: TriangleMesh
+    loops: list[IntArray]
+    signs: csr_matrix
+
+    def of_flat(self, flat: FlatTriangles) -> FloatArray:
+        """Return (2 genus,) the turning in a flat metric, up to full turns."""
+        return np.array([np.angle(np.prod(flat.turns[loop])) for loop in self.loops])
+
+    def by_log_lengths(self, lengths: FloatArray) -> csr_matrix:
+        """Return (2 genus, e) the derivative by the logs of edge lengths; lengths are (m, 3)."""
+        return csr_matrix(self.signs @ _angles_by_log_lengths(self.mesh, lengths))
+
+    def by_log_scale(self, lengths: FloatArray) -> FloatArray:
+        """Return (2 genus, n) the derivative by the log scale at the vertices."""
+        return np.asarray((self.by_log_lengths(lengths) @ edge_means(self.mesh)).todense())
+
+
+def open_turning(mesh: TriangleMesh) -> Turning:
+    """Return the turning of the loops across a mesh's handles."""
+    loops = handle_loops(mesh)
+    twin = halfedge_twins(mesh)
+    parts = [corner_signs(loop, twin) for loop in loops]
+    rows = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
+    columns = np.concatenate([part[0] for part in parts] or [np.empty(0, dtype=np.int64)])
+    values = np.concatenate([part[1] for part in parts] or [np.empty(0)])
+    return Turning(mesh, loops, csr_matrix((values, (rows, columns)), shape=(len(loops), len(twin))))
+
+
+def edge_means(mesh: TriangleMesh) -> csr_matrix:
+    """Return (e, n) the means of values at the ends of edges, which scaling by them adds to the logs of lengths."""
+    count = len(mesh.edges)
+    rows = np.repeat(np.arange(count), 2)
+    return csr_matrix(
+        (np.full(2 * count, 0.5), (rows, mesh.edges.ravel())), shape=(count, len(mesh.vertices))
+    )
+
+
+def curvature_by_log_lengths(mesh: TriangleMesh, lengths: FloatArray) -> csr_matrix:
+    """Return (n, e) the derivative of the angle defects by the logs of edge lengths."""
+    corners = np.arange(3 * len(mesh.faces))
+    at = csr_matrix(
+        (np.full(len(corners), -1.0), (mesh.faces.ravel(), corners)), (len(mesh.vertices), len(corners))
+    )
+    return csr_matrix(at @ _angles_by_log_lengths(mesh, lengths))
+
+
+def _angles_by_log_lengths(mesh: TriangleMesh, lengths: FloatArray) -> csc_matrix:
+    """Return (3m, e) the derivative of corner angles: cot b + cot c by the opposite side, minus a cotangent else."""
+    cots = cotangents(lengths)
+    edges = mesh.halfedge_edges.reshape(-1, 3)
+    corners = np.arange(3 * len(mesh.faces)).reshape(-1, 3)
+    rows, columns, values = [], [], []
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        rows += [corners[:, i]] * 3
+        columns += [edges[:, i], edges[:, j], edges[:, k]]
+        values += [cots[:, j] + cots[:, k], -cots[:, k], -cots[:, j]]
+    shape = (3 * len(mesh.faces), len(mesh.edges))
+    return csc_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)

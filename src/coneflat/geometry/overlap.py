@@ -1,0 +1,205 @@
+"""Where a layout covers the plane more than once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import FloatArray, IntArray
+from ..errors import ArrayShapeError, OptionError
+from ..input.validation import as_faces, require_finite
+from .coverage import covered_twice
+
+# Of the largest coordinate: what is smaller counts as 0, lest products underflow.
+TINY = 2.0**-420
+
+
+@dataclass(frozen=True, eq=False)
+class Overlaps:
+    """Where the triangles of a layout overlap.
+
+    Attributes:
+        pairs: (k, 2) all pairs of triangles whose interiors have a point in common, each with the smaller index
+            first, in lexicographic order.
+        area: of the points of the plane inside at least two triangles, in squared units of the layout.
+        fraction: the same over the area of the points inside at least one. Both are NaN where they would take too
+            long, as of thousands of long triangles in all directions.
+        complete: False if there are more pairs than asked for; then `area` and `fraction` are NaN.
+    """
+
+    pairs: IntArray
+    area: float
+    fraction: float
+    complete: bool = True
+
+
+def find_overlaps(
+    points: ArrayLike, triangles: ArrayLike | None = None, *, limit: int | None = None
+) -> Overlaps:
+    """Return all pairs of triangles in the plane that overlap, without rounding.
+
+    Args:
+        points: (n, 2); or, without `triangles`, (m, 3, 2) the corners of each triangle.
+        triangles: (m, 3) indices of points. Clockwise triangles cover the plane like others; those whose
+            corners are on a line cover nothing.
+        limit: end with so many pairs, any of them; 1 asks only whether there is one.
+
+    Raises:
+        MeshError: an array has the wrong shape, an index no point, a point no finite place.
+        OptionError: the limit is below 1.
+
+    Notes:
+        Interiors are open: triangles that touch in points or along sides, in whole or in part, do not overlap,
+        and whatever has inner points in common does, however thin. No tolerance is involved, and all signs are
+        exact for the coordinates as they are given (those below 2^-420 of the largest count as 0). So two sides
+        of a seam that should coincide, but are an ulp apart the wrong way, do overlap; `area` then is what
+        rounding makes of it, about 1e-16 of the layout's extent times the length of the seam.
+
+        Candidates come from a binary tree of boxes, which takes n log n; large numbers of long triangles in many
+        directions, whose boxes all overlap, take more.
+    """
+    if limit is not None and limit < 1:
+        raise OptionError(f"the limit must be 1 or more, not {limit}")
+    corners = _corners(points, triangles)
+    corners, exponent = _at_unit_size(corners)
+    turned, signs = _counterclockwise(corners)
+    pairs, complete = _find_pairs(turned, np.flatnonzero(signs), limit)
+    if not complete:
+        return Overlaps(pairs, float("nan"), float("nan"), False)
+    twice, once = covered_twice(turned, pairs)
+    return Overlaps(pairs, float(np.ldexp(twice, 2 * exponent)), 0.0 if once <= 0 else twice / once)
+
+
+def _corners(points: ArrayLike, triangles: ArrayLike | None) -> FloatArray:
+    """Return (m, 3, 2) the corners, if all is as it should be."""
+    try:
+        places = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ArrayShapeError(f"points must be an array of numbers: {error}") from error
+    shape = "(n, 2)" if triangles is not None else "(m, 3, 2)"
+    if places.shape[1:] != ((2,) if triangles is not None else (3, 2)):
+        raise ArrayShapeError(f"points must have the shape {shape}, not {places.shape}")
+    if triangles is not None:
+        faces = as_faces(triangles, len(places))
+        require_finite(places, faces)
+        return places[faces]
+    if not len(places) or not np.isfinite(places).all():
+        faces = as_faces(np.arange(3 * len(places)).reshape(-1, 3), 3 * len(places))
+        require_finite(places.reshape(-1, 2), faces)
+    return places
+
+
+def _at_unit_size(corners: FloatArray) -> tuple[FloatArray, int]:
+    """Return the corners divided by a power of two, which rounds nothing, and its exponent."""
+    exponent = int(np.frexp(max(corners.max(), -corners.min()))[1])
+    # By a product, which takes a fifth of the time, unless the factor is not finite.
+    scaled = corners * 2.0**-exponent if exponent > -1000 else np.ldexp(corners, -exponent)
+    scaled[np.abs(scaled) < TINY] = 0.0
+    return scaled, exponent
+
+
+def _counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return the triangles, turned over where they are clockwise, and their orientations 1, -1 and 0."""
+    from .predicates import fill_orientations
+
+    signs = np.empty(len(corners), dtype=np.int64)
+    fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
+    turned = corners.copy()
+    turned[signs < 0] = corners[signs < 0][:, ::-1]
+    return turned, signs
+
+
+def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tuple[IntArray, bool]:
+    """Return the pairs of the chosen triangles that overlap, and whether these are all.
+
+    corners: (m, 3, 2), those chosen counterclockwise.
+    """
+    from .predicates import join
+
+    if len(chosen) < 2:
+        return np.empty((0, 2), dtype=np.int64), True
+    boxes = snug_boxes(corners[chosen])
+    order = z_order(boxes)
+    tree, chosen = box_tree(boxes[order]), chosen[order]
+    arrays = tree, corners[chosen].reshape(-1, 6), np.empty(12)
+    stack, top = np.zeros((4 * len(tree).bit_length(), 2), dtype=np.int64), 1
+    keys, room, left = [], len(chosen), np.inf if limit is None else limit + 1
+    while top > 0 and left > 0:
+        found = np.empty((int(min(left, room)), 2), dtype=np.int64)
+        top, count = join(*arrays, stack, top, found)
+        pairs = chosen[found[:count]]
+        keys.append(pairs.min(axis=1) * len(corners) + pairs.max(axis=1))
+        left -= count
+        room *= 2
+    key = np.sort(np.concatenate(keys)[:limit])
+    return np.stack(np.divmod(key, len(corners)), axis=1), left > 0
+
+
+# By how much coordinates of up to 1 may be off once they are turned.
+ROUNDED = 2.0**-48
+# Boxes are turned if that leaves less than this part of their areas.
+SNUG = 0.5
+
+
+def bounding_boxes(corners: FloatArray) -> FloatArray:
+    """Return (m, 4) x0, y0, -x1, -y1 of triangles (m, 3, 2): the box around several is their minimum."""
+    one, two, three = corners[:, 0], corners[:, 1], corners[:, 2]
+    low = np.minimum(np.minimum(one, two), three)
+    high = np.maximum(np.maximum(one, two), three)
+    return np.concatenate([low, -high], axis=1)
+
+
+def snug_boxes(corners: FloatArray) -> FloatArray:
+    """Return (m, 4) bounding boxes as above, along the axes or along the sides of long triangles askew to them.
+
+    Boxes of the latter kind are larger by what rounding may have taken. corners: (m, 3, 2), none of them above 1.
+    """
+    straight = bounding_boxes(corners)
+    places = corners @ np.array([1, 1j])
+    sides = places[:, [1, 2, 0]] - places
+    turned = places * np.exp(-0.5j * np.angle((sides**2).sum()))
+    askew = bounding_boxes(np.stack([turned.real, turned.imag], axis=2)) - ROUNDED
+    return askew if _areas(askew).sum() < SNUG * _areas(straight).sum() else straight
+
+
+def _areas(boxes: FloatArray) -> FloatArray:
+    areas: FloatArray = (boxes[:, 0] + boxes[:, 2]) * (boxes[:, 1] + boxes[:, 3])
+    return areas
+
+
+def z_order(boxes: FloatArray) -> IntArray:
+    """Return the order of boxes along a Z-shaped curve through their centres (Morton 1966), so near ones are close.
+
+    The cells of the curve are 2^-32 of the extent wide, so charts whose scale varies by e^8 and more are resolved.
+    """
+    centres = boxes[:, :2] - boxes[:, 2:]
+    centres -= centres.min(axis=0)
+    extent = centres.max()
+    cells = (centres * ((2**32 - 1) / extent if extent > 0 else 0.0)).astype(np.uint64)
+    order: IntArray = np.argsort(_spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint64(1), kind="stable")
+    return order
+
+
+def _spread(cells: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Put a zero bit before each of 32 bits."""
+    for shift in (16, 8, 4, 2, 1):
+        kept = np.uint64((2**64 - 1) // (2**shift + 1))  # runs of `shift` ones and as many zeros
+        cells = (cells | cells << np.uint64(shift)) & kept
+    return cells
+
+
+def box_tree(boxes: FloatArray) -> FloatArray:
+    """Return (2 k - 1, 4) the boxes, last, and those around them: node i has 2 i + 1 and 2 i + 2 below it.
+
+    k is a power of two, and at least 2; the boxes that are missing are empty.
+    """
+    leaves = 2 ** max(1, (len(boxes) - 1).bit_length())
+    tree = np.full((2 * leaves - 1, 4), np.inf)
+    tree[leaves - 1 : leaves - 1 + len(boxes)] = boxes
+    while leaves > 1:
+        below = tree[leaves - 1 : 2 * leaves - 1]
+        leaves //= 2
+        np.minimum(below[::2], below[1::2], out=tree[leaves - 1 : 2 * leaves - 1])
+    return tree

@@ -1,0 +1,145 @@
+"""The shapes of the input's own triangles in a flat metric that lives on flipped edges."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ..compiled import compiled
+from .intrinsic import IntrinsicTriangulation
+
+
+@dataclass(frozen=True, eq=False)
+class FlatTriangles:
+    """Triangles in the plane, each in a frame of its own.
+
+    Attributes:
+        sides: (3m,) each half-edge as a vector in the frame of its triangle, a complex number.
+        turns: (3m,) unit numbers: a vector in the frame of a half-edge's twin, times this, is the vector in
+            the frame of its own triangle. 1 on the boundary.
+        twin: (3m,) the half-edge on the other side, -1 on the boundary.
+    """
+
+    sides: ComplexArray
+    turns: ComplexArray
+    twin: IntArray
+
+    @property
+    def is_inverted(self) -> BoolArray:
+        """(m,) True for triangles that are turned over or have no area."""
+        sides = self.sides.reshape(-1, 3)
+        inverted: BoolArray = (np.conj(sides[:, 0]) * sides[:, 1]).imag <= 0
+        return inverted
+
+
+def straight_triangles(
+    triangulation: IntrinsicTriangulation, flips: IntArray, face_count: int | None = None
+) -> FlatTriangles:
+    """Return the input's triangles with straight sides in a flat metric.
+
+    An edge of the input is a geodesic of the input's metric; in the flat metric the straight segment in its
+    place is found by undoing the flips, the last one first, each by unfolding two triangles into the plane.
+    Where a quad is not convex this turns a triangle over: the signs of the areas tell.
+
+    Args:
+        triangulation: flat triangles with their lengths; left as it is.
+        flips: half-edges flipped between the input's triangles and these, in order.
+        face_count: how many triangles, the first ones, are the input's; None: all. The others are the mirror
+            image of a doubled surface, and edges towards them are the boundary.
+    """
+
+    twin, tail = triangulation.twin.copy(), triangulation.tail.copy()
+    sides = np.empty(len(twin), dtype=np.complex128)
+    turns = np.empty(len(twin), dtype=np.complex128)
+    place_triangles(triangulation.length, sides)
+    find_turns(twin, sides, turns)
+    undo_flips(twin, tail, sides, turns, np.asarray(flips, dtype=np.int64))
+    if face_count is not None and 3 * face_count < len(twin):
+        count = 3 * face_count
+        twin, sides, turns = twin[:count].copy(), sides[:count].copy(), turns[:count].copy()
+        outside = twin >= count
+        twin[outside] = -1
+        turns[outside] = 1.0
+    return FlatTriangles(sides, turns, twin)
+
+
+@compiled
+def place_triangles(length: FloatArray, sides: ComplexArray) -> None:
+    """Fill the three sides of each triangle as vectors in a frame of its own, its longest side along x."""
+    for base in range(0, len(length), 3):
+        i = 0
+        for k in range(1, 3):
+            if length[base + k] > length[base + i]:
+                i = k
+        h, h1, h2 = base + i, base + (i + 1) % 3, base + (i + 2) % 3
+        a, b, c = length[h], length[h1], length[h2]
+        slack_a = max(min(b, c) - (a - max(b, c)), 0.0)
+        slack_b = min(c, a) - (b - max(c, a))
+        slack_c = min(a, b) - (c - max(a, b))
+        perimeter = a + b + c
+        height = math.sqrt(perimeter * slack_a * slack_b * slack_c) / (2 * a)
+        # b and c times the cosines at the longest side, through the slacks: short sides keep their digits.
+        sides[h] = complex(a, 0.0)
+        sides[h1] = complex(-(perimeter * slack_c - slack_a * slack_b) / (4 * a), height)
+        sides[h2] = complex(-(perimeter * slack_b - slack_a * slack_c) / (4 * a), -height)
+
+
+@compiled
+def find_turns(twin: IntArray, sides: ComplexArray, turns: ComplexArray) -> None:
+    """Fill the unit number that takes the frame of the twin's triangle to that of each half-edge's own."""
+    for h in range(len(twin)):
+        t = twin[h]
+        if t > h:
+            turn = -sides[h] * sides[t].conjugate()
+            turns[h] = turn / abs(turn)
+            turns[t] = turns[h].conjugate()
+        elif t < 0:
+            turns[h] = 1.0
+
+
+@compiled
+def undo_flips(
+    twin: IntArray, tail: IntArray, sides: ComplexArray, turns: ComplexArray, flips: IntArray
+) -> None:
+    """Undo flips, the last one first, each by unfolding its two triangles into the plane.
+
+    The frames of triangles are carried along: vectors are added and turned, never divided by a side, which
+    may have length zero on the way.
+    """
+    for k in range(len(flips) - 1, -1, -1):
+        h = flips[k]
+        t = twin[h]
+        h1 = h - h % 3 + (h + 1) % 3
+        h2 = h - h % 3 + (h + 2) % 3
+        t1 = t - t % 3 + (t + 1) % 3
+        t2 = t - t % 3 + (t + 2) % 3
+        turn = turns[h]
+        # The edge turns clockwise: sides move h1 to h2, h2 to t1, t1 to t2, t2 to h1; of these the second
+        # changes from the frame of h to that of t, the fourth from t to h.
+        old = (h1, h2, t1, t2)
+        new = (h2, t1, t2, h1)
+        into = (1.0 + 0.0j, turn.conjugate(), 1.0 + 0.0j, turn)
+        moved = (sides[h1], sides[h2] * into[1], sides[t1], sides[t2] * into[3])
+        twins = (twin[h1], twin[h2], twin[t1], twin[t2])
+        outer = (turns[h1], turns[h2], turns[t1], turns[t2])
+        p, u, q, v = tail[h1], tail[h2], tail[t1], tail[t2]
+        for i in range(4):
+            other, total = twins[i], into[i] * outer[i]
+            for j in range(4):
+                if twins[i] == old[j]:
+                    other = new[j]
+                    total *= into[j].conjugate()
+            total /= abs(total)
+            sides[new[i]] = moved[i]
+            twin[new[i]] = other
+            turns[new[i]] = total
+            if other >= 0:
+                twin[other] = new[i]
+                turns[other] = total.conjugate()
+        sides[h] = -(sides[h1] + sides[h2])
+        sides[t] = -sides[h] * turn.conjugate()
+        tail[h], tail[h1], tail[h2] = u, v, p
+        tail[t], tail[t1], tail[t2] = v, u, q

@@ -1,0 +1,136 @@
+"""From whatever the user has to connected meshes that can be worked on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..geometry import edge_lengths, mollify
+from ..geometry.visibility import visible_share
+from ..mesh import TriangleMesh
+from ..options import Options
+from ..seams import CutMesh, edge_costs, open_along
+from ..text import list_some, plural
+from .arrays import InputMesh, as_input
+from .constraints import Wishes, locate_wishes
+from .marked_edges import effective_marks, marked_edges, named_edges
+from .numbering import at_unit_size, turn_corners
+from .validation import CheckedMesh, check_mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """A connected mesh with what the user says of it.
+
+    Attributes:
+        mesh: the mesh.
+        vertices, faces: (n,), (m,) those of the whole mesh; a vertex of a marked seam may be there several times.
+        lengths: (m, 3) side lengths, with which every triangle has area.
+        is_avoided: (m, 3) sides inside a polygon of the input, which should not be cut.
+        is_forbidden: (m, 3) sides that must not be cut.
+        visibility: (n,) what can be seen of each vertex, if that matters.
+        wishes: what the user says of its vertices.
+    """
+
+    mesh: TriangleMesh
+    vertices: IntArray
+    faces: IntArray
+    lengths: FloatArray
+    is_avoided: BoolArray
+    is_forbidden: BoolArray
+    visibility: FloatArray | None
+    wishes: Wishes
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A checked mesh.
+
+    Attributes:
+        given: the input.
+        checked: the mesh, at a size of about one.
+        notes: what was done to triangles without area, and which marks cut nothing.
+        components: its connected parts, apart also where seams are marked.
+        seams: (k, 2) vertices of the edges marked as seams.
+    """
+
+    given: InputMesh
+    checked: CheckedMesh
+    notes: tuple[str, ...]
+    components: tuple[Component, ...]
+    seams: IntArray
+
+
+def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
+    """Check a mesh, and what the options say of its vertices; see `coneflat.flatten` for the arguments.
+
+    Raises:
+        MeshError: the mesh cannot be flattened.
+        OptionError: an option does not fit it.
+    """
+    given = as_input(mesh, faces)
+    checked = at_unit_size(check_mesh(given.vertices, given.faces, repair=options.repair))
+    lengths, note = mollify(
+        edge_lengths(checked.mesh.vertices, checked.mesh.faces),
+        strict=options.strict,
+        names=checked.face_origin,
+    )
+    is_diagonal = turn_corners(checked, ~given.is_side())
+    wishes = locate_wishes(checked, options, given)
+    notes = [] if note is None else [note]
+    forbidden = np.zeros(len(checked.mesh.edges), dtype=bool)
+    if options.forbidden_seams is not None:
+        forbidden[named_edges(checked, np.asarray(options.forbidden_seams))] = True
+    marked = np.empty(0, dtype=np.int64)
+    opened = CutMesh(checked.mesh, np.arange(len(checked.mesh.vertices)))
+    if options.marks_seams:
+        marked, alone = effective_marks(checked.mesh, marked_edges(checked, options, given, forbidden))
+        if len(alone):
+            notes.append(_nothing_cut(wishes.names[checked.mesh.edges[alone]]))
+        wishes.keep_off(checked.mesh.edges[marked])
+        wishes = wishes.with_marks(checked.mesh.edges[marked])
+        opened = open_along(checked.mesh, marked)
+    seen = None
+    if options.hide_seams:
+        up = None if options.up is None else np.array(options.up)
+        seen = visible_share(checked.mesh.vertices, checked.mesh.faces, up)
+
+    def components() -> Iterator[Component]:
+        for part, vertices, part_faces in opened.mesh.split_components():
+            origin = opened.origin[vertices]
+            yield Component(
+                part,
+                origin,
+                part_faces,
+                lengths[part_faces],
+                is_diagonal[part_faces],
+                forbidden[checked.mesh.halfedge_edges].reshape(-1, 3)[part_faces],
+                None if seen is None else seen[origin],
+                wishes.within(origin),
+            )
+
+    return Prepared(given, checked, tuple(notes), tuple(components()), checked.mesh.edges[marked])
+
+
+def _nothing_cut(pairs: IntArray) -> str:
+    names = list_some([f"{a}-{b}" for a, b in pairs[:5].tolist()], len(pairs))
+    return f"Not cut: {plural(len(pairs), 'edge')} ({names}) that no other one meets, so both sides have the same ends."
+
+
+def seam_costs(part: Component, options: Options) -> tuple[FloatArray, BoolArray, BoolArray]:
+    """Return (e,) what each edge costs as part of a seam, whether it is to be avoided, and whether it is forbidden."""
+    sides = part.mesh.edge_halfedges[:, 0]
+    costs = edge_costs(
+        part.mesh,
+        part.lengths.ravel()[sides],
+        creases=options.creases,
+        hiding=options.hide_seams,
+        visibility=part.visibility,
+        vertex_weights=part.wishes.seam_weights,
+    )
+    return costs, part.is_avoided.ravel()[sides], part.is_forbidden.ravel()[sides]

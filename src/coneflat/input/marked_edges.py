@@ -1,0 +1,92 @@
+"""Edges that the user wants cut in any case."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import BoolArray, IntArray
+from ..errors import OptionError
+from ..geometry.normals import dihedral_angles
+from ..mesh import TriangleMesh, end_corners
+from ..options import Options
+from ..text import list_some, plural
+from .arrays import InputMesh
+from .numbering import turn_corners
+from .validation import CheckedMesh
+
+
+def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh, forbidden: BoolArray) -> BoolArray:
+    """Return (e,) True for inner edges that are to be seams: named, sharp, or seams of the input's own UVs.
+
+    forbidden: (e,) edges that are not to be cut, sharp or not.
+
+    Raises:
+        OptionError: a pair of vertices is no edge, or is forbidden; the input has no UVs.
+    """
+    mesh = checked.mesh
+    marked = np.zeros(len(mesh.edges), dtype=bool)
+    if isinstance(options.seams, str):
+        marked |= _seams_of_input(checked, given)
+    if options.sharp_angle is not None:
+        marked |= np.abs(dihedral_angles(mesh)) > options.sharp_angle
+    marked &= ~forbidden
+    if options.seams is not None and not isinstance(options.seams, str):
+        named = named_edges(checked, np.asarray(options.seams))
+        both = named[forbidden[named]]
+        if len(both):
+            pair = checked.vertex_origin[mesh.edges[both[0]]]
+            raise OptionError(
+                f"{plural(len(both), 'edge')} given as seams and as forbidden seams: the first is {pair[0]}-{pair[1]}"
+            )
+        marked[named] = True
+    return marked & ~mesh.is_boundary_edge
+
+
+def effective_marks(mesh: TriangleMesh, marked: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return the marked edges that cut something, and those that do not: alone, their ends are the same on both sides.
+
+    marked: (e,) inner edges.
+    """
+    at = np.bincount(mesh.edges[marked].ravel(), minlength=len(mesh.vertices))
+    falls_apart = (at > 1) | mesh.is_boundary_vertex
+    cuts = falls_apart[mesh.edges].any(axis=1)
+    return np.flatnonzero(marked & cuts), np.flatnonzero(marked & ~cuts)
+
+
+def named_edges(checked: CheckedMesh, pairs: IntArray) -> IntArray:
+    """Return the edges between pairs (k, 2) of the input's vertices.
+
+    Raises:
+        OptionError: a pair of vertices is no edge.
+    """
+    origin = checked.vertex_origin
+    bound = int(origin.max()) + 1
+    ends = np.sort(origin[checked.mesh.edges], axis=1)
+    keys = ends[:, 0] * bound + ends[:, 1]
+    low, high = pairs.min(axis=1), pairs.max(axis=1)
+    wanted = np.where((low >= 0) & (high < bound), low * bound + high, -1)
+    missing = np.flatnonzero(~np.isin(wanted, keys))
+    if len(missing):
+        names = [f"{a}-{b}" for a, b in pairs[missing[:5]].tolist()]
+        raise OptionError(
+            f"{plural(len(missing), 'seam')} of {len(pairs):,} between vertices that no edge connects: "
+            f"{list_some(names, len(missing))}"
+        )
+    return np.flatnonzero(np.isin(keys, wanted))
+
+
+def _seams_of_input(checked: CheckedMesh, given: InputMesh) -> BoolArray:
+    """Return (e,) True where the sides of an edge have different UVs in the input's file."""
+    texture = given.corner_texture()
+    if texture is None:
+        raise OptionError("the input has no UV coordinates whose seams could be kept")
+    mesh = checked.mesh
+    at = turn_corners(checked, texture)
+    inside = ~mesh.is_boundary_edge
+    one, two = mesh.edge_halfedges.T
+    flat = at.ravel()
+    marked = np.zeros(len(mesh.edges), dtype=bool)
+    tails, heads = (flat[ends] for ends in end_corners(one[inside]))
+    others, those = (flat[ends] for ends in end_corners(two[inside]))
+    marked[inside] = (tails != those) | (heads != others)
+    return marked

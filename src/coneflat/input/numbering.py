@@ -1,0 +1,53 @@
+"""Between the user's numbering of vertices and faces and that of the checked mesh."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from .._arrays import BoolArray, IntArray
+from ..errors import NonFiniteError
+from ..mesh import TriangleMesh
+from .validation import CheckedMesh
+
+
+def result_numbering(checked: CheckedMesh, input_count: int) -> tuple[IntArray, IntArray]:
+    """Number the checked mesh's vertices as the input does; those that a repair added come after them.
+
+    Returns:
+        (n,) the number of each vertex of the checked mesh, and (r,) the input vertex of each number.
+    """
+    origin = checked.vertex_origin
+    is_added = np.zeros(len(origin), dtype=bool)
+    is_added[1:] = origin[1:] == origin[:-1]
+    number = origin.copy()
+    number[is_added] = input_count + np.arange(int(is_added.sum()))
+    return number, np.concatenate([np.arange(input_count), origin[is_added]])
+
+
+# Size of a mesh of which texels per unit of length, and their like, are numbers.
+SMALLEST = 1e-300
+
+Values = TypeVar("Values", IntArray, BoolArray)
+
+
+def at_unit_size(checked: CheckedMesh) -> CheckedMesh:
+    """Return the mesh scaled by a power of two, which rounds nothing, so that squares of lengths are no extremes.
+
+    Raises:
+        NonFiniteError: it is so small that UV units per unit of length are beyond numbers.
+    """
+    size = float(np.abs(checked.mesh.vertices).max())
+    if size < SMALLEST:
+        raise NonFiniteError(f"positions of at most {size:.3g} are too small for numbers: scale the mesh")
+    exponent = -int(np.frexp(size)[1])
+    mesh = TriangleMesh(np.ldexp(checked.mesh.vertices, exponent), checked.mesh.faces)
+    return replace(checked, mesh=mesh, exponent=exponent)
+
+
+def turn_corners(checked: CheckedMesh, per_corner: Values) -> Values:
+    """Bring values at the input's triangle corners (m, 3) to the faces of the checked mesh."""
+    values = per_corner[checked.face_origin]
+    return np.where(checked.is_turned[:, None], values[:, [0, 2, 1]], values)

@@ -1,0 +1,265 @@
+"""Triangulating polygons."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..errors import DegenerateFaceError, FaceIndexError
+from ..files.raw import first_bad_corner
+from .polygons import polygon_of
+
+#: Part of a quad's area below which one of its halves counts as empty or turned over: far above the
+#: rounding of a collinear corner (about 1e-16), far below any triangle worth having.
+_EMPTY_HALF = 1e-9
+
+#: Relative difference below which the diagonals of a quad are equally long, as in every square; without it
+#: rounding would choose another one for each cell of a rotated grid.
+_EQUAL_DIAGONALS = 1e-9
+
+
+def triangulate(vertices: FloatArray, corners: IntArray, offsets: IntArray) -> tuple[IntArray, IntArray]:
+    """Return triangles that cover polygons, k - 2 for each polygon of k corners, oriented as it is.
+
+    A quad is split along the diagonal that leaves both halves facing the way the quad does; if both
+    diagonals do, along the shorter. Larger polygons become fans where they are convex and go through ear
+    clipping where they are not. Coordinates may be NaN: the result is valid in its indices then.
+
+    Args:
+        vertices: (n, 3) positions.
+        corners: (c,) vertex of every polygon corner, polygon after polygon.
+        offsets: (p + 1,) polygon i owns corners[offsets[i]:offsets[i + 1]].
+
+    Returns:
+        (m, 3) vertex indices, in the order of the polygons; a view of `corners` if all are triangles. (m, 3)
+        index into `corners` of the same.
+
+    Raises:
+        DegenerateFaceError: a polygon has fewer than 3 corners.
+        FaceIndexError: a corner names a vertex that does not exist.
+    """
+    corners = np.asarray(corners, dtype=np.int64)
+    offsets = np.asarray(offsets, dtype=np.int64)
+    sizes = np.diff(offsets)
+    _check(len(vertices), corners, offsets, sizes)
+
+    if len(corners) == 3 * len(sizes):
+        return corners.reshape(-1, 3), np.arange(len(corners)).reshape(-1, 3)
+    first_triangle = np.cumsum(sizes - 2) - (sizes - 2)
+    face_corners = np.empty((int((sizes - 2).sum()), 3), dtype=np.int64)
+
+    triangles = sizes == 3
+    face_corners[first_triangle[triangles]] = offsets[:-1][triangles, None] + np.arange(3)
+
+    quads = np.flatnonzero(sizes == 4)
+    if len(quads):
+        own = offsets[quads, None] + np.arange(4)
+        use_02 = _splits_at_first_corner(vertices, corners[own])[:, None, None]
+        local = np.where(use_02, [[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]])
+        rows = first_triangle[quads, None] + np.arange(2)
+        face_corners[rows] = offsets[quads, None, None] + local
+
+    for size in np.unique(sizes[sizes > 4]).tolist():
+        polygons = np.flatnonzero(sizes == size)
+        own = offsets[polygons, None] + np.arange(size)
+        local = triangulate_ngons(vertices[corners[own]])
+        rows = first_triangle[polygons, None] + np.arange(size - 2)
+        face_corners[rows] = offsets[polygons, None, None] + local
+    return corners[face_corners], face_corners
+
+
+def is_polygon_side(face_corners: IntArray, offsets: IntArray) -> BoolArray:
+    """Return (m, 3) whether the side from triangle corner k to k + 1 is a side of its polygon.
+
+    False for the diagonals that `triangulate` put in. Triangles may run either way around.
+
+    Args:
+        face_corners: (m, 3) polygon corner at each triangle corner.
+        offsets: (p + 1,) where the corners of each polygon begin.
+    """
+    sizes = np.diff(offsets)
+    if np.all(sizes == 3):
+        return np.ones(face_corners.shape, dtype=bool)
+    sizes = sizes[polygon_of(face_corners, offsets)][:, None]
+    steps = np.abs(face_corners - np.roll(face_corners, -1, axis=1))
+    return np.asarray((steps == 1) | (steps == sizes - 1))
+
+
+def _check(vertex_count: int, corners: IntArray, offsets: IntArray, sizes: IntArray) -> None:
+    if np.any(sizes < 3):
+        i = int(np.argmax(sizes < 3))
+        raise DegenerateFaceError(f"face {i} has {sizes[i]} corners, but a face needs at least 3")
+    c = first_bad_corner(corners, vertex_count)
+    if c is not None:
+        i = int(np.searchsorted(offsets, c, side="right")) - 1
+        raise FaceIndexError(f"face {i} names vertex {corners[c]}, but there are {vertex_count} vertices")
+
+
+def _splits_at_first_corner(vertices: FloatArray, quads: IntArray) -> BoolArray:
+    """Return (q,) whether to split quads from corner 0 to 2 rather than from 1 to 3.
+
+    The choice does not depend on which corner is named first.
+    """
+    p0, p1, p2, p3 = (vertices[quads[:, k]] for k in range(4))
+    with np.errstate(invalid="ignore", over="ignore"):
+        normal = np.cross(p2 - p0, p3 - p1)
+        least = _EMPTY_HALF * _dot(normal, normal)
+        valid_02 = (_dot(np.cross(p1 - p0, p2 - p0), normal) > least) & (
+            _dot(np.cross(p2 - p0, p3 - p0), normal) > least
+        )
+        valid_13 = (_dot(np.cross(p1 - p0, p3 - p0), normal) > least) & (
+            _dot(np.cross(p2 - p1, p3 - p1), normal) > least
+        )
+        length_02 = _dot(p2 - p0, p2 - p0)
+        length_13 = _dot(p3 - p1, p3 - p1)
+        choice = length_02 < length_13
+        tied = np.abs(length_02 - length_13) <= _EQUAL_DIAGONALS * (length_02 + length_13)
+    if tied.any():
+        # The corner that comes first by coordinates decides; on a grid all diagonals run one way then.
+        rank = np.empty(len(vertices), dtype=np.int64)
+        rank[np.lexsort(vertices.T[::-1])] = np.arange(len(vertices))
+        ranks = rank[quads[tied]]
+        choice[tied] = ranks[:, [0, 2]].min(axis=1) < ranks[:, [1, 3]].min(axis=1)
+    return np.where(valid_02 == valid_13, choice, valid_02)
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(np.einsum("ij,ij->i", a, b))
+
+
+#: Part of a polygon's area below which a triangle in it counts as empty: above the rounding of collinear
+#: corners, below any triangle worth having.
+_EMPTY_TRIANGLE = 1e-9
+
+#: Corners that a fan is tried from: all of any usual polygon, and so few that no polygon takes long.
+_APEXES = 256
+
+#: Diagonals of a polygon looked at before the shapes reached so far are taken: seconds.
+_MOST_TRIALS = 200_000
+
+
+def triangulate_ngons(points: FloatArray) -> IntArray:
+    """Return triangles of q polygons of the same number of corners k.
+
+    Args:
+        points: (q, k, 3) their corners; k > 3.
+
+    Returns:
+        (q, k - 2, 3) corner positions 0 to k - 1, in each triangle ascending, so that it is oriented as its
+        polygon is.
+    """
+    size = points.shape[1]
+    fan = np.stack([np.zeros(size - 2, np.int64), np.arange(1, size - 1), np.arange(2, size)], axis=1)
+    triangles = np.tile(fan, (len(points), 1, 1))
+    with np.errstate(invalid="ignore", over="ignore"):
+        normals = _newell_normals(points)
+        for i in np.flatnonzero(~_is_convex(points, normals)).tolist():
+            plane = _in_plane(points[i], normals[i])
+            if plane is not None:
+                triangles[i] = _concave(plane)
+    return triangles
+
+
+def _newell_normals(points: FloatArray) -> FloatArray:
+    """Return (q, 3) Newell's normals, of twice the area's length."""
+    local = points - points[:, :1]
+    return np.asarray(np.cross(local[:, 1:-1], local[:, 2:]).sum(axis=1))
+
+
+def _is_convex(points: FloatArray, normals: FloatArray) -> BoolArray:
+    """Return (q,) whether every corner turns left and the fan from corner 0 covers the polygon once."""
+    least = _EMPTY_TRIANGLE * np.einsum("ij,ij->i", normals, normals)
+    sides = np.roll(points, -1, axis=1) - points
+    turns = np.einsum("qki,qi->qk", np.cross(np.roll(sides, 1, axis=1), sides), normals)
+    local = points - points[:, :1]
+    fan = np.einsum("qki,qi->qk", np.cross(local[:, 1:-1], local[:, 2:]), normals)
+    return np.asarray(np.all(turns > least[:, None], axis=1) & np.all(fan > least[:, None], axis=1))
+
+
+def _in_plane(points: FloatArray, normal: FloatArray) -> FloatArray | None:
+    """Return (k, 2) the polygon seen against its normal, counterclockwise; None if it has no plane."""
+    length = np.linalg.norm(normal)
+    if not np.isfinite(points).all() or not np.isfinite(length) or length == 0:
+        return None
+    up = normal / length
+    across = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+    across /= np.linalg.norm(across)
+    local = points - points.mean(axis=0)
+    return np.stack([local @ across, local @ np.cross(up, across)], axis=1)
+
+
+def _concave(plane: FloatArray) -> IntArray:
+    """Return (k - 2, 3) triangles of a polygon in the plane that may be concave."""
+    from mapbox_earcut import triangulate_float64
+
+    size = len(plane)
+    fan, smallest = _best_fan(plane)
+    if smallest > 0:
+        return fan
+    ears = np.asarray(triangulate_float64(np.ascontiguousarray(plane), np.array([size], dtype=np.uint32)))
+    # Where a polygon touches or crosses itself, earcut may leave corners out, which neighbours still have.
+    if len(ears) == 3 * (size - 2) and len(np.unique(ears)) == size:
+        return _flipped(plane, np.sort(ears.reshape(-1, 3).astype(np.int64), axis=1))
+    return fan
+
+
+def _flipped(plane: FloatArray, triangles: IntArray) -> IntArray:
+    """Return triangles of better shape, by flipping diagonals while the worse of the two triangles gains.
+
+    Ear clipping is content with triangles between three corners on a line.
+    """
+    points = [complex(x, y) for x, y in plane.tolist()]
+    faces = [tuple(face) for face in triangles.tolist()]
+    # Of each directed side, the triangle and the corner opposite.
+    across = {(face[k], face[k - 2]): (t, face[k - 1]) for t, face in enumerate(faces) for k in range(3)}
+
+    def shape(*face: int) -> float:
+        a, b, c = (points[i] for i in face)
+        sides = abs(b - a) ** 2 + abs(c - b) ** 2 + abs(a - c) ** 2
+        return ((b - a).conjugate() * (c - a)).imag / sides if sides else 0.0
+
+    # Every flip raises the sorted list of shapes, so this ends; most diagonals are flipped once, if at all.
+    waiting = deque((a, b) for a, b in across if a < b and (b, a) in across)
+    for _ in range(_MOST_TRIALS):
+        if not waiting:
+            break
+        a, b = waiting.popleft()
+        if (a, b) not in across or (b, a) not in across:
+            continue
+        (t, c), (s, d) = across[a, b], across[b, a]
+        gain = min(shape(d, b, c), shape(a, d, c)) - min(shape(a, b, c), shape(b, a, d))
+        if gain > _EMPTY_TRIANGLE:
+            del across[a, b], across[b, a]
+            for number, face in ((t, (d, b, c)), (s, (a, d, c))):
+                faces[number] = face
+                across |= {(face[k], face[k - 2]): (number, face[k - 1]) for k in range(3)}
+            waiting += [
+                (min(side), max(side)) for side in ((a, d), (d, b), (b, c), (c, a)) if side[::-1] in across
+            ]
+    return np.sort(np.array(faces, dtype=np.int64), axis=1)
+
+
+def _best_fan(plane: FloatArray) -> tuple[IntArray, float]:
+    """Return the fan whose smallest triangle is largest, and that triangle's part of the polygon's area.
+
+    Of very large polygons, some of the corners are tried.
+
+    The part is 0 where triangles are empty or turned over, or the fan is not one turn around its centre.
+    """
+    size = len(plane)
+    best = (-np.inf, 0)
+    for apex in range(0, size, -(-size // _APEXES)):
+        local = np.roll(plane, -apex, axis=0)[1:] - plane[apex]
+        areas = local[:-1, 0] * local[1:, 1] - local[:-1, 1] * local[1:, 0]
+        best = max(best, (float(areas.min()), -apex))
+    apex = -best[1]
+    rim = np.roll(np.arange(size), -apex)
+    local = plane[rim[1:]] - plane[apex]
+    areas = local[:-1, 0] * local[1:, 1] - local[:-1, 1] * local[1:, 0]
+    angles = np.arctan2(areas, np.einsum("ij,ij->i", local[:-1], local[1:]))
+    fan = np.stack([np.full(size - 2, apex), rim[1:-1], rim[2:]], axis=1)
+    total = areas.sum()
+    sound = areas.min() > _EMPTY_TRIANGLE * total and angles.sum() < 2 * np.pi
+    return np.sort(fan, axis=1), float(areas.min() / total) if sound else 0.0

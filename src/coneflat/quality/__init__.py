@@ -1,0 +1,1 @@
+"""Measures of a parameterization, and of how it was found."""

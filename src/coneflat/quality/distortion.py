@@ -1,0 +1,285 @@
+"""Measures of a parameterization, from the mesh and its UVs alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from .._arrays import FloatArray, IntArray, dots
+from ..errors import ArrayShapeError
+from ..geometry.overlap import Overlaps, find_overlaps
+from ..mesh import TriangleMesh, end_corners, label_components
+from ..threads import meanwhile
+
+ZERO_AREA = 1e-12  # twice the area over the longest side squared: no digit of the shape is left below
+JOINED = 1e-6  # UV distance over UV edge length at which two sides of an edge count as one
+
+
+@dataclass(frozen=True, eq=False)
+class Distortion:
+    """Quality of a flattening.
+
+    Quasi-conformal distortion (QC) is the ratio of the singular values of a triangle's map, 1 where it is
+    conformal (Kharevych et al. 2006); means and quantiles are weighted by the area on the model.
+
+    Attributes:
+        qc: (m,) per triangle; NaN where the triangle is degenerate on the model or in the plane.
+        log_area_scale: (m,) log of sqrt(UV area / area on the model); NaN likewise.
+        qc_mean, qc_p95, qc_max: of `qc`.
+        area_std: standard deviation of `log_area_scale`.
+        flipped: triangles that run against the orientation of their chart.
+        degenerate: triangles without area in the plane that have some on the model.
+        degenerate_input: triangles without area on the model.
+        charts: pieces of the layout.
+        mirrored_charts: charts whose orientation is reversed.
+        seam_length: length on the model of all seams, each once, over the square root of the area.
+        seam_mismatch: relative difference of a seam edge's two UV lengths: mean, weighted by length.
+        seam_mismatch_max: the same, the largest.
+        seam_motion_mismatch: how far the two sides of a seam are from one rigid motion of each other: the largest
+            change of the rotation between them from one seam edge to the next, radians; where seams branch
+            or end, and at cones, there is none to compare.
+        density_spread: of texels per length on the model, the quantile at 95% over that at 5%.
+        overlap: part of the area that the layout covers that it covers more than once.
+        overlapping_pairs: pairs of triangles with inner points in common, without rounding.
+        angle_sum_error: largest difference, radians, between the sum of the angles around a vertex in the plane and
+            what it is to be: 2 pi (pi on the boundary) less the curvature prescribed; NaN if none is known.
+        curvature_error: ||target - K||_2 / n of the metric, in units of pi (Table 1 of the paper).
+        curvature_error_max: largest |target - K|, in units of pi.
+    """
+
+    qc: FloatArray
+    log_area_scale: FloatArray
+    qc_mean: float
+    qc_p95: float
+    qc_max: float
+    area_std: float
+    flipped: int
+    degenerate: int
+    degenerate_input: int
+    charts: int
+    mirrored_charts: int
+    seam_length: float
+    seam_mismatch: float
+    seam_mismatch_max: float
+    seam_motion_mismatch: float
+    density_spread: float
+    overlap: float
+    overlapping_pairs: int
+    angle_sum_error: float = float("nan")
+    curvature_error: float = float("nan")
+    curvature_error_max: float = float("nan")
+
+    def rescaled(self, log_factor: float) -> Distortion:
+        """Return the measures of the same layout at another scale, given by the log of that over the one measured."""
+        return replace(self, log_area_scale=self.log_area_scale + log_factor)
+
+
+def curvature_errors(residual: FloatArray) -> tuple[float, float]:
+    """Return ||target - K||_2 / n as in Table 1 of the paper, and the largest |target - K|, both over pi.
+
+    residual: (n,) target - K, radians.
+    """
+    return (
+        float(np.linalg.norm(residual) / len(residual) / np.pi),
+        float(np.abs(residual).max() / np.pi),
+    )
+
+
+def measure(
+    mesh: TriangleMesh,
+    corner_uv: FloatArray,
+    curvature_error: tuple[float, float] = (np.nan, np.nan),
+    cones: IntArray | None = None,
+    prescribed: FloatArray | None = None,
+    overlaps: Overlaps | None = None,
+) -> Distortion:
+    """Measure a UV map.
+
+    Args:
+        mesh: the mesh.
+        corner_uv: (m, 3, 2) the UV point of every triangle corner.
+        cones: (s,) vertices at which the rotation between the sides of a seam changes.
+        curvature_error: what `curvature_errors` returns for the metric.
+        prescribed: (n,) curvature that vertices are to have in the plane, radians; NaN where it is free.
+        overlaps: what `find_overlaps` returns, if that is known.
+
+    Raises:
+        ArrayShapeError, NonFiniteError: the arrays do not fit the mesh, or UVs are not finite.
+    """
+    _check_shapes(mesh, corner_uv, prescribed)
+    find = partial(find_overlaps, corner_uv) if overlaps is None else lambda: overlaps
+    with meanwhile(find, len(corner_uv)) as finding:
+        measured = measure_map(mesh, corner_uv, curvature_error, cones)
+        if prescribed is not None:
+            error = angle_sum_errors(mesh, corner_uv, prescribed)[0]
+            measured = replace(measured, angle_sum_error=float(np.nanmax(np.abs(error), initial=0.0)))
+        found = finding.result()
+    return replace(measured, overlap=found.fraction, overlapping_pairs=len(found.pairs))
+
+
+def _check_shapes(mesh: TriangleMesh, corner_uv: FloatArray, prescribed: FloatArray | None) -> None:
+    """Refuse arrays that compiled loops would read beyond their ends."""
+    for name, found, wanted in (
+        ("corner_uv", np.shape(corner_uv), (*np.shape(mesh.faces), 2)),
+        (
+            "prescribed",
+            (len(mesh.vertices),) if prescribed is None else np.shape(prescribed),
+            (len(mesh.vertices),),
+        ),
+    ):
+        if found != wanted:
+            raise ArrayShapeError(f"{name} must have the shape {wanted}, as the mesh has it, not {found}")
+
+
+def angle_sum_errors(
+    mesh: TriangleMesh, corner_uv: FloatArray, prescribed: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return (n,) by what the angles around each vertex sum to too much, radians; and what a rounded point makes of it.
+
+    Args:
+        mesh: the mesh.
+        corner_uv: (m, 3, 2) the UV point of every triangle corner.
+        prescribed: (n,) curvature of vertices in the plane, NaN where it is free; so is the error then.
+    """
+    from .distortion_kernel import sum_angles
+
+    uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
+    sums, change = sum_angles(mesh.faces, uv, len(mesh.vertices))
+    full = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
+    return sums - full + prescribed, change
+
+
+def measure_map(
+    mesh: TriangleMesh,
+    corner_uv: FloatArray,
+    curvature_error: tuple[float, float] = (np.nan, np.nan),
+    cones: IntArray | None = None,
+) -> Distortion:
+    """Return all measures but those of overlaps; arguments are those of `measure`."""
+    from .distortion_kernel import measure_triangles
+
+    corner_uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
+    area, has_area, uv_area, has_uv_area, qc = measure_triangles(
+        mesh.vertices, mesh.faces, corner_uv, ZERO_AREA
+    )
+    valid = has_area & has_uv_area
+    log_scale = np.full(len(area), np.nan)
+    log_scale[valid] = np.log(np.abs(uv_area[valid]) / area[valid]) / 2
+    weights = area[valid]
+    mean_scale = _mean(log_scale[valid], weights)
+
+    seams, charts, chart = _seams_and_charts(mesh, corner_uv)
+    way = np.where(has_uv_area, np.sign(uv_area), 0)
+    majority = np.sign(np.bincount(chart, weights=np.abs(uv_area) * way, minlength=charts))
+    against = way * majority[chart] < 0
+    seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
+    return Distortion(
+        qc=qc,
+        log_area_scale=log_scale,
+        qc_mean=_mean(qc[valid], weights),
+        qc_p95=quantile(qc[valid], weights, 0.95),
+        qc_max=float(qc[valid].max()) if len(weights) else float("nan"),
+        area_std=float(np.sqrt(_mean((log_scale[valid] - mean_scale) ** 2, weights))),
+        flipped=int(against.sum()),
+        degenerate=int((has_area & ~has_uv_area).sum()),
+        degenerate_input=int((~has_area).sum()),
+        charts=charts,
+        mirrored_charts=int((majority < 0).sum()),
+        seam_length=float(seam_lengths.sum() / np.sqrt(area.sum() / 2)) if area.sum() > 0 else 0.0,
+        seam_mismatch=_mean(mismatches, seam_lengths) if len(seams) else 0.0,
+        seam_mismatch_max=float(mismatches.max()) if len(seams) else 0.0,
+        seam_motion_mismatch=_seam_motion_mismatch(mesh, corner_uv, seams, cones),
+        density_spread=_spread(log_scale[valid], weights),
+        overlap=float("nan"),
+        overlapping_pairs=0,
+        curvature_error=curvature_error[0],
+        curvature_error_max=curvature_error[1],
+    )
+
+
+def _sides(mesh: TriangleMesh, corner_uv: FloatArray, edges: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return the UV ends (k, 2, 2) of interior edges as each of their two faces sees them, in one order."""
+    corners = corner_uv.reshape(-1, 2)
+    one, two = (end_corners(mesh.edge_halfedges[edges, side]) for side in (0, 1))
+    return corners[np.stack(one, axis=1)], corners[np.stack(two[::-1], axis=1)]
+
+
+def _side_lengths(ends: FloatArray) -> FloatArray:
+    side = ends[:, 1] - ends[:, 0]
+    return np.sqrt(dots(side, side))
+
+
+def seams_of(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
+    """Return the inner edges whose two sides have different UVs."""
+    return _seams_and_charts(mesh, np.ascontiguousarray(corner_uv, dtype=np.float64))[0]
+
+
+def _seams_and_charts(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[IntArray, int, IntArray]:
+    """Return the interior edges whose UVs differ, the number of charts, and the chart of each face."""
+    from .distortion_kernel import find_joined
+
+    joined = find_joined(mesh.edge_halfedges, corner_uv, JOINED)
+    faces = mesh.edge_faces[joined]
+    count, chart = label_components(len(mesh.faces), faces[:, 0], faces[:, 1])
+    return np.flatnonzero(~joined & ~mesh.is_boundary_edge), count, chart
+
+
+def _seam_mismatch(
+    mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the length on the model of each seam edge, and the relative difference of its UV lengths."""
+    here, there = (_side_lengths(ends) for ends in _sides(mesh, corner_uv, seams))
+    ends = mesh.vertices[mesh.edges[seams]]
+    return _side_lengths(ends), np.abs(here - there) / np.maximum((here + there) / 2, np.finfo(float).tiny)
+
+
+def _seam_motion_mismatch(
+    mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray, cones: IntArray | None
+) -> float:
+    """Return the largest change, radians, of the rotation between a seam's sides along it."""
+    here, there = _sides(mesh, corner_uv, seams)
+    one = (here[:, 1] - here[:, 0]) @ np.array([1, 1j])
+    two = (there[:, 1] - there[:, 0]) @ np.array([1, 1j])
+    # `here` is the side of the first half-edge, which may be either side of the seam: each edge tells the
+    # rotation as seen by a walker along it, from the left side to the right.
+    rotation = one * np.conj(two)
+    rotation = rotation / np.maximum(np.abs(rotation), np.finfo(float).tiny)
+    starts = mesh.tails[mesh.edge_halfedges[seams, 0]]
+    ends = mesh.heads[mesh.edge_halfedges[seams, 0]]
+    degree = np.bincount(np.concatenate([starts, ends]), minlength=len(mesh.vertices))
+    passed = (degree == 2) & ~mesh.is_boundary_vertex
+    if cones is not None:
+        passed[cones] = False
+    # The two seam edges at each vertex that a seam passes, and whether each of them leaves it.
+    at = np.concatenate([starts, ends])
+    leaves = np.repeat([True, False], len(seams))
+    edge = np.tile(np.arange(len(seams)), 2)
+    order = np.argsort(at, kind="stable")
+    order = order[passed[at[order]]].reshape(-1, 2)
+    if not len(order):
+        return 0.0
+    first, second = rotation[edge[order[:, 0]]], rotation[edge[order[:, 1]]]
+    # Edges that both leave, or both arrive, are walked in opposite directions, with left and right exchanged.
+    opposed = leaves[order[:, 0]] == leaves[order[:, 1]]
+    change = np.where(opposed, first * second, first * np.conj(second))
+    return float(np.abs(np.angle(change)).max())
+
+
+def _mean(values: FloatArray, weights: FloatArray) -> float:
+    total = float(weights.sum())
+    return float((values * weights).sum() / total) if total > 0 else float("nan")
+
+
+def _spread(log_scale: FloatArray, weights: FloatArray) -> float:
+    return float(np.exp(quantile(log_scale, weights, 0.95) - quantile(log_scale, weights, 0.05)))
+
+
+def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
+    """Return the value below which lies a fraction of the weight; NaN of nothing."""
+    if not len(values):
+        return float("nan")
+    order = np.argsort(values)
+    cumulated = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(cumulated, fraction * cumulated[-1])])

@@ -1,0 +1,1 @@
+"""What a flattening returns: put together, measured, held against what was promised."""

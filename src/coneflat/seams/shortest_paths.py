@@ -1,0 +1,191 @@
+"""Shortest ways on the edges of a mesh that is cut open, compiled.
+
+Nothing is glued to the triangle of a border half-edge: `cut` is True there. At a vertex on the border the half-edges
+that leave it lie in sectors between those of the border; all sectors along one border curve are one place, its circle.
+A way ends where it meets the border, so the circles of the half-edges there are all one has to know, and no cut mesh
+is made.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..compiled import compiled
+
+
+@compiled
+def label_circles(
+    twin: IntArray,
+    leaving: IntArray,
+    cut: BoolArray,
+    sides: IntArray,
+    points: IntArray,
+    circle: IntArray,
+    around: IntArray,
+    starts: IntArray,
+) -> int:
+    """Number the border curves through given half-edges, then the points on none of them; return how many there are.
+
+    leaving: (n,) a half-edge that leaves each vertex. circle: (3m,) -1; gets the number at each half-edge that leaves a
+    curve or point. around: these half-edges in order; starts: where each circle begins there.
+    """
+    count = 0
+    n = 0
+    starts[0] = 0
+    for side in sides:
+        if circle[side] >= 0:
+            continue
+        h = side
+        while circle[h] < 0:
+            circle[h] = count
+            around[n] = h
+            n += 1
+            h = h - h % 3 + (h + 1) % 3
+            while not cut[h]:
+                circle[h] = count
+                around[n] = h
+                n += 1
+                h = twin[h]
+                h = h - h % 3 + (h + 1) % 3
+        count += 1
+        starts[count] = n
+    for v in points:
+        h = leaving[v]
+        if circle[h] >= 0:
+            continue
+        while circle[h] < 0:
+            circle[h] = count
+            around[n] = h
+            n += 1
+            h = twin[h]
+            h = h - h % 3 + (h + 1) % 3
+        count += 1
+        starts[count] = n
+    return count
+
+
+@compiled
+def push(keys: FloatArray, items: IntArray, size: int, key: float, item: int) -> int:
+    """Put an item on a binary heap and return its new size."""
+    i = size
+    while i > 0:
+        parent = (i - 1) // 2
+        if keys[parent] <= key:
+            break
+        keys[i] = keys[parent]
+        items[i] = items[parent]
+        i = parent
+    keys[i] = key
+    items[i] = item
+    return size + 1
+
+
+@compiled
+def drop_first(keys: FloatArray, items: IntArray, size: int) -> int:
+    """Take the least item off a binary heap and return its new size."""
+    size -= 1
+    key, item = keys[size], items[size]
+    i = 0
+    while True:
+        child = 2 * i + 1
+        if child >= size:
+            break
+        if child + 1 < size and keys[child + 1] < keys[child]:
+            child += 1
+        if keys[child] >= key:
+            break
+        keys[i] = keys[child]
+        items[i] = items[child]
+        i = child
+    keys[i] = key
+    items[i] = item
+    return size
+
+
+@compiled
+def search(
+    starts: IntArray,
+    heads: IntArray,
+    costs: FloatArray,
+    enters: IntArray,
+    seeds: IntArray,
+    seed_costs: FloatArray,
+    seed_origins: IntArray,
+    inner: IntArray,
+    inner_costs: FloatArray,
+    height: FloatArray,
+    target: int,
+    limit: float,
+    farthest: float,
+    distance: FloatArray,
+    before: IntArray,
+    origin: IntArray,
+    reached: IntArray,
+    arrival: FloatArray,
+    last: IntArray,
+    keys: FloatArray,
+    items: IntArray,
+) -> int:
+    """Search the ways off the border in the order of distance plus height; return how many vertices were reached.
+
+    Slots are half-edges sorted by tail: those of vertex v are starts[v] to starts[v + 1]; heads, costs: where they lead
+    and what for; enters: the circle that each enters, if any. The search begins along the slots `seeds`, and at the
+    vertices `inner` off the border, at the costs given; origins are names for where. It ends at the circle `target`,
+    and leaves out where distance plus height is the limit and more, or distance the `farthest`. Heights are lower
+    bounds of what is still to come; along an edge they fall by no more than its cost.
+
+    distance: (n,) infinite off the border, and -1 on it; gets those of the vertices reached, which are listed in
+    `reached`. before: (n,) the slot by which each was reached, -1 where the search began; origin: (n,) from where, -1
+    for `inner`. arrival: infinite; gets the cost of the way to each circle. last: its last slot.
+    """
+    size = 0
+    count = 0
+    for k in range(len(seeds)):
+        if seed_costs[k] < limit:
+            size = push(keys, items, size, seed_costs[k], -1 - k)
+    for k in range(len(inner)):
+        v, d = inner[k], inner_costs[k]
+        if d + height[v] < limit and d < distance[v]:
+            if distance[v] == math.inf:
+                reached[count] = v
+                count += 1
+            distance[v] = d
+            before[v] = -1
+            origin[v] = -1
+            size = push(keys, items, size, d + height[v], v)
+    while size > 0:
+        key, item = keys[0], items[0]
+        if key >= limit:
+            break
+        size = drop_first(keys, items, size)
+        if item < 0:
+            slot = seeds[-1 - item]
+            stop = slot + 1
+            d = key
+            source = seed_origins[-1 - item]
+        elif key > distance[item] + height[item]:
+            continue
+        else:
+            slot = starts[item]
+            stop = starts[item + 1]
+            d = distance[item]
+            source = origin[item]
+        for i in range(slot, stop):
+            v = heads[i]
+            e = d + costs[i]
+            if e >= distance[v]:
+                if distance[v] < 0 and e < arrival[enters[i]]:
+                    arrival[enters[i]] = e
+                    last[enters[i]] = i
+                    if enters[i] == target and e < limit:
+                        limit = e
+            elif e + height[v] < limit and e < farthest:
+                if distance[v] == math.inf:
+                    reached[count] = v
+                    count += 1
+                distance[v] = e
+                before[v] = i
+                origin[v] = source
+                size = push(keys, items, size, e + height[v], v)
+    return count

@@ -1,0 +1,153 @@
+"""Which back end factorizes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import lru_cache
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bmat, csc_matrix, csr_matrix
+
+from ..errors import OptionError
+from .superlu import SuperLUFactor
+from .types import EmptyFactor, Factor, NotPositiveDefinite
+
+# The modules that the back ends need; those that are no dependencies, with what installs them.
+MODULES = {
+    "pardiso": "pypardiso",
+    "cholespy": "cholespy",
+    "scipy": "scipy",
+    "amg": "pyamg",
+}
+INSTALLED_BY = {"pardiso": "coneflat[fast]", "amg": "coneflat[amg]"}
+# Unknowns below which loading MKL takes longer than what it saves.
+LARGE = 20_000
+# Unknowns from which a factorization without supernodes and nested dissection takes minutes and too much memory.
+HUGE = 2_000_000
+
+
+class Choice:
+    """The back end asked for, and those that were used."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.used: dict[str, None] = {}
+
+
+_choice: ContextVar[Choice | None] = ContextVar("coneflat_solver", default=None)
+
+
+@lru_cache
+def available(name: str) -> bool:
+    """Whether a back end is installed."""
+    try:
+        return find_spec(MODULES[name]) is not None
+    except ModuleNotFoundError:  # pragma: no cover - a package without its parent
+        return False
+
+
+@contextmanager
+def solving(name: str) -> Iterator[Choice]:
+    """Have everything inside use a back end, "auto" for the best there is.
+
+    Raises:
+        OptionError: it is not installed.
+    """
+    if name != "auto" and not available(name):
+        raise OptionError(f"the solver {name} is not installed: pip install '{INSTALLED_BY[name]}'")
+    choice = Choice(name)
+    token = _choice.set(choice)
+    try:
+        yield choice
+    finally:
+        _choice.reset(token)
+
+
+def factorize(matrix: csc_matrix, used_up: Factor | None = None, is_noted: bool = True) -> Factor:
+    """Factorize a sparse symmetric positive definite matrix.
+
+    Args:
+        matrix: (n, n), both triangles, with sorted indices.
+        used_up: the factor of another matrix of the same size, needed no more, whose analysis may serve.
+        is_noted: whether the back end counts as used, as it does not for a small part of something larger.
+
+    Raises:
+        MetricError: it is singular in double precision.
+    """
+    size = matrix.shape[0]
+    if size == 0:
+        return EmptyFactor()
+    choice = _choice.get() or Choice("auto")
+    name = best_for(size) if choice.name == "auto" else choice.name
+    try:
+        factor = _open(name, matrix) if used_up is None else used_up.renewed(matrix)
+    except NotPositiveDefinite:
+        # Rounding has made it indefinite: with pivots it has a factorization all the same.
+        name, factor = _pivoting(name, matrix)
+    except MemoryError:
+        if choice.name != "auto" or not available("amg"):
+            raise
+        name, factor = "amg", _open("amg", matrix)
+    if is_noted:
+        choice.used[name] = None
+    return factor
+
+
+def best_for(size: int) -> str:
+    """Return the name of the back end for so many unknowns."""
+    names: tuple[str, ...] = ("cholespy",)
+    if size >= HUGE:
+        names = ("pardiso", "amg", "cholespy")
+    elif size >= LARGE:
+        names = ("pardiso", "cholespy")
+    return next((name for name in names if available(name)), "scipy")
+
+
+def _open(name: str, matrix: csc_matrix) -> Factor:
+    if name == "pardiso":
+        from .pardiso import PardisoFactor
+
+        return PardisoFactor(matrix)
+    if name == "cholespy":
+        from .cholespy import CholespyFactor
+
+        return CholespyFactor(matrix)
+    if name == "amg":
+        from .multigrid import MultigridSolver
+
+        return MultigridSolver(matrix)
+    return SuperLUFactor(matrix)
+
+
+def _pivoting(name: str, matrix: csc_matrix) -> tuple[str, Factor]:
+    if name == "pardiso":
+        from .pardiso import INDEFINITE, PardisoFactor
+
+        return name, PardisoFactor(matrix, INDEFINITE)
+    return "scipy", SuperLUFactor(matrix)
+
+
+class HermitianFactor:
+    """A factorized Hermitian positive definite matrix: as a real one of twice the size.
+
+    Args:
+        matrix: (n, n) complex.
+
+    Raises:
+        MetricError: it is singular in double precision.
+    """
+
+    def __init__(self, matrix: csr_matrix) -> None:
+        real, imaginary = matrix.real, matrix.imag
+        self._factor = factorize(csc_matrix(bmat([[real, -imaginary], [imaginary, real]])))
+
+    def solve(self, right: NDArray[Any]) -> NDArray[np.complex128]:
+        """Return the complex x with A x = right, both (n,)."""
+        parts = self._factor.solve(np.concatenate([right.real, right.imag]))
+        solution: NDArray[np.complex128] = parts[: len(right)] + 1j * parts[len(right) :]
+        return solution

@@ -1,0 +1,173 @@
+"""Figures of a flattening, by kind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from ... import text
+from ...curve import ConeCurve
+from ...errors import OptionError
+from ...quality.checker import CELLS, check_cells
+from ..quantity import check_color_map, conformal_distortion, curvature, stretch
+from .camera import Eye, eye_direction, view_aspect
+from .compose import Panel, Row, check_pixels, compose
+from .cone_curve import draw_cone_curve
+from .cone_marks import mark_handles
+from .model import DOTS_PER_INCH, draw_checker, draw_cones, draw_curvature, draw_quality
+from .uv_layout import draw_layout, layout_aspect
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ...result.flattening import Flattening
+
+CURVE_ASPECT, CURVE_HEIGHT = 1.6, 3.2
+
+
+@dataclass(frozen=True)
+class Look:
+    """How to draw a figure.
+
+    Attributes:
+        size: width and height in inches; None for what the pictures need.
+        dpi: dots per inch of the pictures.
+        eyes: directions from the model to the eye, one for each view, see `draw_checker`.
+        up: the model's upward axis, "x", "y" or "z".
+        colors: a colour map of matplotlib for quality and curvature; None for their own.
+        cells: of the checkerboard, in a row that is as long as the root of the area.
+        color_charts: give the charts of the layout different colours.
+        distortion: of the curve: the area distortion that is wanted.
+        title: to be written above all.
+
+    Raises:
+        OptionError: one of them makes no sense.
+    """
+
+    size: tuple[float, float] | None = None
+    dpi: float = DOTS_PER_INCH
+    eyes: Sequence[Eye] = ("front-right",)
+    up: str = "y"
+    colors: str | None = None
+    cells: float = CELLS
+    color_charts: bool = False
+    distortion: float = 0.2
+    title: str = ""
+
+    def __post_init__(self) -> None:
+        if isinstance(self.eyes, str):
+            object.__setattr__(self, "eyes", (self.eyes,))
+        if not len(self.eyes):
+            raise OptionError("a figure of the model needs an eye to see it from")
+        for eye in self.eyes:
+            eye_direction(eye, self.up)
+        check_pixels((1.0, 1.0) if self.size is None else self.size, self.dpi)
+        check_cells(self.cells)
+        if self.colors is not None:
+            check_color_map(self.colors)
+
+    def views(
+        self, result: Flattening, draw: Callable[..., object], label: str = "", **options: Any
+    ) -> list[Panel]:
+        """Return a panel for each eye, in which a function draws the model."""
+        options |= {"up": self.up, "dpi": self.dpi}
+        vertices = result.vertices[np.unique(result.faces)]
+        return [
+            Panel(
+                view_aspect(vertices, eye, self.up),
+                partial(draw, result, eye=eye, **options),
+                label * (k == 0),
+            )
+            for k, eye in enumerate(self.eyes)
+        ]
+
+
+def make_figure(shown: Flattening | ConeCurve, kind: str, **look: Any) -> Figure:
+    """Return a figure for print, which `save_figure` writes.
+
+    Args:
+        shown: the flattening; of the kind "curve" a `ConeCurve`.
+        kind: "layout": the charts in the unit square with cones. "checker": the model with a checkerboard through
+            its UVs. "quality": distortion of angles and of scale on the model and in the layout. "cones": the model
+            with cones and seams. "curvature": angles missing around vertices, before and after. "curve": area
+            distortion against the number of cones.
+        look: `size` in inches, `dpi`, `eyes` to see the model from and its axis `up`, `colors`, `cells` of the
+            checkerboard, `color_charts`, `distortion` wanted, `title`: the attributes of `coneflat.view.Look`.
+
+    Raises:
+        OptionError: an option makes no sense, or matplotlib is not installed.
+    """
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise OptionError(f"unknown kind of figure {text.shown(kind)}: choose from {', '.join(KINDS)}")
+    if isinstance(shown, ConeCurve) != (kind == "curve"):
+        raise OptionError(
+            "figures of the kind 'curve', and no others, show what `coneflat.cone_curve` returns"
+        )
+    if kind != "curve" and not hasattr(shown, "uv_faces"):
+        raise OptionError(f"a figure shows what `coneflat.flatten` returns, not {text.shown(shown)}")
+    chosen = Look(**look)
+    rows, marks = _ROWS[kind](shown, chosen)
+    return compose(rows, title=chosen.title, marks=marks, size=chosen.size, dpi=chosen.dpi)
+
+
+_Rows: TypeAlias = "tuple[list[Row], list[Any]]"
+
+
+def _layout(result: Flattening, look: Look) -> _Rows:
+    panel = Panel(
+        layout_aspect(result, crop=False), partial(draw_layout, result, color_charts=look.color_charts)
+    )
+    return [Row([panel])], mark_handles(result, seams=False)
+
+
+def _checker(result: Flattening, look: Look) -> _Rows:
+    return [Row(look.views(result, draw_checker, cells=look.cells))], mark_handles(result, cones=False)
+
+
+def _cones(result: Flattening, look: Look) -> _Rows:
+    return [Row(look.views(result, draw_cones))], mark_handles(result)
+
+
+def _quality(result: Flattening, look: Look) -> _Rows:
+    rows = []
+    for measure, find in (("qc", conformal_distortion), ("scale", stretch)):
+        options: dict[str, Any] = {"measure": measure, "colors": look.colors}
+        layout = partial(draw_quality, result, on="layout", dpi=look.dpi, **options)
+        panels = [
+            *look.views(result, draw_quality, **options),
+            Panel(layout_aspect(result, crop=True), layout),
+        ]
+        rows.append(Row(panels, [find(result).recolored(look.colors)]))
+    return rows, []
+
+
+def _curvature(result: Flattening, look: Look) -> _Rows:
+    rows = []
+    for flat, label in ((False, "On the model"), (True, "After flattening")):
+        panels = look.views(result, draw_curvature, label, flat=flat, colors=look.colors)
+        rows.append(Row(panels, [curvature(result, flat).recolored(look.colors)]))
+    if len(look.eyes) == 1:
+        before, after = rows
+        rows = [Row([*before.panels, *after.panels], [*before.quantities, *after.quantities])]
+    return rows, mark_handles(result, seams=False)
+
+
+def _curve(curve: ConeCurve, look: Look) -> _Rows:
+    panel = Panel(CURVE_ASPECT, partial(draw_cone_curve, curve, distortion=look.distortion), is_graph=True)
+    return [Row([panel], tallest=CURVE_HEIGHT)], []
+
+
+_ROWS: dict[str, Callable[[Any, Look], _Rows]] = {
+    "layout": _layout,
+    "checker": _checker,
+    "quality": _quality,
+    "cones": _cones,
+    "curvature": _curvature,
+    "curve": _curve,
+}
+
+KINDS = tuple(_ROWS)

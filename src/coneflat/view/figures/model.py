@@ -1,0 +1,151 @@
+"""Drawing the model: its texture, its cones and seams, and quantities on it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ...errors import OptionError
+from ...quality.checker import CELLS, cell_side
+from ..quantity import Quantity, conformal_distortion, curvature, stretch
+from .camera import Eye
+from .cone_marks import draw_cones_on_model, draw_seams_on_model, pixels_of
+from .projection import MeshPicture, render_mesh
+from .uv_layout import fill_layout
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ...result.flattening import Flattening
+
+DOTS_PER_INCH = 300.0
+"""Resolution of pictures, for print."""
+
+QUANTITY_CONTRAST = 0.5
+"""Of light and shadow under colours that mean numbers, where a shadow must not read as one."""
+
+
+def draw_checker(
+    result: Flattening,
+    axes: Axes,
+    *,
+    eye: Eye = "front-right",
+    up: str = "y",
+    cells: float = CELLS,
+    seams: bool = True,
+    cones: bool = False,
+    dpi: float = DOTS_PER_INCH,
+) -> None:
+    """Draw the model with a checkerboard that its UVs put on it: squares, equally large, if nothing is distorted.
+
+    Args:
+        result: the flattening.
+        axes: matplotlib axes to draw in; their own lines and ticks are turned off.
+        eye: direction from the model to the eye: (3,), or "front", "back", "left", "right", "top", "bottom", or two
+            of them such as "back-left" for three quarters.
+        up: the model's upward axis, "x", "y" or "z".
+        cells: cells in a row that is as long as the root of the area.
+        seams, cones: mark those that are visible.
+        dpi: resolution of the picture.
+
+    Raises:
+        OptionError: an option makes no sense.
+    """
+    side = cell_side(result.uv, result.uv_faces, cells)
+    picture = _show(axes, result, eye, up, dpi, corner_uv=result.corner_uv, cell=side)
+    if seams:
+        draw_seams_on_model(axes, picture, result)
+    if cones:
+        draw_cones_on_model(axes, picture, result)
+
+
+def draw_cones(
+    result: Flattening,
+    axes: Axes,
+    *,
+    eye: Eye = "front-right",
+    up: str = "y",
+    dpi: float = DOTS_PER_INCH,
+) -> None:
+    """Draw the model with its cones and seams, and faintly those behind it.
+
+    Cones are red where their curvature is positive and black where it is negative, with an area that grows with it.
+    Arguments and errors are those of `draw_checker`.
+    """
+    picture = _show(axes, result, eye, up, dpi)
+    draw_seams_on_model(axes, picture, result, through=True)
+    draw_cones_on_model(axes, picture, result, through=True)
+
+
+def draw_quality(
+    result: Flattening,
+    axes: Axes,
+    *,
+    measure: str = "qc",
+    on: str = "model",
+    eye: Eye = "front-right",
+    up: str = "y",
+    colors: str | None = None,
+    dpi: float = DOTS_PER_INCH,
+) -> Quantity:
+    """Draw how much the triangles are distorted, by colours, and return what is shown.
+
+    Args:
+        measure: "qc" for quasi-conformal distortion, 1 where angles are kept; "scale" for lengths in the layout over
+            those on the model, over the mean of this.
+        on: where to draw it, on the "model" or in the "layout".
+        colors: a colour map of matplotlib; by default viridis, or purple to orange.
+
+    The other arguments and errors are those of `draw_checker`. The colour bar of what is returned is
+    `figure.colorbar(quantity.scale.mappable(), ax=axes)`.
+    """
+    if measure not in ("qc", "scale"):
+        raise OptionError(f"unknown measure {measure!r}: choose from qc, scale")
+    quantity = (conformal_distortion if measure == "qc" else stretch)(result).recolored(colors)
+    if on == "layout":
+        fill_layout(axes, result, quantity, dpi)
+    elif on == "model":
+        draw_quantity(axes, result, quantity, eye, up, dpi)
+    else:
+        raise OptionError(f"nothing can be drawn on {on!r}: choose from model, layout")
+    return quantity
+
+
+def draw_curvature(
+    result: Flattening,
+    axes: Axes,
+    *,
+    flat: bool = False,
+    eye: Eye = "front-right",
+    up: str = "y",
+    colors: str | None = None,
+    dpi: float = DOTS_PER_INCH,
+) -> Quantity:
+    """Draw the curvature of every vertex, the angles missing around it, by colours, and return what is shown.
+
+    Args:
+        flat: of the flat metric, where only cones should have curvature; else of the model.
+        colors: a colour map of matplotlib.
+
+    The other arguments and errors are those of `draw_checker`.
+    """
+    quantity = curvature(result, flat).recolored(colors)
+    picture = draw_quantity(axes, result, quantity, eye, up, dpi)
+    if flat:
+        draw_cones_on_model(axes, picture, result)
+    return quantity
+
+
+def draw_quantity(
+    axes: Axes, result: Flattening, quantity: Quantity, eye: Eye, up: str, dpi: float
+) -> MeshPicture:
+    """Draw the model coloured by a quantity."""
+    return _show(axes, result, eye, up, dpi, colors=quantity.colors(), contrast=QUANTITY_CONTRAST)
+
+
+def _show(axes: Axes, result: Flattening, eye: Eye, up: str, dpi: float, **paint: Any) -> MeshPicture:
+    """Show a picture of the model so that the axes' coordinates are its pixels, row 0 at the top."""
+    picture = render_mesh(result.vertices, result.faces, size=pixels_of(axes, dpi), eye=eye, up=up, **paint)
+    extent = (0, picture.camera.width, picture.camera.height, 0)
+    axes.imshow(picture.image, extent=extent, interpolation="antialiased")
+    axes.set_axis_off()
+    return picture

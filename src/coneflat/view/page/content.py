@@ -1,0 +1,174 @@
+"""What a page shows of a flattening, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..._arrays import FloatArray, IntArray
+from ...errors import ArrayShapeError, OptionError
+from ...files.uv_split import split_at_seams
+from ...geometry.planar import signed_double_areas
+from ...mesh import TriangleMesh, end_corners, label_faces
+from ...quality.checker import cell_side
+from ..colours import page_scales
+from ..quantity import ColorScale, conformal_distortion, missing_angles, stretch
+from .thin import sides, thin
+
+if TYPE_CHECKING:
+    from ...result.flattening import Flattening
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """A flattening as a page shows it: v vertices, u points of the layout, m triangles, c cones.
+
+    Attributes:
+        places: (v, 3) vertices, moved and scaled into the unit ball.
+        centre, radius: where the ball lies in the model's units.
+        point_vertex: (u,) the vertex of each point of the layout.
+        uv: (u, 2) the points.
+        uv_side: the root of the area of all triangles in the plane.
+        faces: (m, 3) triangles of points.
+        outline: half-edges 3 f + i on the outlines of charts, each opposite corner i of face f: the two sides of
+            each seam edge, one after the other, then those of the boundary.
+        seams: how many seam edges there are.
+        chart: (m,) the chart of each triangle, the largest first.
+        qc, area_scale: (m,) QC distortion, and scale relative to its mean; NaN where undefined.
+        curvature, flat_curvature: (v,) of the model and of the flat metric, in units of pi; NaN on the boundary.
+        cones: (c,) vertices.
+        cone_curvatures: (c,) radians.
+        vertex_numbers: (v,) each vertex's number in the input, or -1.
+        face_numbers: (m,) each triangle's number in the result.
+        outward: 1 if triangles run anticlockwise seen from outside, else -1.
+        left_out: how many triangles are not shown.
+        scales: the scale of each colour map.
+    """
+
+    places: FloatArray
+    centre: FloatArray
+    radius: float
+    point_vertex: IntArray
+    uv: FloatArray
+    uv_side: float
+    faces: IntArray
+    outline: IntArray
+    seams: int
+    chart: IntArray
+    qc: FloatArray
+    area_scale: FloatArray
+    curvature: FloatArray
+    flat_curvature: FloatArray
+    cones: IntArray
+    cone_curvatures: FloatArray
+    vertex_numbers: IntArray
+    face_numbers: IntArray
+    outward: int
+    left_out: int
+    scales: dict[str, ColorScale]
+
+
+def content_of(result: Flattening, most: int) -> Content:
+    """Return what a page shows, with at most so many triangles.
+
+    Raises:
+        ArrayShapeError: the result has no UVs, or no triangles.
+        MeshError: it cannot be thinned to so few triangles.
+        OptionError: `most` is not positive.
+    """
+    if most < 1:
+        raise OptionError(f"a page shows at least one triangle, not {most}")
+    if not len(result.faces) or not len(result.uv) or np.shape(result.uv_faces) != np.shape(result.faces):
+        raise ArrayShapeError(
+            f"there is nothing to show: {len(result.faces):,} triangles, {len(result.uv):,} UV points and "
+            f"{len(result.uv_faces):,} triangles of them"
+        )
+    split = split_at_seams(result)
+    used, vertex = np.unique(split.own, return_inverse=True)
+    vertex = vertex.reshape(-1)
+    places, centre, radius = _into_unit_ball(result.vertices[used])
+    mesh = TriangleMesh(places, vertex[split.faces])
+    outline, seams = outline_halfedges(mesh, split.faces)
+    chart = _charts(split.faces, split.uv)
+    qc, scale = conformal_distortion(result), stretch(result)
+    curvatures = [missing_angles(result, flat)[used] / np.pi for flat in (False, True)]
+    cone = np.searchsorted(used, result.cones)
+
+    shown, corners = np.arange(len(split.faces)), split.faces
+    if len(shown) > most:
+        kept = np.zeros(len(split.uv), dtype=bool)
+        for end in end_corners(outline):
+            kept[split.faces.reshape(-1)[end]] = True
+        kept |= np.isin(vertex, cone)
+        shown, corners = thin(places[vertex], split.uv, split.faces, kept, most)
+        # Those at outlines all stay: their third corner is merged with none of the other two.
+        outline = 3 * np.searchsorted(shown, outline // 3) + outline % 3
+    points, faces = np.unique(corners, return_inverse=True)
+    vertices, point_vertex = np.unique(vertex[points], return_inverse=True)
+    return Content(
+        places=places[vertices],
+        centre=centre,
+        radius=radius,
+        point_vertex=point_vertex.reshape(-1),
+        uv=split.uv[points],
+        uv_side=cell_side(split.uv, split.faces, 1.0),
+        faces=faces.reshape(-1, 3),
+        outline=outline,
+        seams=seams,
+        chart=chart[shown],
+        qc=qc.values[shown],
+        area_scale=scale.values[shown],
+        curvature=curvatures[0][vertices],
+        flat_curvature=curvatures[1][vertices],
+        cones=np.searchsorted(vertices, cone),
+        cone_curvatures=result.curvatures,
+        vertex_numbers=used[vertices]
+        if result.vertex_origin is None
+        else result.vertex_origin[used[vertices]],
+        face_numbers=shown,
+        outward=_outward(places[mesh.faces]),
+        left_out=len(split.faces) - len(shown),
+        scales=page_scales(qc, scale, curvatures[0]),
+    )
+
+
+def outline_halfedges(mesh: TriangleMesh, uv_faces: IntArray) -> tuple[IntArray, int]:
+    """Return the half-edges on the outlines of charts, and how many seams are among them.
+
+    Seams come first, the two half-edges of each together, then the half-edges of the boundary.
+    """
+    inside = mesh.edge_halfedges[~mesh.is_boundary_edge]
+    flat = uv_faces.reshape(-1)
+    starts_one, ends_one = (flat[end] for end in end_corners(inside[:, 0]))
+    starts_two, ends_two = (flat[end] for end in end_corners(inside[:, 1]))
+    seams = inside[(starts_one != ends_two) | (ends_one != starts_two)]
+    boundary = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
+    return np.concatenate([seams.reshape(-1), boundary]), len(seams)
+
+
+def _into_unit_ball(vertices: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    centre = low + (high - low) / 2
+    centred = vertices - centre
+    # The largest coordinate first, or squares could overflow.
+    size = float(np.abs(centred).max()) or 1.0
+    radius = size * float(np.sqrt(((centred / size) ** 2).sum(axis=1).max())) or 1.0
+    return centred / radius, centre, radius
+
+
+def _charts(faces: IntArray, uv: FloatArray) -> IntArray:
+    """Return (m,) the chart of each triangle, numbered from the one with the largest area."""
+    count, chart = label_faces(faces, len(uv))
+    areas = np.abs(signed_double_areas(uv[faces]))
+    rank = np.full(count, -1, dtype=np.int64)
+    rank[np.argsort(-np.bincount(chart, weights=areas, minlength=count), kind="stable")] = np.arange(count)
+    return rank[chart]
+
+
+def _outward(corners: FloatArray) -> int:
+    """Return 1 if normals point away from the middle, by and large, else -1; `corners` is (m, 3, 3)."""
+    centroids = corners.mean(axis=1)
+    away = (centroids - centroids.mean(axis=0)) * np.cross(*sides(corners))
+    return -1 if float(away.sum()) < 0 else 1

@@ -1,0 +1,117 @@
+"""A page's data: numbers and texts as JSON, arrays as one compressed block of bytes."""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...files.texture import Texture
+from ...quality.checker import CELLS
+from ...result.from_uv import shown_rows
+from ..colours import as_plain, diverging, sequential
+from ..figures.camera import fit_camera
+from ..figures.demo import title
+from ..figures.uv_layout import CHART_COLORS
+from .content import Content
+
+if TYPE_CHECKING:
+    from ...result.flattening import Flattening
+
+ALIGNMENT = 4
+"""Bytes: where the browser may put a typed array."""
+
+COMPRESSION = 6
+
+
+class Payload(NamedTuple):
+    """What goes into a page: JSON that is safe inside a script element, and base64 text."""
+
+    head: str
+    arrays: str
+
+
+def payload_of(
+    result: Flattening, content: Content, picture: Texture | None, name: str, up: str, show: str
+) -> Payload:
+    """Return the data of a page.
+
+    Raises:
+        OptionError: `up` names no axis.
+    """
+    low, high = content.uv.min(axis=0), content.uv.max(axis=0)
+    arrays = _arrays(content)
+    if picture is not None:
+        arrays["picture"] = np.frombuffer(picture.content, dtype=np.uint8)
+    listed, block = pack(arrays)
+    head: dict[str, Any] = {
+        "name": name,
+        "title": title(replace(result, source=None)),
+        "rows": shown_rows(result),
+        "notes": list(result.notes),
+        "triangles": len(result.faces),
+        "left_out": content.left_out,
+        "seams": content.seams,
+        "cone_curvatures": content.cone_curvatures.tolist(),
+        "outward": content.outward,
+        "turn": fit_camera(content.places, (1, 1), up=up).axes.tolist(),
+        "uv_low": low.tolist(),
+        "uv_high": high.tolist(),
+        "uv_side": content.uv_side,
+        "squares": CELLS,
+        "scales": {key: as_plain(key, scale) for key, scale in content.scales.items()},
+        "picture": None if picture is None else picture.kind,
+        "show": show,
+        "arrays": listed,
+    }
+    return Payload(_safe_json(head), base64.b64encode(zlib.compress(block, COMPRESSION)).decode("ascii"))
+
+
+def _arrays(content: Content) -> dict[str, NDArray[Any]]:
+    """Return the arrays by the names that the page's scripts know them by."""
+    arrays: dict[str, NDArray[Any]] = {
+        "places": content.places.astype(np.float32),
+        "uv": content.uv.astype(np.float32),
+        "point_vertex": content.point_vertex.astype(np.uint32),
+        "faces": content.faces.astype(np.uint32),
+        "outline": content.outline.astype(np.uint32),
+        "chart": content.chart.astype(np.uint16 if content.chart.max() < 2**16 else np.uint32),
+        "qc": content.qc.astype(np.float32),
+        "area": content.area_scale.astype(np.float32),
+        "curvature": content.curvature.astype(np.float32),
+        "flat": content.flat_curvature.astype(np.float32),
+        "cones": content.cones.astype(np.uint32),
+        "sequential": sequential(),
+        "diverging": diverging(),
+        "tints": np.array([list(bytes.fromhex(colour[1:])) for colour in CHART_COLORS], dtype=np.uint8),
+    }
+    if not np.array_equal(content.vertex_numbers, np.arange(len(content.places))):
+        arrays["vertex_numbers"] = content.vertex_numbers.astype(np.int32)
+    if content.left_out:
+        arrays["face_numbers"] = content.face_numbers.astype(np.uint32)
+    return arrays
+
+
+def pack(arrays: Mapping[str, NDArray[Any]]) -> tuple[list[dict[str, Any]], bytes]:
+    """Return where each array lies in a block of bytes, little-endian, and the block."""
+    listed, parts, offset = [], [], 0
+    for name, array in arrays.items():
+        content = np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<"), copy=False).tobytes()
+        content += bytes(-len(content) % ALIGNMENT)
+        kind = f"{array.dtype.kind}{array.dtype.itemsize}"
+        listed.append({"name": name, "type": kind, "offset": offset, "count": array.size})
+        parts.append(content)
+        offset += len(content)
+    return listed, b"".join(parts)
+
+
+def _safe_json(value: Any) -> str:
+    """Return JSON without anything that could end a script element or open a comment in it."""
+    text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

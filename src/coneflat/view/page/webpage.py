@@ -1,0 +1,155 @@
+"""One self-contained HTML page of a flattening, which loads nothing from anywhere."""
+
+from __future__ import annotations
+
+import html
+import os
+import sys
+import tempfile
+import webbrowser
+from functools import cache
+from importlib.resources import files
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import OptionError
+from ...files.atomic import as_path, atomic_write, check_target, known_ending
+from ...text import shown
+from .content import content_of
+from .payload import payload_of
+from .picture import read_picture
+
+if TYPE_CHECKING:
+    from ...result.flattening import Flattening
+
+SHOWS = ("checker", "picture", "charts", "qc", "area", "curvature", "flat", "plain")
+"""What a page can show first."""
+
+MOST_TRIANGLES = 500_000
+"""On a page; larger meshes are thinned for display, or the browser would turn them haltingly."""
+
+MOST_IN_NOTEBOOK = 100_000
+"""The same in a notebook, which stores every page that it shows."""
+
+ENDINGS = (".html", ".htm")
+NOTEBOOK_HEIGHT = 560  # pixels
+
+# In the order in which they must run: names are shared.
+_SCRIPTS = (
+    "state", "model", "corners", "camera", "shaders", "graphics", "renderer", "marks", "gestures", "facts",
+    "picture", "controls", "main",
+)  # fmt: skip
+
+
+def page_of(
+    result: Flattening,
+    *,
+    name: str | None = None,
+    texture: str | PathLike[str] | None = None,
+    up: str = "y",
+    show: str | None = None,
+    most_triangles: int = MOST_TRIANGLES,
+) -> str:
+    """Return the page as text.
+
+    Args:
+        result: the flattening.
+        name: the page's title; by default that of the file the mesh was read from.
+        texture: a PNG, JPEG, GIF or WebP file to lay on the model.
+        up: the model's upward axis in the first view, "x", "y" or "z".
+        show: what the colours show first: "checker", "picture", "charts", "qc", "area", "curvature" (of the model),
+            "flat" (the curvature left) or "plain"; by default the picture, if there is one, or the checkerboard.
+        most_triangles: a mesh with more is thinned for display.
+
+    Raises:
+        OptionError: `up` or `show` is none of these, or `most_triangles` is no whole number.
+        ArrayShapeError: the result has no UVs.
+        MeshError: it cannot be thinned to so few triangles.
+        MeshFileError: the texture cannot be read.
+    """
+    if show is None:
+        show = "checker" if texture is None else "picture"
+    if show not in SHOWS:
+        raise OptionError(f"unknown show {show!r}: choose from {', '.join(SHOWS)}")
+    picture = None if texture is None else read_picture(texture)
+    if isinstance(most_triangles, bool) or not isinstance(most_triangles, (int, np.integer)):
+        raise OptionError(f"most_triangles must be a whole number, not {shown(most_triangles)}")
+    content = content_of(result, most_triangles)
+    if name is None:
+        name = "Flattening" if result.source is None else result.source.path.name
+    payload = payload_of(result, content, picture, name, up, show)
+    before_head, after_head, after_arrays = _template()
+    return "".join((before_head, payload.head, after_head, payload.arrays, after_arrays))
+
+
+def check_page(path: str | PathLike[str]) -> Path:
+    """Return the path if a page can be expected to be written there.
+
+    Raises:
+        UnknownFormatError: it does not end with .html or .htm.
+        MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
+    """
+    path = as_path(path)
+    known_ending(path, ENDINGS, "pages are written as")
+    check_target(path)
+    return path
+
+
+def write_page(page: str, path: str | PathLike[str] | None) -> Path:
+    """Write a page, in full or not at all, and return where: by default a new temporary file.
+
+    Raises:
+        UnknownFormatError, MeshFileError: as of `check_page`.
+    """
+    if path is None:
+        handle, name = tempfile.mkstemp(prefix="coneflat-", suffix=".html")
+        os.close(handle)
+        path = name
+    path = check_page(path)
+    with atomic_write(path, "w") as stream:
+        stream.write(page)
+    return path
+
+
+def open_page(path: Path) -> bool:
+    """Open a page in the user's browser; return whether there is one that could."""
+    has_display = (
+        not sys.platform.startswith("linux") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    )
+    if not has_display:  # A text browser would take the terminal, and show nothing.
+        return False
+    try:
+        return webbrowser.open(path.resolve().as_uri())
+    except (OSError, webbrowser.Error):
+        return False
+
+
+def notebook_html(result: Flattening) -> str:
+    """Return HTML with the page in a frame, for notebooks."""
+    page = page_of(result, most_triangles=MOST_IN_NOTEBOOK)
+    return (
+        f'<iframe srcdoc="{html.escape(page)}" title="coneflat" loading="lazy" '
+        f'style="width: 100%; height: {NOTEBOOK_HEIGHT}px; border: 1px solid #8886; border-radius: 6px"></iframe>'
+    )
+
+
+@cache
+def _template() -> tuple[str, str, str]:
+    """Return the parts of the page before, between and after its two blocks of data."""
+    folder = files(__package__)
+
+    def read(name: str) -> str:
+        return (folder / name).read_text(encoding="utf-8")
+
+    page = read("page.html")
+    for mark, text in (
+        ("{{style}}", read("page.css")),
+        ("{{script}}", "\n".join(read(f"{name}.js") for name in _SCRIPTS)),
+    ):
+        page = page.replace(mark, text)
+    before, rest = page.split("{{head}}")
+    between, after = rest.split("{{arrays}}")
+    return before, between, after
