@@ -17,7 +17,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 import shapes  # noqa: E402
 
 from coneflat import check_mesh, read_mesh  # noqa: E402
-from coneflat.mesh import TriangleMesh
+from coneflat.mesh import TriangleMesh  # noqa: E402
 
 
 def meshes(names: list[str], largest: int) -> Iterator[tuple[str, TriangleMesh]]:

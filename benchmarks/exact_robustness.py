@@ -31,20 +31,20 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import shapes  # noqa: E402
 
-from coneflat.files import read_mesh
-from coneflat.flat.exact.metric import ExactMetric, exact_metric
-from coneflat.geometry import edge_lengths
-from coneflat.geometry.mollify import mollify
-from coneflat.geometry.planar import heights
-from coneflat.geometry.straight import straight_triangles
-from coneflat.input.triangulate import triangulate
-from coneflat.input.validation import check_mesh
-from coneflat.layout.patches import DEGENERATE
-from coneflat.layout.unfold import unfold
-from coneflat.layout.untangle import untangle
-from coneflat.mesh import TriangleMesh
-from coneflat.quality.distortion import measure
-from coneflat.seams import cut_open, find_seams
+from coneflat.files import read_mesh  # noqa: E402
+from coneflat.flat.exact.metric import ExactMetric, exact_metric  # noqa: E402
+from coneflat.geometry import edge_lengths  # noqa: E402
+from coneflat.geometry.mollify import mollify  # noqa: E402
+from coneflat.geometry.planar import heights  # noqa: E402
+from coneflat.geometry.straight import straight_triangles  # noqa: E402
+from coneflat.input.triangulate import triangulate  # noqa: E402
+from coneflat.input.validation import check_mesh  # noqa: E402
+from coneflat.layout.patches import DEGENERATE  # noqa: E402
+from coneflat.layout.unfold import unfold  # noqa: E402
+from coneflat.layout.untangle import untangle  # noqa: E402
+from coneflat.mesh import TriangleMesh  # noqa: E402
+from coneflat.quality.distortion import measure  # noqa: E402
+from coneflat.seams import cut_open, find_seams  # noqa: E402
 
 
 @dataclass

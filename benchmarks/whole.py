@@ -22,7 +22,7 @@ from scipy.sparse import csc_matrix
 from coneflat import Flattening, cotangent_laplacian, cotangents, edge_lengths, flatten
 from coneflat.apps.compare.peers import PEERS, installed_peers
 from coneflat.solver import factorize, solving
-from coneflat.solver.factorize import best_for
+from coneflat.solver.back_ends import best_for
 
 STAGES = ("check", "cones", "metric", "cut", "layout", "measure")
 FITTED_FROM = 90_000  # triangles, from where on the growth is that of large meshes

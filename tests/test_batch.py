@@ -381,8 +381,8 @@ def test_a_worker_that_crashes_fails_its_mesh_alone_and_leaves_nothing_half_writ
 
 CRASHING = """
 import json, os, signal, sys
-from coneflat.batch import child
-from coneflat.io import atomic_write
+from coneflat.apps.batch import child
+from coneflat.files import atomic_write
 job = json.loads(sys.stdin.readline())
 if job["mesh"].endswith("ball.obj"):
     with atomic_write(job["output"]) as file:

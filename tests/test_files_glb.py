@@ -12,7 +12,7 @@ from shapes import join, sphere
 
 import coneflat
 from coneflat.files import read_mesh, read_mesh_from
-from coneflat.input.join import read_joined
+from coneflat.files.read import read_joined
 
 trimesh = pytest.importorskip("trimesh")
 

@@ -12,7 +12,8 @@ from click.testing import CliRunner
 import coneflat
 from coneflat import MeshFile, check_mesh, errors
 from coneflat.apps.cli.main import cli
-from coneflat.input.join import join_borders, read_joined
+from coneflat.files.read import read_joined
+from coneflat.input.join import join_borders
 
 TAKE_MESHES = ("flatten", "batch", "cones", "compare", "view", "figure", "measure")
 
@@ -244,7 +245,7 @@ class TestOwnUVs:
         assert "Shown are" not in done.stdout
 
     def test_they_are_those_of_the_file(self, square):
-        from coneflat.input.join import read_joined
+        from coneflat.files.read import read_joined
         from coneflat.result.from_uv import own_flattening
 
         shown = own_flattening(read_joined(square))

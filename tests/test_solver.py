@@ -10,7 +10,7 @@ from coneflat.apps.cli.main import cli
 from coneflat.geometry import cotangent_laplacian, cotangents, edge_lengths
 from coneflat.options import SOLVERS as SOLVER_NAMES
 from coneflat.solver import available, factorize, pardiso, solving
-from coneflat.solver.factorize import HUGE, LARGE, MODULES, best_for
+from coneflat.solver.back_ends import HUGE, LARGE, MODULES, best_for
 
 SOLVERS = [
     pytest.param(name, marks=pytest.mark.skipif(not available(name), reason=f"{name} is not installed"))
@@ -96,7 +96,7 @@ def test_solutions_are_the_same_every_time(name, matrix):
 
 def test_the_ladder_takes_what_is_installed(monkeypatch):
     installed = {"cholespy", "scipy"}
-    monkeypatch.setattr("coneflat.solver.factorize.available", lambda name: name in installed)
+    monkeypatch.setattr("coneflat.solver.back_ends.available", lambda name: name in installed)
     assert best_for(LARGE - 1) == best_for(HUGE) == "cholespy"
     installed |= {"pardiso", "amg"}
     assert (best_for(LARGE - 1), best_for(LARGE), best_for(HUGE)) == ("cholespy", "pardiso", "pardiso")
@@ -107,7 +107,7 @@ def test_the_ladder_takes_what_is_installed(monkeypatch):
 
 
 def test_a_solver_that_is_not_installed(monkeypatch):
-    monkeypatch.setattr("coneflat.solver.factorize.available", lambda name: False)
+    monkeypatch.setattr("coneflat.solver.back_ends.available", lambda name: False)
     with pytest.raises(errors.OptionError, match=r"pip install 'coneflat\[fast\]'"):
         flatten(*shapes.sphere(1), solver="pardiso")
 

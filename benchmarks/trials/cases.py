@@ -140,7 +140,7 @@ def _file(rng: Random, outcome: Outcome) -> None:
     outcome.recipe += f"; weld={weld}; {in_short(options)}"
     faces = None
     with outcome.guarded(expects_nan=True):
-        faces = coneflat.files.triangulate(mesh.vertices, mesh.corners, mesh.offsets)[0]
+        faces = coneflat.input.triangulate.triangulate(mesh.vertices, mesh.corners, mesh.offsets)[0]
     if faces is not None:
         _flatten(rng, outcome, lambda: coneflat.flatten(mesh, **options), options, (mesh.vertices, faces))
 

@@ -1,11 +1,14 @@
-"""Names of the array types used in annotations."""
+"""Names of the array types used in annotations, and arrays of users checked."""
 
 from __future__ import annotations
 
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import ArrayShapeError, EmptyMeshError, FaceIndexError, NonFiniteError
+from .text import list_some, plural
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
@@ -17,3 +20,41 @@ def dots(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the inner products of vectors along the last axis, several times as fast there as a sum of products."""
     products: FloatArray = np.einsum("...i,...i->...", one, other)
     return products
+
+
+def as_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
+    """Return (m, 3) vertex indices; raises ArrayShapeError, EmptyMeshError, or FaceIndexError with the bad ones."""
+    try:
+        array = np.asarray(faces)
+        if array.dtype.kind not in "fiu" and array.size:
+            raise TypeError(f"their type is {array.dtype}")
+        with np.errstate(invalid="ignore"):
+            triangles = np.ascontiguousarray(array, dtype=np.int64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ArrayShapeError(f"faces must be an (m, 3) array of vertex indices: {error}") from error
+    if triangles.size == 0:
+        raise EmptyMeshError("the mesh has no faces")
+    if triangles.ndim != 2 or triangles.shape[1] != 3:
+        raise ArrayShapeError(f"faces must have the shape (m, 3), not {triangles.shape}")
+    if array.dtype.kind == "f" and (triangles != array).any():
+        raise ArrayShapeError("faces must hold whole numbers, vertex indices from 0")
+    bad = np.flatnonzero(((triangles < 0) | (triangles >= vertex_count)).any(axis=1))
+    if len(bad):
+        row = triangles[bad[0]]
+        raise FaceIndexError(
+            f"{plural(len(bad), 'face')} with a vertex index outside 0..{vertex_count - 1}: "
+            f"{list_some(bad)}; face {bad[0]} is ({row[0]}, {row[1]}, {row[2]})"
+        )
+    return triangles
+
+
+def require_finite(points: FloatArray, triangles: IntArray) -> None:
+    """Raise NonFiniteError if a face has a vertex that is nowhere; vertices without a face do not matter."""
+    is_bad: BoolArray = np.any(~np.isfinite(points), axis=1)
+    if is_bad.any():
+        bad = np.unique(triangles[is_bad[triangles]])
+        if len(bad):
+            raise NonFiniteError(
+                f"{plural(len(bad), 'vertex', 'vertices')} of {len(points):,} with NaN or infinite coordinates: "
+                f"{list_some(bad)}; remove or mend them"
+            )

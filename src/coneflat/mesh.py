@@ -63,7 +63,7 @@ def sort_pairs(one: IntArray, two: IntArray, bound: int) -> tuple[IntArray, Bool
 class TriangleMesh:
     """A manifold, consistently oriented triangle mesh without isolated vertices.
 
-    `coneflat.validation.check_mesh` makes one out of arbitrary arrays, or says why it cannot.
+    `coneflat.input.validation.check_mesh` makes one out of arbitrary arrays, or says why it cannot.
 
     Attributes:
         vertices: (n, 3) positions.

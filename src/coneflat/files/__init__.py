@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from .atomic import atomic_write
 from .npz import read_flattening
-from .raw import COLOURS, PIPE
+from .raw import PIPE
 from .read import INPUT_FORMATS, read_mesh, read_mesh_from
 from .write import OUTPUT_FORMATS, check_output, write_flattening, write_stream
 
 __all__ = [
-    "COLOURS",
     "INPUT_FORMATS",
     "OUTPUT_FORMATS",
     "PIPE",

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
 from ..errors import EmptyMeshError, FaceIndexError, MeshFileError
-from .raw import COLOURS, NO_UV, RawMesh, first_bad_corner, offsets_of
+from ..input.mesh_file import COLOURS
+from ..input.polygons import first_bad_corner
+from .raw import NO_UV, RawMesh, offsets_of
 from .text import Growing, TextBlock, newline_of, text_blocks
 
 _OTHER, _VERTEX, _FACE, _TEXTURE, _NORMAL, _ELEMENT, _COMMENTED_FACE = range(7)

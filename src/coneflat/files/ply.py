@@ -12,7 +12,8 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..errors import EmptyMeshError, MeshFileError
-from .raw import COLOURS, NO_UV, RawMesh, offsets_of
+from ..input.mesh_file import COLOURS
+from .raw import NO_UV, RawMesh, offsets_of
 from .text import Growing, text_blocks
 
 _TYPES = {

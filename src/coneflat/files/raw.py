@@ -14,14 +14,12 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..errors import ConeflatError, EmptyMeshError, FaceIndexError, MeshFileError
+from ..input.polygons import first_bad_corner
 
 if TYPE_CHECKING:
     from .gltf.scene import GltfScene
     from .obj import ObjText
 
-
-#: Names of the properties that are a vertex's colour.
-COLOURS = ("red", "green", "blue")
 
 #: Instead of the number of a UV point: the corner has none.
 NO_UV = -1
@@ -123,13 +121,6 @@ def check_corners(path: Path, mesh: RawMesh) -> None:
         raise FaceIndexError(
             f"{path}: face {i} names vertex {mesh.corners[c]}, but there are {count} vertices, from 0 on"
         )
-
-
-def first_bad_corner(corners: IntArray, vertex_count: int) -> int | None:
-    """Return the first of (c,) corners that names no vertex, if any does."""
-    if corners.min(initial=0) >= 0 and corners.max(initial=-1) < vertex_count:
-        return None
-    return int(np.argmax((corners < 0) | (corners >= vertex_count)))
 
 
 def offsets_of(sizes: IntArray) -> IntArray:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import ConeflatError, EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
+from ..input.join import Joined, join_borders
 from ..input.mesh_file import MeshFile
 from ..input.weld import weld as weld_vertices
 from ..text import shown
@@ -187,3 +188,21 @@ def find_meshes(pattern: str) -> list[str]:
     if not matches:
         raise OptionError(f"{pattern!r} matches no mesh ({', '.join(INPUT_FORMATS)})")
     return matches
+
+
+def read_joined(path: str | PathLike[str], weld: bool | None = None) -> Joined:
+    """Return the mesh of a file, closed where nobody could want it open.
+
+    Args:
+        path: the file.
+        weld: True merges all vertices at the same position and False none; None merges them in the formats that
+            cannot share vertices, and in the others joins borders that coincide.
+
+    Raises:
+        MeshError, MeshFileError: as of `read_mesh`.
+    """
+    mesh = read_mesh(path, weld)
+    # What a scene has as several nodes stays apart.
+    if weld is not None or mesh.unwelded is not None or mesh.scene is not None:
+        return Joined(mesh, np.arange(len(mesh.vertices)))
+    return join_borders(mesh)

@@ -11,12 +11,12 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..atlas.snap import snap_apart
 from ..errors import MeshFileError
+from ..input.mesh_file import COLOURS
 from ..input.polygons import polygon_of
 from ..result.promises import DOUBLE, SINGLE, remeasured
 from ..text import plural
 from .gltf.scene_write import scene_losses
 from .polygons import find_pieces
-from .raw import COLOURS
 
 if TYPE_CHECKING:
     from ..result.flattening import Flattening

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import FloatArray, IntArray, as_faces, require_finite
 from ..errors import ArrayShapeError, OptionError
-from ..input.validation import as_faces, require_finite
 from .coverage import covered_twice
 
 # Of the largest coordinate: what is smaller counts as 0, lest products underflow.

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from .._arrays import BoolArray, IntArray
 from ..errors import ArrayShapeError
-from ..files import read_mesh
 from .mesh_file import MeshFile
 from .triangulate import is_polygon_side, triangulate
 
@@ -66,6 +65,8 @@ def as_input(mesh: Any, faces: ArrayLike | None = None) -> InputMesh:
     if faces is not None:
         return InputMesh(mesh, faces)
     if isinstance(mesh, (str, PathLike)):
+        from ..files import read_mesh
+
         mesh = read_mesh(mesh)
     if isinstance(mesh, MeshFile):
         triangles, corners = triangulate(mesh.vertices, mesh.corners, mesh.offsets)

@@ -9,10 +9,10 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import OptionError
-from ..files import COLOURS
 from ..geometry.operators import at_unit_scale
 from ..options import Options
 from .arrays import InputMesh
+from .mesh_file import COLOURS
 from .validation import CheckedMesh
 
 # How much more a vertex of a pure colour weighs than a grey one.

@@ -9,14 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from .._arrays import BoolArray, IntArray
 from ..errors import OptionError
-from ..files.read import read_mesh
 from ..mesh import label_components, sort_pairs
 from ..text import plural
 from .mesh_file import MeshFile
@@ -109,24 +107,6 @@ class Joined:
             if other != vertex:
                 return other, vertex
         raise AssertionError("all vertices are different")
-
-
-def read_joined(path: str | PathLike[str], weld: bool | None = None) -> Joined:
-    """Return the mesh of a file, closed where nobody could want it open.
-
-    Args:
-        path: the file.
-        weld: True merges all vertices at the same position and False none; None merges them in the formats that
-            cannot share vertices, and in the others joins borders that coincide.
-
-    Raises:
-        MeshError, MeshFileError: as of `read_mesh`.
-    """
-    mesh = read_mesh(path, weld)
-    # What a scene has as several nodes stays apart.
-    if weld is not None or mesh.unwelded is not None or mesh.scene is not None:
-        return Joined(mesh, np.arange(len(mesh.vertices)))
-    return join_borders(mesh)
 
 
 def join_borders(mesh: MeshFile) -> Joined:

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from ..files.obj import ObjText
 
 
+#: Names of the properties that are a vertex's colour.
+COLOURS = ("red", "green", "blue")
+
+
 @dataclass(frozen=True, eq=False)
 class MeshFile:
     """A mesh read from a file, with its polygons untouched.

@@ -105,3 +105,10 @@ def polygon_of(face_corners: IntArray, offsets: IntArray) -> IntArray:
     """
     polygon: IntArray = np.searchsorted(offsets, face_corners[:, 0], side="right") - 1
     return polygon
+
+
+def first_bad_corner(corners: IntArray, vertex_count: int) -> int | None:
+    """Return the first of (c,) corners that names no vertex, if any does."""
+    if corners.min(initial=0) >= 0 and corners.max(initial=-1) < vertex_count:
+        return None
+    return int(np.argmax((corners < 0) | (corners >= vertex_count)))

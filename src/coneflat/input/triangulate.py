@@ -8,8 +8,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import DegenerateFaceError, FaceIndexError
-from ..files.raw import first_bad_corner
-from .polygons import polygon_of
+from .polygons import first_bad_corner, polygon_of
 
 #: Part of a quad's area below which one of its halves counts as empty or turned over: far above the
 #: rounding of a collinear corner (about 1e-16), far below any triangle worth having.

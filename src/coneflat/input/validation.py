@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, as_faces, require_finite
 from ..errors import (
     ArrayShapeError,
     DegenerateFaceError,
     EmptyMeshError,
-    FaceIndexError,
-    NonFiniteError,
     NonManifoldError,
     NonOrientableError,
 )
@@ -95,43 +93,6 @@ def _as_vertices(vertices: ArrayLike) -> FloatArray:
     if points.ndim != 2 or points.shape[1] != 3:
         raise ArrayShapeError(f"vertices must have the shape (n, 3), not {points.shape}")
     return points
-
-
-def as_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
-    try:
-        array = np.asarray(faces)
-        if array.dtype.kind not in "fiu" and array.size:
-            raise TypeError(f"their type is {array.dtype}")
-        with np.errstate(invalid="ignore"):
-            triangles = np.ascontiguousarray(array, dtype=np.int64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ArrayShapeError(f"faces must be an (m, 3) array of vertex indices: {error}") from error
-    if triangles.size == 0:
-        raise EmptyMeshError("the mesh has no faces")
-    if triangles.ndim != 2 or triangles.shape[1] != 3:
-        raise ArrayShapeError(f"faces must have the shape (m, 3), not {triangles.shape}")
-    if array.dtype.kind == "f" and (triangles != array).any():
-        raise ArrayShapeError("faces must hold whole numbers, vertex indices from 0")
-    bad = np.flatnonzero(((triangles < 0) | (triangles >= vertex_count)).any(axis=1))
-    if len(bad):
-        row = triangles[bad[0]]
-        raise FaceIndexError(
-            f"{plural(len(bad), 'face')} with a vertex index outside 0..{vertex_count - 1}: "
-            f"{list_some(bad)}; face {bad[0]} is ({row[0]}, {row[1]}, {row[2]})"
-        )
-    return triangles
-
-
-def require_finite(points: FloatArray, triangles: IntArray) -> None:
-    """Raise NonFiniteError if a face has a vertex that is nowhere; vertices without a face do not matter."""
-    is_bad: BoolArray = np.any(~np.isfinite(points), axis=1)
-    if is_bad.any():
-        bad = np.unique(triangles[is_bad[triangles]])
-        if len(bad):
-            raise NonFiniteError(
-                f"{plural(len(bad), 'vertex', 'vertices')} of {len(points):,} with NaN or infinite coordinates: "
-                f"{list_some(bad)}; remove or mend them"
-            )
 
 
 class _Check:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._arrays import ComplexArray, FloatArray, IntArray
 from ..errors import MetricError
-from ..flat.exact.metric import ExactMetric, double
+from ..geometry.intrinsic import double
+
+if TYPE_CHECKING:
+    from ..flat.exact.metric import ExactMetric
 from ..geometry.intrinsic import IntrinsicTriangulation, halfedge_twins, intrinsic_triangulation
 from ..geometry.straight import FlatTriangles
 from ..mesh import TriangleMesh

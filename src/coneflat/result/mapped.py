@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, as_faces
 from ..errors import ArrayShapeError, MissingUVError
 from ..input.arrays import as_input
-from ..input.join import Joined, read_joined
+from ..input.join import Joined
 from ..input.mesh_file import MeshFile
 from ..input.polygons import fan_corners
-from ..input.validation import as_faces
 
 if TYPE_CHECKING:
     from .flattening import Flattening
@@ -62,6 +61,8 @@ def as_mapped(
             from ..files.npz import read_flattening
 
             return _of_result(read_flattening(mesh))
+        from ..files.read import read_joined
+
         return of_file(read_joined(mesh, weld))
     if isinstance(mesh, MeshFile):
         return of_file(Joined(mesh, np.arange(len(mesh.vertices))))

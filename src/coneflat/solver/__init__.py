@@ -4,7 +4,7 @@ The ladder, best first: MKL PARDISO (pypardiso) for large systems, CHOLMOD witho
 (SciPy), and conjugate gradients with multigrid (pyamg) for what fits no factorization.
 """
 
-from .factorize import HermitianFactor, available, factorize, solving
+from .back_ends import HermitianFactor, available, factorize, solving
 from .types import Factor, NotPositiveDefinite
 
 __all__ = ["Factor", "HermitianFactor", "NotPositiveDefinite", "available", "factorize", "solving"]

@@ -1,4 +1,4 @@
-"""A process of its own for flattening: `python -m coneflat.batch.child` reads jobs and writes rows, a line each."""
+"""A process that flattens: `python -m coneflat.apps.batch.child` reads jobs and writes rows, a line each."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ COLUMNS = (
 def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     """Flatten a mesh file to a file and return the row of the summary; errors become rows, too."""
     from ...errors import ConeflatError
+    from ...files.read import read_joined
     from ...files.write import write_measured
-    from ...input.join import read_joined
     from ...pipeline import flatten
     from ...result.requirements import REPORTED, breaches, parse_requirements
 

@@ -22,7 +22,7 @@ class Job:
     Attributes:
         mesh, output: absolute paths.
         options: keyword arguments of `coneflat.flatten`, as JSON has them.
-        weld: merge vertices at the same position; None for the default, see `coneflat.io.join.read_joined`.
+        weld: merge vertices at the same position; None for the default, see `coneflat.files.read.read_joined`.
         mark: what changes when the mesh file, the options or the version do; "" where there is no such file.
         required: what measures must be, such as "flipped=0"; a mesh that does not meet it has failed.
     """

@@ -20,7 +20,7 @@ ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
 
-COMMAND = [sys.executable, "-m", "coneflat.batch.child"]
+COMMAND = [sys.executable, "-m", "coneflat.apps.batch.child"]
 
 
 def failed(job: Job, error: str, seconds: float | None = None) -> dict[str, Any]:

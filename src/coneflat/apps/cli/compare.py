@@ -69,7 +69,7 @@ def compare(
       coneflat compare horse.ply --up z -o horse --methods exact,linear,bff,lscm
     """
     from ...errors import MetricError
-    from ...input.join import read_joined
+    from ...files.read import read_joined
     from ...options import METHODS, PAPER
     from ..compare.run import compare_methods
     from ..compare.table import comparison_csv, comparison_lines, comparison_markdown

@@ -65,7 +65,7 @@ def cones(
     from ...curve import cone_curve, find_cones
     from ...files import atomic_write
     from ...files.atomic import check_target
-    from ...input.join import read_joined
+    from ...files.read import read_joined
     from ...view import check_figure_target, make_figure, new_figure, save_figure
     from .console import Console
     from .run import FLATTENED, READ

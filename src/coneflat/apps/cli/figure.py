@@ -128,7 +128,7 @@ def figure(
 def _surface(file: Path, weld: bool | None) -> tuple[Any, tuple[str, ...]]:
     """Return what a search for cones takes, a mesh file as it is, of a result its mesh; and notes on reading it."""
     from ...files import read_flattening
-    from ...input.join import read_joined
+    from ...files.read import read_joined
 
     if file.suffix.lower() != ".npz":
         joined = read_joined(file, weld)

@@ -11,7 +11,6 @@ import numpy as np
 
 from ..._arrays import FloatArray, IntArray
 from ...errors import MeshFileError, OptionError
-from .search import is_file
 
 _CURVATURE = re.compile(
     r"(?P<number>[-+]?(?:\d+\.?\d*(?:e[-+]?\d+)?|\.\d+)?)\s*\*?\s*(?P<unit>pi|π|deg|°|rad)?\s*(?:/\s*(?P<by>\d+\.?\d*))?",
@@ -142,3 +141,11 @@ def _lines(path: Path) -> list[str]:
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise MeshFileError(f"cannot read {path}: {reason}") from error
+
+
+def is_file(text: str) -> bool:
+    """Whether an option's value names a file that is there."""
+    try:
+        return Path(text).is_file()
+    except (OSError, ValueError):
+        return False

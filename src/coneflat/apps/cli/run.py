@@ -15,9 +15,10 @@ from typing import IO, Any
 from ...errors import OptionError
 from ...files import PIPE, atomic_write, check_output, read_flattening, write_stream
 from ...files.atomic import check_target
+from ...files.read import read_joined
 from ...files.write import write_measured
 from ...files.written import as_written
-from ...input.join import Joined, read_joined
+from ...input.join import Joined
 from ...pipeline import flatten
 from ...result.flattening import Flattening
 from ...result.mapped import has_uv

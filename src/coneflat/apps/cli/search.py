@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -158,11 +157,3 @@ def as_keywords(params: Mapping[str, Any]) -> dict[str, Any]:
             "allowed_cones": None if params["only"] is None else read_vertices("--only", params["only"]),
         }
     return keywords
-
-
-def is_file(text: str) -> bool:
-    """Whether an option's value names a file that is there."""
-    try:
-        return Path(text).is_file()
-    except (OSError, ValueError):
-        return False

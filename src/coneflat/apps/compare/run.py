@@ -102,7 +102,7 @@ def compare_methods(
     Args:
         mesh, faces: as for `coneflat.flatten`.
         methods: names that its `method` takes.
-        peers: names of other packages' methods, of `coneflat.compare.PEERS`; by default those that are installed.
+        peers: names of other packages' methods, of `coneflat.apps.compare.PEERS`; by default those that are installed.
         progress: called with what is done and the fraction done.
         options: arguments of `coneflat.flatten`; those of cones hold for all, by the method "exact" if they do not
             name another.

@@ -53,7 +53,7 @@ class Minimum:
 def descend(function: Convex, start: FloatArray, tolerance: float, max_steps: int) -> Minimum:
     """Return the place of least gradient that Newton's method reaches.
 
-    As in `coneflat.conformal.newton`, a step is halved while the function rises at its end: what is left falls by half
+    As in `coneflat.flat.exact.newton`, a step is halved while the function rises at its end: what is left falls by half
     of what was to be had. One that goes beyond the minimum is taken if it halves the least gradient so far.
     Once below the tolerance, the method goes on while steps halve the gradient.
     """
