@@ -49,10 +49,10 @@ def main() -> None:
         if name == "sphere":
             exact()  # compiles, or loads what was compiled
         one, two = best_time(exact, arguments.runs), best_time(linear, arguments.runs)
-        figures = found[-1].figures
-        flips = figures.euclidean_flips + figures.ptolemy_flips
+        statistics = found[-1].statistics
+        flips = statistics.euclidean_flips + statistics.ptolemy_flips
         print(
-            f"| {name} | {len(mesh.faces):,} | {figures.newton_steps} | {flips:,} | {one:.2f} | {two:.2f} "
+            f"| {name} | {len(mesh.faces):,} | {statistics.newton_steps} | {flips:,} | {one:.2f} | {two:.2f} "
             f"| {one / two:.2f} |",
             flush=True,
         )

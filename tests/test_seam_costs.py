@@ -112,7 +112,7 @@ def test_ridges_bend_one_way_and_valleys_the_other():
 
 
 class TestCosts:
-    def test_without_wishes_they_are_lengths(self):
+    def test_without_constraints_they_are_lengths(self):
         mesh = TriangleMesh(*shapes.sphere(2))
         np.testing.assert_array_equal(edge_costs(mesh, lengths_of(mesh)), lengths_of(mesh))
 
@@ -202,7 +202,7 @@ class TestCosts:
         assert cut_open(mesh, find_seams(mesh, np.array([3, 50, 80]), costs)).pieces == 1
 
     @pytest.mark.parametrize(
-        ("wishes", "message"),
+        ("constraints", "message"),
         [
             ({"creases": -1}, "creases must be a number from 0 to 10, not -1"),
             ({"hiding": np.inf}, "hiding must be a number from 0 to 10, not inf"),
@@ -215,10 +215,10 @@ class TestCosts:
             ({"vertex_weights": np.full(162, np.nan)}, "must be finite"),
         ],
     )
-    def test_nonsense_is_refused(self, wishes, message):
+    def test_nonsense_is_refused(self, constraints, message):
         mesh = TriangleMesh(*shapes.sphere(2))
         with pytest.raises(errors.OptionError, match=message):
-            edge_costs(mesh, lengths_of(mesh), **wishes)
+            edge_costs(mesh, lengths_of(mesh), **constraints)
 
     def test_bending_is_refused_out_of_its_range(self):
         mesh = TriangleMesh(*shapes.sphere(2))

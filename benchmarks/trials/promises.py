@@ -335,7 +335,7 @@ def _check_cones(trial: Trial) -> None:
     )
     if missing or forbidden or strange:
         trial.broken(
-            "cones", "cones: wishes", f"missing {missing}, forbidden {forbidden}, not allowed {strange}"
+            "cones", "cones: constraints", f"missing {missing}, forbidden {forbidden}, not allowed {strange}"
         )
     count = options.get("cone_count")
     is_one = len(np.unique(topology.component[topology.is_used])) == 1 and not trial.is_marked

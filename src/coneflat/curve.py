@@ -170,14 +170,14 @@ def _open(
     with stages("check"):
         part = max(prepare(mesh, faces, options).components, key=lambda each: len(each.faces))
     surface = Surface.of(part.mesh, part.lengths)
-    only = only_choice(surface, part.wishes, options)
+    only = only_choice(surface, part.constraints, options)
     if only is not None:
-        share = weighted_areas(surface.areas, part.wishes.weights)
+        share = weighted_areas(surface.areas, part.constraints.weights)
         return _named(only, area_distortion(only.log_scale, share), part)
     stages.share = 1.0
     with stages("cones", 0.3):
-        return search_on(surface, part.wishes, options, stages), part
+        return search_on(surface, part.constraints, options, stages), part
 
 
 def _named(solution: ConeSolution, distortion: float, part: Component) -> FoundCones:
-    return FoundCones(part.wishes.names[solution.cones], solution.curvatures, distortion)
+    return FoundCones(part.constraints.names[solution.cones], solution.curvatures, distortion)

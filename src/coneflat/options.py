@@ -246,7 +246,7 @@ class Options:
 
     def _check_pursuit(self) -> None:
         """Check the options that only a pursuit takes, and those of whole quanta."""
-        if self.wishes_cones and not self.searches_cones:
+        if self.constrains_cones and not self.searches_cones:
             given = next(name for name in PURSUIT_FIELDS if self._is_set(name))
             raise OptionError(f"{given} is an option of cones 'pursuit', not of cones {self.cone_choice!r}")
         if self.boundary_kind == "straight" and not self.searches_cones:
@@ -271,7 +271,7 @@ class Options:
         return self.cones if isinstance(self.cones, str) else "given"
 
     @property
-    def wishes_cones(self) -> bool:
+    def constrains_cones(self) -> bool:
         """Whether something is said of the cones that a pursuit should find."""
         return any(self._is_set(name) for name in PURSUIT_FIELDS)
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ._arrays import FloatArray, IntArray
 from .atlas.injective import without_overlaps
 from .cones import ConeSolution
-from .cones.choose import DEARER, Surface, Turned, choose_cones, is_riddled, pursues
+from .cones.choose import DEARER, Surface, Turned, choose_cones, has_many_handles, pursues
 from .errors import CurvatureError, MetricError, SeamError
 from .flat import LaidOut
 from .flat.exact.flatten import ExactFlatMetric
@@ -22,7 +22,7 @@ from .flat.methods import find_metric
 from .geometry.handles import open_turning
 from .geometry.operators import area_distortion, weighted_areas
 from .input.components import Component, Prepared, prepare, seam_costs
-from .input.constraints import Wishes
+from .input.constraints import Constraints
 from .mesh import TriangleMesh
 from .options import UNFOLDED, Boundary, Cones, Options
 from .progress import Progress, Stages
@@ -213,7 +213,7 @@ def _flatten_components(prepared: Prepared, options: Options, stages: Stages) ->
         except (CurvatureError, MetricError, SeamError) as error:
             if len(prepared.components) == 1:
                 raise
-            where = f"in the component of vertex {part.wishes.names[0]} ({len(part.faces):,} triangles)"
+            where = f"in the component of vertex {part.constraints.names[0]} ({len(part.faces):,} triangles)"
             raise type(error)(f"{where}: {error}") from error
         stages.end_part()
     return pieces
@@ -230,12 +230,12 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
         with stages("atlas", 1.0):
             laid_out = without_overlaps(laid_out, part, options)
     notes = _missed_distortion(laid_out, part, options)
-    if is_riddled(part.mesh, options):
+    if has_many_handles(part.mesh, options):
         notes += (
             f"A surface with {part.mesh.genus():,} handles needs so many cones that the greedy search placed them.",
         )
     if options.method in UNFOLDED:
-        notes += shortfalls(laid_out, part.wishes.names)
+        notes += shortfalls(laid_out, part.constraints.names)
     return replace(laid_out, notes=laid_out.notes + notes)
 
 
@@ -251,7 +251,7 @@ def _with_held_cones(
     for _ in range(SEARCHES - 1):
         if not fewest:
             break
-        part = replace(part, wishes=part.wishes.without(unheld_cones(laid_out)))
+        part = replace(part, constraints=part.constraints.without(unheld_cones(laid_out)))
         laid_out = _flatten_once(surface, part, options, stages)
         if len(unheld_cones(laid_out)) < fewest:
             best, fewest = laid_out, len(unheld_cones(laid_out))
@@ -260,7 +260,7 @@ def _with_held_cones(
 
 def _missed_distortion(laid_out: LaidOut, part: Component, options: Options) -> tuple[str, ...]:
     """Return that the distortion asked for was not reached, if so."""
-    reached = laid_out.figures.area_distortion_linear
+    reached = laid_out.statistics.area_distortion_linear
     if not pursues(part.mesh, options):
         return ()
     if options.cone_count is not None:
@@ -304,7 +304,7 @@ def unheld_cones(laid_out: LaidOut) -> IntArray:
 def _flatten_once(surface: Surface, part: Component, options: Options, stages: Stages) -> LaidOut:
     with stages("cones", 0.4):
         solution = choose_cones(
-            surface, part.wishes, options, stages, _turning_meter(surface, part.wishes, options)
+            surface, part.constraints, options, stages, _turning_meter(surface, part.constraints, options)
         )
     laid_out = _lay_out(surface, part, solution, replace(options, correct_handles=False), stages)
     if not options.correct_handles or options.quantum is None or not part.mesh.genus():
@@ -314,14 +314,14 @@ def _flatten_once(surface: Surface, part: Component, options: Options, stages: S
     return replace(corrected, notes=(*corrected.notes, cost))
 
 
-def _turning_meter(surface: Surface, wishes: Wishes, options: Options) -> Turned | None:
+def _turning_meter(surface: Surface, constraints: Constraints, options: Options) -> Turned | None:
     """Return what tells by how much loops across handles turn with given cones; None where nobody asks."""
     if options.quantum is None or options.method != "exact" or not surface.mesh.genus():
         return None
     turning, plain = open_turning(surface.mesh), replace(options, correct_handles=False, best_effort=True)
 
     def turned(solution: ConeSolution) -> FloatArray:
-        metric = find_metric(surface, solution, wishes, plain)
+        metric = find_metric(surface, solution, constraints, plain)
         return turning.of_flat(metric.straight()) if isinstance(metric, ExactFlatMetric) else np.empty(0)
 
     return turned
@@ -346,18 +346,18 @@ def _lay_out(
     # The cut depends on the cones alone.
     with meanwhile(partial(_cut, part, solution, options), len(mesh.faces)) as cutting:
         with stages("metric", 0.75):
-            metric = find_metric(surface, solution, part.wishes, options)
+            metric = find_metric(surface, solution, part.constraints, options)
         with stages("cut", 0.85):
             disk, seams = cutting.result()
 
     with stages("layout", 0.95):
         laid_out = metric.lay_out(disk, seams)
         linear, reached = (
-            area_distortion(phi, weighted_areas(surface.areas, part.wishes.weights))
+            area_distortion(phi, weighted_areas(surface.areas, part.constraints.weights))
             for phi in (solution.log_scale, laid_out.log_scale[: len(mesh.vertices)])
         )
-        figures = replace(laid_out.figures, area_distortion_linear=linear, area_distortion=reached)
-        return replace(laid_out, figures=figures)
+        statistics = replace(laid_out.statistics, area_distortion_linear=linear, area_distortion=reached)
+        return replace(laid_out, statistics=statistics)
 
 
 def _cut(part: Component, solution: ConeSolution, options: Options) -> tuple[TriangleMesh, IntArray]:

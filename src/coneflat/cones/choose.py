@@ -13,7 +13,7 @@ from .._arrays import BoolArray, FloatArray
 from ..geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
 from ..geometry.operators import vertex_areas
 from ..geometry.ties import tie_key
-from ..input.constraints import Wishes
+from ..input.constraints import Constraints
 from ..mesh import TriangleMesh
 from ..options import Options
 from ..progress import Stages
@@ -77,30 +77,30 @@ def pursues(mesh: TriangleMesh, options: Options) -> bool:
     is_prescribed = options.boundary_kind in ("disk", "polygon") and mesh.is_boundary_vertex.any()
     return options.cone_choice == "pursuit" or (
         options.cone_choice == "auto"
-        and (options.wishes_cones or not (is_prescribed or is_riddled(mesh, options)))
+        and (options.constrains_cones or not (is_prescribed or has_many_handles(mesh, options)))
     )
 
 
-def is_riddled(mesh: TriangleMesh, options: Options) -> bool:
+def has_many_handles(mesh: TriangleMesh, options: Options) -> bool:
     """Whether a mesh has so many handles, and needs so many cones for them, that few of them are no aim."""
     from .cone_search import MOST_CONES
 
-    if options.cone_choice != "auto" or options.wishes_cones or mesh.is_boundary_vertex.any():
+    if options.cone_choice != "auto" or options.constrains_cones or mesh.is_boundary_vertex.any():
         return False
     # Each handle but one takes two cones of 4 pi.
     return -mesh.euler_characteristic > MOST_CONES // 2
 
 
 def choose_cones(
-    surface: Surface, wishes: Wishes, options: Options, stages: Stages, turned: Turned | None = None
+    surface: Surface, constraints: Constraints, options: Options, stages: Stages, turned: Turned | None = None
 ) -> ConeSolution:
     """Return cones with their curvatures and linear log scale; `turned` is asked where these are quantised."""
     mesh = surface.mesh
     if pursues(mesh, options):
-        corners = corners_alone(surface, wishes, options)
-        return _pursued(surface, wishes, options, stages, turned) if corners is None else corners
+        corners = corners_alone(surface, constraints, options)
+        return _pursued(surface, constraints, options, stages, turned) if corners is None else corners
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
-    is_greedy = options.cone_choice == "greedy" or is_riddled(mesh, options)
+    is_greedy = options.cone_choice == "greedy" or has_many_handles(mesh, options)
     if is_greedy:
         solution = greedy_cones(
             *given,
@@ -109,27 +109,27 @@ def choose_cones(
             tie_key=tie_key(mesh.vertices),
             progress=stages.tell,
         )
-    elif len(wishes.cones) and np.isfinite(wishes.cones.curvatures).all():
-        solution = cones_with_curvature(*given, wishes.cones.vertices, wishes.cones.curvatures)
+    elif len(constraints.cones) and np.isfinite(constraints.cones.curvatures).all():
+        solution = cones_with_curvature(*given, constraints.cones.vertices, constraints.cones.curvatures)
     else:
-        solution = cones_at(*given, wishes.cones.vertices)
+        solution = cones_at(*given, constraints.cones.vertices)
     if options.scale_at_cones and options.method == "exact":
         check_enough(len(solution.cones), mesh)
     else:
         advice = "allow more of them (--max-cones)" if is_greedy else "add cones or move them"
-        check_feasible(solution.cones, solution.curvatures, wishes.names, advice)
+        check_feasible(solution.cones, solution.curvatures, constraints.names, advice)
     return solution
 
 
-def corners_alone(surface: Surface, wishes: Wishes, options: Options) -> ConeSolution | None:
+def corners_alone(surface: Surface, constraints: Constraints, options: Options) -> ConeSolution | None:
     """Return a polyhedron's corners as cones if they are few: it unfolds without any distortion. Else None."""
-    if options.cone_choice != "auto" or options.wishes_cones or options.boundary_kind == "straight":
+    if options.cone_choice != "auto" or options.constrains_cones or options.boundary_kind == "straight":
         return None
     mesh, curvature = surface.mesh, surface.curvature
     corners = np.flatnonzero((np.abs(curvature) > FLAT) & ~mesh.is_boundary_vertex)
     angles = 2 * np.pi - curvature[corners]
     most = FEW if options.max_cones is None else min(options.max_cones, FEW)
-    if not 0 < len(corners) <= most or not wishes.is_allowed[corners].all():
+    if not 0 < len(corners) <= most or not constraints.is_allowed[corners].all():
         return None
     if angles.min() < options.min_cone_angle or angles.max() > (options.max_cone_angle or np.inf):
         return None
@@ -138,7 +138,7 @@ def corners_alone(surface: Surface, wishes: Wishes, options: Options) -> ConeSol
 
 
 def _pursued(
-    surface: Surface, wishes: Wishes, options: Options, stages: Stages, turned: Turned | None
+    surface: Surface, constraints: Constraints, options: Options, stages: Stages, turned: Turned | None
 ) -> ConeSolution:
     """Return the fewest cones for the distortion allowed, or the best of the number asked for."""
     from ..geometry.handles import open_turning
@@ -147,10 +147,10 @@ def _pursued(
     from .quantise import quantise_cones
 
     mesh = surface.mesh
-    only = only_choice(surface, wishes, options)
+    only = only_choice(surface, constraints, options)
     if only is not None:
         return only
-    search = search_on(surface, wishes, options, stages)
+    search = search_on(surface, constraints, options, stages)
 
     distortion, count = options.distortion, options.cone_count
     if options.quantum is None:
@@ -168,30 +168,32 @@ def _pursued(
     return replace(found, cones=found.cones[~mesh.is_boundary_vertex[found.cones]])
 
 
-def only_choice(surface: Surface, wishes: Wishes, options: Options) -> ConeSolution | None:
+def only_choice(surface: Surface, constraints: Constraints, options: Options) -> ConeSolution | None:
     """Return the solution without cones where no vertex may be one, and none need be; else None."""
     mesh = surface.mesh
-    takes_rest = _takes_rest(mesh, wishes, options)
-    if (wishes.is_allowed & ~takes_rest).any() or not (takes_rest.any() or mesh.euler_characteristic == 0):
+    takes_rest = _takes_rest(mesh, constraints, options)
+    if (constraints.is_allowed & ~takes_rest).any() or not (
+        takes_rest.any() or mesh.euler_characteristic == 0
+    ):
         return None
     given = surface.laplacian, surface.curvature, takes_rest, mesh.euler_characteristic
     return cones_at(*given, np.empty(0, dtype=np.int64))
 
 
-def _takes_rest(mesh: TriangleMesh, wishes: Wishes, options: Options) -> BoolArray:
+def _takes_rest(mesh: TriangleMesh, constraints: Constraints, options: Options) -> BoolArray:
     """Return (n,) the boundary vertices that take what curvature the cones leave.
 
     Corners of a straightened boundary are part of the trade, like the cones inside; but not on marked seams.
     """
     if options.boundary_kind != "straight":
         return mesh.is_boundary_vertex
-    if wishes.on_marks is None:
+    if constraints.on_marks is None:
         return np.zeros(len(mesh.vertices), dtype=bool)
-    return mesh.is_boundary_vertex & wishes.on_marks
+    return mesh.is_boundary_vertex & constraints.on_marks
 
 
-def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages) -> ConeSearch:
-    """Return a search for cones as the options and the user's wishes have it.
+def search_on(surface: Surface, constraints: Constraints, options: Options, stages: Stages) -> ConeSearch:
+    """Return a search for cones as the options and the user's constraints have it.
 
     One that is open on the surface goes on: only where cones are allowed may have changed.
     """
@@ -203,7 +205,7 @@ def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages
         ROOM * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)) + np.pi * mesh.is_boundary_vertex
     )
     if surface.search is not None:
-        surface.search.restrict(~surface.search.is_boundary & wishes.is_allowed)
+        surface.search.restrict(~surface.search.is_boundary & constraints.is_allowed)
         return surface.search
     if len(room) >= FINE:
         room = np.minimum(room, WIDEST / surface.widest)
@@ -211,16 +213,16 @@ def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages
         surface.laplacian,
         surface.curvature,
         surface.areas,
-        _takes_rest(mesh, wishes, options),
+        _takes_rest(mesh, constraints, options),
         mesh.euler_characteristic,
         tie_key=tie_key(mesh.vertices),
         # A corner of angle a has a curvature of pi - a: cones inside keep to the same bound.
         min_cone_angle=options.min_cone_angle + (np.pi if is_straight else 0.0),
         max_cone_angle=options.max_cone_angle,
         positive_only=options.positive_only,
-        weights=wishes.weights,
-        required=wishes.required.vertices,
-        allowed=wishes.is_allowed,
+        weights=constraints.weights,
+        required=constraints.required.vertices,
+        allowed=constraints.is_allowed,
         room=None if options.refine else room.astype(np.float64),
     )
     search.tell = stages.tell

@@ -109,7 +109,7 @@ def _smoothed_aggregates(
     for _ in range(TRIES):
         if most is None or number <= most * CLOSE:
             break
-        # Vertices left over make aggregates smaller than wished, and another level for that little makes all dense.
+        # Vertices left over make aggregates smaller than wanted, and another level for that little makes all dense.
         size *= number / most
         before = number
         labels, number = aggregate(*rows, size, weak)

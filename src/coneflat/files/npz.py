@@ -117,7 +117,7 @@ def _array(content: bytes) -> NDArray[Any]:
 
 
 def _flattening(path: Path, arrays: dict[str, NDArray[Any]]) -> Flattening:
-    from ..quality.statistics import SolveFigures
+    from ..quality.statistics import SolveStatistics
     from ..result.flattening import Flattening
 
     for name in _NAMES:
@@ -160,7 +160,9 @@ def _flattening(path: Path, arrays: dict[str, NDArray[Any]]) -> Flattening:
         seconds=report["seconds"],
         notes=tuple(report["notes"]),
         settings=report["settings"],
-        solve=SolveFigures(**{field.name: _number(report[field.name]) for field in fields(SolveFigures)}),
+        solve=SolveStatistics(
+            **{field.name: _number(report[field.name]) for field in fields(SolveStatistics)}
+        ),
         solvers=tuple(report["solvers"]),
         rotations=_rotations(report),
         # Vertices that a refinement added come from none.

@@ -13,7 +13,7 @@ from ..errors import ConvergenceError, MetricError
 from ..geometry import angle_defect, double_areas, edge_lengths
 from ..geometry.planar import heights, sides_between, signed_angles, signed_double_areas
 from ..mesh import TriangleMesh
-from ..quality.statistics import SolveFigures
+from ..quality.statistics import SolveStatistics
 from ..text import plural
 
 # Height over longest side below which a triangle counts as flat, neither upright nor upside down: coordinates are
@@ -37,7 +37,7 @@ class LaidOut:
         seams: (k, 2) vertex pairs.
         log_scale: (n,) phi; flat lengths are about l * exp(phi).
         target, curvature: (n,) curvature wanted and reached, radians.
-        figures: how it was found.
+        statistics: how it was found.
         notes: what falls short, one sentence each.
     """
 
@@ -50,7 +50,7 @@ class LaidOut:
     log_scale: FloatArray
     target: FloatArray
     curvature: FloatArray
-    figures: SolveFigures
+    statistics: SolveStatistics
     chart: IntArray | None = None
     notes: tuple[str, ...] = ()
 
@@ -131,7 +131,7 @@ def laid_out_at(
     seams: IntArray,
     lengths: FloatArray,
     solution: ConeSolution,
-    figures: SolveFigures | None = None,
+    statistics: SolveStatistics | None = None,
     notes: tuple[str, ...] = (),
 ) -> LaidOut:
     """Return a layout of a mesh's own triangles, at the mesh's area, with the scale and curvature that it has.
@@ -143,7 +143,7 @@ def laid_out_at(
         seams: (k,) the edges along which it was cut.
         lengths: (m, 3) side lengths, with which every triangle has area.
         solution: the cones and what was asked of them.
-        figures, notes: how it was found, and what falls short.
+        statistics, notes: how it was found, and what falls short.
 
     Raises:
         MetricError: the layout has no area.
@@ -168,7 +168,7 @@ def laid_out_at(
         # The boundary is free: what comes out there is what was wanted.
         target=np.where(mesh.is_boundary_vertex, curvature, solution.target),
         curvature=curvature,
-        figures=SolveFigures() if figures is None else figures,
+        statistics=SolveStatistics() if statistics is None else statistics,
         notes=notes,
     )
 

@@ -13,7 +13,7 @@ from ..geometry import angle_defect, corner_angles, double_areas, is_broken
 from ..geometry.planar import signed_double_areas
 from ..layout import least_squares_layout
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
-from ..quality.statistics import SolveFigures
+from ..quality.statistics import SolveStatistics
 from .base import LaidOut, all_faces
 
 
@@ -50,7 +50,7 @@ class LinearFlatMetric:
             curvature=angle_defect(
                 self.mesh.faces, corner_angles(self.lengths), self.mesh.is_boundary_vertex
             ),
-            figures=SolveFigures(broken=int(is_broken(self.lengths).sum())),
+            statistics=SolveStatistics(broken=int(is_broken(self.lengths).sum())),
         )
 
 

@@ -13,7 +13,7 @@ from ..cones import ConeSolution
 from ..cones.choose import Surface
 from ..errors import OptionError
 from ..geometry.handles import open_turning
-from ..input.constraints import Wishes
+from ..input.constraints import Constraints
 from ..mesh import TriangleMesh
 from ..options import Options
 from .base import FlatMetric
@@ -23,7 +23,9 @@ from .exact.handles import corrected_flattening
 from .linear import linear_flattening
 
 
-def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, options: Options) -> FlatMetric:
+def find_metric(
+    surface: Surface, solution: ConeSolution, constraints: Constraints, options: Options
+) -> FlatMetric:
     """Return the flat metric that the options name."""
     mesh, lengths = surface.mesh, surface.lengths
     if options.method == "linear":
@@ -34,37 +36,37 @@ def find_metric(surface: Surface, solution: ConeSolution, wishes: Wishes, option
     if mesh.is_boundary_vertex.any():
         if options.boundary_kind == "straight":
             boundary = straight_boundary(mesh, solution.target)
-        elif options.boundary_kind == "disk" or len(wishes.corners):
+        elif options.boundary_kind == "disk" or len(constraints.corners):
             boundary = prescribed_boundary(
                 mesh,
                 lengths,
                 float(solution.curvatures.sum()),
-                wishes.corners.vertices,
-                wishes.corners.curvatures,
-                wishes.names,
+                constraints.corners.vertices,
+                constraints.corners.curvatures,
+                constraints.names,
             )
     choices = ExactChoices(
         scale_at_cones=options.scale_at_cones,
         boundary=boundary,
-        kept=_kept_boundary(mesh, wishes, options),
+        kept=_kept_boundary(mesh, constraints, options),
         # Both sides of a marked seam are to have the same length.
         keep_area=options.boundary_kind != "lengths" and not options.marks_seams,
         best_effort=options.best_effort,
         refine=options.refine,
-        names=wishes.names,
+        names=constraints.names,
     )
     if options.correct_handles and options.quantum is not None and mesh.genus():
         return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantum)
     return exact_flattening(mesh, lengths, solution, choices)
 
 
-def _kept_boundary(mesh: TriangleMesh, wishes: Wishes, options: Options) -> BoolArray:
+def _kept_boundary(mesh: TriangleMesh, constraints: Constraints, options: Options) -> BoolArray:
     """Return (n,) the boundary vertices between which lengths stay: on marked seams, so that both sides are equal."""
     if options.boundary_kind == "lengths":
         return mesh.is_boundary_vertex
-    if wishes.on_marks is None:
+    if constraints.on_marks is None:
         return np.zeros(len(mesh.vertices), dtype=bool)
-    return mesh.is_boundary_vertex & wishes.on_marks
+    return mesh.is_boundary_vertex & constraints.on_marks
 
 
 #: Takes a connected mesh, its (m, 3) side lengths, cones with their curvatures, and whether a result that did not

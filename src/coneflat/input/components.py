@@ -17,7 +17,7 @@ from ..options import Options
 from ..seams import CutMesh, edge_costs, open_along
 from ..text import list_some, plural
 from .arrays import InputMesh, as_input
-from .constraints import Wishes, locate_wishes
+from .constraints import Constraints, locate_constraints
 from .marked_edges import effective_marks, marked_edges, named_edges
 from .numbering import at_unit_size, turn_corners
 from .validation import CheckedMesh, check_mesh
@@ -34,7 +34,7 @@ class Component:
         is_avoided: (m, 3) sides inside a polygon of the input, which should not be cut.
         is_forbidden: (m, 3) sides that must not be cut.
         visibility: (n,) what can be seen of each vertex, if that matters.
-        wishes: what the user says of its vertices.
+        constraints: what the user says of its vertices.
     """
 
     mesh: TriangleMesh
@@ -44,7 +44,7 @@ class Component:
     is_avoided: BoolArray
     is_forbidden: BoolArray
     visibility: FloatArray | None
-    wishes: Wishes
+    constraints: Constraints
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
         names=checked.face_origin,
     )
     is_diagonal = turn_corners(checked, ~given.is_side())
-    wishes = locate_wishes(checked, options, given)
+    constraints = locate_constraints(checked, options, given)
     notes = [] if note is None else [note]
     forbidden = np.zeros(len(checked.mesh.edges), dtype=bool)
     if options.forbidden_seams is not None:
@@ -91,9 +91,9 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
     if options.marks_seams:
         marked, alone = effective_marks(checked.mesh, marked_edges(checked, options, given, forbidden))
         if len(alone):
-            notes.append(_nothing_cut(wishes.names[checked.mesh.edges[alone]]))
-        wishes.keep_off(checked.mesh.edges[marked])
-        wishes = wishes.with_marks(checked.mesh.edges[marked])
+            notes.append(_nothing_cut(constraints.names[checked.mesh.edges[alone]]))
+        constraints.keep_off(checked.mesh.edges[marked])
+        constraints = constraints.with_marks(checked.mesh.edges[marked])
         opened = open_along(checked.mesh, marked)
     seen = None
     if options.hide_seams:
@@ -111,7 +111,7 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
                 is_diagonal[part_faces],
                 forbidden[checked.mesh.halfedge_edges].reshape(-1, 3)[part_faces],
                 None if seen is None else seen[origin],
-                wishes.within(origin),
+                constraints.within(origin),
             )
 
     return Prepared(given, checked, tuple(notes), tuple(components()), checked.mesh.edges[marked])
@@ -131,6 +131,6 @@ def seam_costs(part: Component, options: Options) -> tuple[FloatArray, BoolArray
         creases=options.creases,
         hiding=options.hide_seams,
         visibility=part.visibility,
-        vertex_weights=part.wishes.seam_weights,
+        vertex_weights=part.constraints.seam_weights,
     )
     return costs, part.is_avoided.ravel()[sides], part.is_forbidden.ravel()[sides]

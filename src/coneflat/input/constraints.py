@@ -41,7 +41,7 @@ class VertexCurvatures:
 
 
 @dataclass(frozen=True, eq=False)
-class Wishes:
+class Constraints:
     """What the user says about the vertices of a mesh.
 
     Attributes:
@@ -64,8 +64,8 @@ class Wishes:
     seam_weights: FloatArray | None = None
     on_marks: BoolArray | None = None
 
-    def without(self, vertices: IntArray) -> Wishes:
-        """Return wishes that forbid cones at some vertices, too."""
+    def without(self, vertices: IntArray) -> Constraints:
+        """Return constraints that forbid cones at some vertices, too."""
         is_allowed = self.is_allowed.copy()
         is_allowed[vertices] = False
         return replace(self, is_allowed=is_allowed)
@@ -78,15 +78,15 @@ class Wishes:
                     f"cone {self.names[vertex]} lies on a seam that is marked, which takes what curvature it needs"
                 )
 
-    def with_marks(self, seams: IntArray) -> Wishes:
-        """Return wishes that know the marked seams, given by vertices."""
+    def with_marks(self, seams: IntArray) -> Constraints:
+        """Return constraints that know the marked seams, given by vertices."""
         on_marks = np.zeros(len(self.names), dtype=bool)
         on_marks[seams] = True
         return replace(self, on_marks=on_marks)
 
-    def within(self, component: IntArray) -> Wishes:
+    def within(self, component: IntArray) -> Constraints:
         """Return what is said of a component, numbered there; `component` are its vertices, ascending."""
-        return Wishes(
+        return Constraints(
             self.names[component],
             self.cones.within(component),
             self.corners.within(component),
@@ -103,12 +103,12 @@ def _weights_within(weights: FloatArray | None, component: IntArray) -> FloatArr
     return None if weights is None or not weights[component].any() else at_unit_scale(weights[component])
 
 
-def locate_wishes(checked: CheckedMesh, options: Options, given: InputMesh) -> Wishes:
+def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh) -> Constraints:
     """Return what the options say of the input's vertices for those of the checked mesh.
 
     Args:
         checked: the mesh.
-        options: where the wishes stand.
+        options: where the constraints stand.
         given: the input.
 
     Raises:
@@ -131,7 +131,7 @@ def locate_wishes(checked: CheckedMesh, options: Options, given: InputMesh) -> W
         if name in options.forbidden_cones:
             raise OptionError(f"vertex {name} is both a required and a forbidden cone")
     is_allowed[required.vertices] = True
-    return Wishes(
+    return Constraints(
         names,
         _locate(checked, "cone", options.given_cones),
         _locate(checked, "corner", options.corners),

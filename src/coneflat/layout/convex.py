@@ -48,13 +48,13 @@ def make_convex(
     chosen = np.unique(owner[is_bad & ~_concave_in_space(polygons, positions)[owner]])
     mesh = TriangleMesh(points, uv_faces)
     movable = ~mesh.is_boundary_vertex
-    wished = np.unique(triples[np.isin(owner, chosen)])
-    wished = wished[movable[wished]]
-    if not len(wished):
+    wanted = np.unique(triples[np.isin(owner, chosen)])
+    wanted = wanted[movable[wanted]]
+    if not len(wanted):
         return points
     # What is concave in space may be so in the plane; it must not stand in the way of others.
     hopeless = np.isin(owner, np.setdiff1d(owner[is_bad], chosen))
-    return _moved(points, np.concatenate([uv_faces, triples[~hopeless]]), wished)
+    return _moved(points, np.concatenate([uv_faces, triples[~hopeless]]), wanted)
 
 
 def _moved(points: FloatArray, triangles: IntArray, moving: IntArray) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class SolveFigures:
+class SolveStatistics:
     """How a metric and its layout were found.
 
     Attributes:
@@ -40,8 +40,8 @@ class SolveFigures:
     area_distortion: float = 0.0
 
     @classmethod
-    def of_all(cls, parts: Sequence[SolveFigures], areas: Sequence[float]) -> SolveFigures:
-        """Return the figures of components together: counts add up, deviations combine by area."""
+    def of_all(cls, parts: Sequence[SolveStatistics], areas: Sequence[float]) -> SolveStatistics:
+        """Return the statistics of components together: counts add up, deviations combine by area."""
         values = {}
         for field in fields(cls):
             every = np.array([getattr(part, field.name) for part in parts])

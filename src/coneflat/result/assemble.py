@@ -20,7 +20,7 @@ from ..options import CONED, Options
 from ..progress import Stages
 from ..quality.distortion import curvature_errors, measure
 from ..quality.rotations import Rotations, measure_rotations
-from ..quality.statistics import SolveFigures
+from ..quality.statistics import SolveStatistics
 from .flattening import Flattening
 from .promises import broken_promises
 
@@ -69,7 +69,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         uv = np.empty_like(points)
         uv[corners] = packed.corner_uv
 
-    refined = any(one.figures.refined_triangles for one in laid_out)
+    refined = any(one.statistics.refined_triangles for one in laid_out)
     face_corners = (
         None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
     )
@@ -123,8 +123,8 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
             *[POLYGONS_LOST] * (refined and given.source is not None),
         ),
         settings=options.as_dict(),
-        solve=SolveFigures.of_all(
-            [one.figures for one in laid_out], [one.area if len(laid_out) > 1 else 1.0 for one in laid_out]
+        solve=SolveStatistics.of_all(
+            [one.statistics for one in laid_out], [one.area if len(laid_out) > 1 else 1.0 for one in laid_out]
         ),
         rotations=rotations,
         vertex_origin=np.concatenate([vertex_origin, np.full(len(positions) - len(vertex_origin), -1)]),

@@ -12,7 +12,7 @@ from .._arrays import FloatArray, IntArray
 from ..input.mesh_file import MeshFile
 from ..quality.distortion import Distortion
 from ..quality.rotations import Rotations
-from ..quality.statistics import SolveFigures
+from ..quality.statistics import SolveStatistics
 from ..text import plural
 
 
@@ -67,7 +67,7 @@ class Flattening:
     seconds: Mapping[str, float]
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
-    solve: SolveFigures = field(default_factory=SolveFigures)
+    solve: SolveStatistics = field(default_factory=SolveStatistics)
     solvers: tuple[str, ...] = ()
     rotations: Rotations | None = None
     vertex_origin: IntArray | None = None

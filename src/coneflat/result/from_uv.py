@@ -9,7 +9,7 @@ from ..geometry import double_areas, edge_lengths
 from ..input.join import Joined
 from ..quality.checker import cell_side
 from ..quality.distortion import angle_sum_errors, seams_of
-from ..quality.statistics import SolveFigures
+from ..quality.statistics import SolveStatistics
 from .flattening import Flattening
 from .mapped import Mapped, has_uv, of_file
 from .measure_uv import measure_mapped, uv_points
@@ -77,7 +77,7 @@ def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
         seconds={},
         notes=measured.notes,
         settings={"method": OWN},
-        solve=SolveFigures(),
+        solve=SolveStatistics(),
         source=mapped.source,
     )
 

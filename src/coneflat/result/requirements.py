@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 
 from ..errors import OptionError
-from ..quality.statistics import SolveFigures
+from ..quality.statistics import SolveStatistics
 from .report import MEASURES
 
 _FORM = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*(?P<relation><=|>=|==|=|<|>)\s*(?P<bound>\S+)\s*")
@@ -27,7 +27,7 @@ REPORTED = (
     "triangles",
     "cones",
     *MEASURES,
-    *(field.name for field in fields(SolveFigures)),
+    *(field.name for field in fields(SolveStatistics)),
     "rotation_deviation",
     "packing_efficiency",
     "uv_scale",

@@ -14,7 +14,7 @@ from ...errors import OptionError
 from ...geometry import corner_angles
 from ...layout.least_squares import fit_shapes, shapes_of_angles
 from ...mesh import TriangleMesh
-from ...quality.statistics import SolveFigures
+from ...quality.statistics import SolveStatistics
 from ...text import plural
 from ..base import LaidOut, failure_notes, laid_out_at, off_by
 from .conditions import (
@@ -74,9 +74,9 @@ class AngleMetric:
                 *notes,
                 f"{plural(broken, 'triangle')} got an angle below 0: method 'abf++' allows none.",
             )
-        figures = SolveFigures(newton_steps=found.steps, residual=found.residual, broken=broken)
+        statistics = SolveStatistics(newton_steps=found.steps, residual=found.residual, broken=broken)
         points = fit_shapes(disk, shapes, self.lengths)
-        return laid_out_at(points, self.mesh, disk, seams, self.lengths, self.solution, figures, notes)
+        return laid_out_at(points, self.mesh, disk, seams, self.lengths, self.solution, statistics, notes)
 
 
 def angle_based(

@@ -13,7 +13,7 @@ from ...geometry.straight import FlatTriangles, straight_triangles
 from ...layout.unfold import unfold
 from ...layout.untangle import untangle
 from ...mesh import TriangleMesh
-from ...quality.statistics import SolveFigures
+from ...quality.statistics import SolveStatistics
 from ...seams import cut_open
 from ...text import plural
 from ..base import LaidOut, all_faces, failure_notes, laid_out_curvature, off_by
@@ -96,9 +96,9 @@ class ExactFlatMetric:
     notes: tuple[str, ...] = ()
 
     @property
-    def figures(self) -> SolveFigures:
+    def statistics(self) -> SolveStatistics:
         """How the metric was found."""
-        return SolveFigures(
+        return SolveStatistics(
             newton_steps=self.solved.steps,
             euclidean_flips=self.solved.euclidean_flips,
             ptolemy_flips=self.solved.ptolemy_flips,
@@ -133,8 +133,8 @@ class ExactFlatMetric:
             # Where the boundary is free, what comes out is what was wanted.
             target=np.where(self.is_open, curvature, self.target),
             curvature=curvature,
-            figures=replace(
-                self.figures,
+            statistics=replace(
+                self.statistics,
                 untangled_triangles=int(flat.is_inverted.sum()),
                 untangled_vertices=len(untangled.moved),
                 untangled_move=untangled.largest_move,
@@ -165,7 +165,7 @@ class ExactFlatMetric:
             log_scale=refined.log_scale + np.log(self.shrink),
             target=np.concatenate([self.target, np.zeros(len(mesh.vertices) - len(self.target))]),
             curvature=laid_out_curvature(mesh, points[disk.faces]),
-            figures=replace(self.figures, refined_triangles=len(mesh.faces) - len(self.mesh.faces)),
+            statistics=replace(self.statistics, refined_triangles=len(mesh.faces) - len(self.mesh.faces)),
             notes=self.notes,
         )
 

@@ -123,7 +123,7 @@ def test_cones_that_triangles_cannot_hold_are_avoided():
         ({"boundary": "straight", "cones": "greedy"}, errors.OptionError, "pursuit"),
     ],
 )
-def test_wishes_that_make_no_sense(options, kind, message):
+def test_constraints_that_make_no_sense(options, kind, message):
     with pytest.raises(kind, match=message):
         flatten(*shapes.sphere(2), **options)
 
@@ -166,7 +166,7 @@ def test_on_the_command_line(files, monkeypatch, arguments, told):
         assert told in message
 
 
-def test_a_wish_brings_cones_where_the_boundary_is_prescribed():
+def test_a_constraint_brings_cones_where_the_boundary_is_prescribed():
     vertices, faces = shapes.hill()
     assert len(flatten(vertices, faces, boundary="disk").cones) == 0
     assert len(flatten(vertices, faces, boundary="disk", cone_count=3).cones) == 3
