@@ -7,6 +7,7 @@ import pytest
 import shapes
 
 from coneflat import PAPER, corner_angles, edge_lengths, errors, flatten, read_mesh
+from coneflat.apps.compare.run import flatten as flatten_by_any
 from coneflat.cones import ConeSolution
 from coneflat.flat.angle_based import flatten as abf
 from coneflat.flat.angle_based.conditions import angle_conditions, wanted_angles
@@ -216,13 +217,13 @@ def test_what_did_not_converge_is_refused_or_noted(monkeypatch):
 
 @pytest.mark.parametrize("method", BOTH)
 def test_a_cut_without_cones_is_noted(method):
-    result = flatten(*shapes.annulus(), method=f"{method}/free")
+    result = flatten_by_any(*shapes.annulus(), method=f"{method}/free")
     assert not len(result.cones)
     assert len(result.seams)
     assert result.notes == (
         "The mesh was cut first: the angles of cones, and lengths along seams, were left free.",
     )
-    assert not flatten(*shapes.hill(), method=f"{method}/free", cones="none").notes
+    assert not flatten_by_any(*shapes.hill(), method=f"{method}/free", cones="none").notes
 
 
 def test_negative_angles_are_noted():
@@ -288,11 +289,13 @@ def test_real_models(shared, name):
 
 def test_free_cones_are_an_option():
     mesh = shapes.sphere(3)
-    free = flatten(*mesh, method="abf++/free")
+    free = flatten_by_any(*mesh, method="abf++/free")
     held = flatten(*mesh, method="abf++")
     assert free.distortion.seam_mismatch > 1e-3 > 1e-9 > held.distortion.seam_mismatch
     with pytest.raises(errors.OptionError, match="unknown method 'lscm/free'"):
-        flatten(*mesh, method="lscm/free")
+        flatten_by_any(*mesh, method="lscm/free")
+    with pytest.raises(errors.OptionError, match=r"unknown method 'abf\+\+/free'"):
+        flatten(*mesh, method="abf++/free")
 
 
 def test_angles_that_round_to_nothing_are_wanted_a_little_wider():

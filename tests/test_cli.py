@@ -13,9 +13,9 @@ import threading
 import numpy as np
 import pytest
 import shapes
+from coneflat.apps.cli.given import parse_angle, parse_curvature, parse_vertices
 
 from coneflat import errors, read_mesh
-from coneflat.apps.cli.given import parse_angle, parse_curvature, parse_vertices
 
 #: A line of progress, which comes by the clock.
 PROGRESS = re.compile(r" *\d+\.\d s +\d+%  .*")
@@ -106,12 +106,22 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "--epsilon", "few"], "not a valid float"),
         (["model.obj", "--max-cones", "0"], "0 cones of at most 1.5 pi each cannot carry"),
         (["model.obj", "--cones", "magic"], "magic"),
-        (["model.obj", "--cone", "1:pi", "--cone", "2"], "vertex 2 has none"),
-        (["model.obj", "--cone", "1:pi", "--cone", "2:pi"], "sum to 6.283185 (2 pi)"),
-        (["model.obj", "--cone", "x"], "'x' is not VERTEX"),
-        (["model.obj", "--cone", "1", "--max-cones", "3"], "leave out --max-cones"),
+        (["model.obj", "--cones", "1:pi,2"], "vertex 2 has none"),
+        (["model.obj", "--cones", "1:pi", "--cones", "2:pi"], "sum to 6.283185 (2 pi)"),
+        (["model.obj", "--cones", "1x"], "'1x' is not VERTEX"),
+        (["model.obj", "--cones", "1", "--max-cones", "3"], "leave out --max-cones"),
         (["model.obj", "--paper", "--epsilon", "1"], "leave out --epsilon"),
         (["model.obj", "--magic"], "--magic"),
+        (["model.obj", "--cone", "1"], "--cone is now --cones"),
+        (["model.obj", "--cones-file", "a"], "--cones-file is now --cones"),
+        (["model.obj", "--corner", "1"], "--corner is now --boundary"),
+        (["model.obj", "--forbid", "1"], "--forbid is now --forbidden-cones"),
+        (["model.obj", "--only", "1"], "--only is now --allowed-cones"),
+        (["model.obj", "--keep-seams"], "--keep-seams is now --seams input"),
+        (["model.obj", "--require", "3"], "--required-cones 3"),
+        (["model.obj", "--at-cones", "scale"], "there is no option --at-cones any more"),
+        (["model.obj", "--lengths", "mean"], "there is no option --lengths any more"),
+        (["model.obj", "--hide-seams", "much"], "not a valid float"),
         (["empty.obj"], "empty.obj"),
         (["text.ply"], "text.ply"),
         (["model.xyz"], ".xyz"),
@@ -134,7 +144,7 @@ def test_bad_input_is_one_line_and_exit_code_2(model, tmp_path, arguments, messa
 def test_cones_from_a_file(model, tmp_path):
     def flatten(text):
         (tmp_path / "cones.txt").write_text(text)
-        return run("flatten", model, "--cones-file", "cones.txt", "--report", "report.json", cwd=tmp_path)
+        return run("flatten", model, "--cones", "cones.txt", "--report", "report.json", cwd=tmp_path)
 
     done = flatten("# vertex curvature\n3 pi/2\n\n50, 270deg\n100 pi # the third\n120  1.0pi\n")
     assert done.returncode == 0, done.stderr
@@ -267,13 +277,15 @@ def test_marked_seams(tmp_path):
         done = run("flatten", "box.obj", "-q", "--seams", "pairs.txt", cwd=tmp_path)
         assert done.returncode == 2
         assert message in done.stderr
-    done = run("flatten", "box.obj", "-q", "--seams", "pairs.txt", "--keep-seams", cwd=tmp_path)
-    assert "leave out --keep-seams" in done.stderr
-    done = run("flatten", "box.obj", "-q", "--keep-seams", cwd=tmp_path)
+    done = run("flatten", "box.obj", "-q", "--seams", "pairs.txt", "--seams", "input", cwd=tmp_path)
+    assert "--seams input is one choice" in done.stderr
+    done = run("flatten", "box.obj", "-q", "--seams", "input", cwd=tmp_path)
     assert "no UV coordinates" in done.stderr
 
 
-@pytest.mark.parametrize(("ending", "charts"), [("obj", "atlas"), ("glb", "atlas"), ("ply", "one")])
+@pytest.mark.parametrize(
+    ("ending", "charts"), [("obj", "atlas"), ("glb", "atlas"), ("ply", "atlas"), ("npz", "atlas")]
+)
 def test_what_is_to_be_textured_becomes_an_atlas(model, tmp_path, ending, charts):
     for extra, expected in (((), charts), (("--charts", "one"), "one"), (("--paper",), "one")):
         done = run(

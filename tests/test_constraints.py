@@ -141,16 +141,17 @@ def files(tmp_path, ball):
     ("arguments", "told"),
     [
         (["--weights", "quality", "--min-cone-angle", "90deg"], None),
-        (["--weights", "weights.txt", "--forbid", "face.txt", "--require", "3"], None),
-        (["--cone-count", "6", "--positive-only", "--only", "1,5,9,33,81,160,200,333,401"], None),
+        (["--weights", "weights.txt", "--forbidden-cones", "face.txt", "--required-cones", "3"], None),
+        (["--cone-count", "6", "--positive-only", "--allowed-cones", "1,5,9,33,81,160,200,333,401"], None),
         (["--quantise", "pi/2", "--distortion", "0.3"], None),
+        (["--quantize", "pi/2", "--hide-seams", "--creases", "2"], None),
         (["--weights", "nothing"], "it has red, green, blue, quality"),
-        (["--forbid", "a,b"], "'a' is no vertex"),
+        (["--forbidden-cones", "a,b"], "'a' is no vertex"),
         (["--min-cone-angle", "wide"], "is no angle"),
         (["--cone-count", "5", "--distortion", "0.1"], "leave out --distortion"),
         (["--cones", "greedy", "--quantise", "pi/2"], "leave out --quantise"),
         (["--paper", "--distortion", "0.1"], "leave out --distortion"),
-        (["--cone", "3", "--weights", "quality"], "leave out --weights"),
+        (["--cones", "3", "--weights", "quality"], "leave out --weights"),
     ],
 )
 def test_on_the_command_line(files, monkeypatch, arguments, told):

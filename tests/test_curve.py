@@ -66,7 +66,7 @@ def test_the_command_writes_cones_that_flatten_reads(model, tmp_path, monkeypatc
     done = CliRunner().invoke(cli, ["cones", str(model), "--distortion", "0.1", "-o", "ball.cones"])
     assert done.exit_code == 0, done.output
     assert "area distortion 0.0" in done.output
-    again = CliRunner().invoke(cli, ["flatten", str(model), "--cones-file", "ball.cones", "-q"])
+    again = CliRunner().invoke(cli, ["flatten", str(model), "--cones", "ball.cones", "-q"])
     assert again.exit_code == 0, again.output
 
 

@@ -64,7 +64,7 @@ def test_a_flat_torus_does_not_turn():
 @pytest.mark.parametrize("name", ["sphere", "hill"])
 def test_without_handles_seams_turn_by_quarters(name):
     shape = {"sphere": shapes.sphere(3), "hill": shapes.hill()}[name]
-    result = flatten(*shape, quantum=QUARTER, boundary="straight")
+    result = flatten(*shape, quantise=QUARTER, boundary="straight")
     assert result.rotations.worst < 1e-8
     assert result.rotations.handles == ()
     np.testing.assert_allclose(off_multiple(result.curvatures, QUARTER), 0, atol=1e-12)
@@ -72,9 +72,9 @@ def test_without_handles_seams_turn_by_quarters(name):
 
 @pytest.mark.parametrize("shape", [shapes.torus(), shapes.genus(2)])
 def test_handles(shape):
-    plain = flatten(*shape, quantum=QUARTER)
+    plain = flatten(*shape, quantise=QUARTER)
     assert plain.distortion.flipped == 0
-    exact = flatten(*shape, quantum=QUARTER, correct_handles=True)
+    exact = flatten(*shape, quantise=QUARTER, correct_handles=True)
     assert exact.rotations.worst < 1e-8
     assert exact.distortion.curvature_error_max < 1e-9
     assert exact.distortion.seam_mismatch_max < 1e-9
@@ -87,7 +87,7 @@ def test_handles(shape):
     "name", ["hand.obj", "bunny.obj", "fandisk.obj", "elephant.obj", "rocker-arm.obj", "3holes.off"]
 )
 def test_real_models(shared, name):
-    result = flatten(read_mesh(shared(name)), quantum=QUARTER, correct_handles=True)
+    result = flatten(read_mesh(shared(name)), quantise=QUARTER, correct_handles=True)
     assert result.rotations.worst <= 1e-8
     assert result.distortion.flipped == 0
     assert result.solve.area_distortion <= 0.25

@@ -114,12 +114,12 @@ def test_costs_of_seams_that_overflow_when_summed():
 @pytest.mark.parametrize("quantum", [1e-20, 1e-300, LEAST_QUANTUM / 2, math.nan, math.inf, -1.0, 7.0])
 def test_a_quantum_outside_its_bounds_is_refused_with_them(quantum):
     with pytest.raises(errors.OptionError, match="quantum must be from 0.0001 radians"):
-        coneflat.flatten(*shapes.sphere(1), quantum=quantum)
+        coneflat.flatten(*shapes.sphere(1), quantise=quantum)
 
 
 def test_the_least_quantum_gives_its_multiples():
     quantum = 2 * math.pi / 60_000
-    result = coneflat.flatten(*shapes.sphere(2), quantum=quantum, max_cone_angle=None)
+    result = coneflat.flatten(*shapes.sphere(2), quantise=quantum, max_cone_angle=None)
     units = result.curvatures / quantum
     assert np.allclose(units, np.round(units), atol=1e-5)
 

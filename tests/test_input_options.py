@@ -153,13 +153,13 @@ class TestJoining:
         path = write_obj(tmp_path / "soup.obj", vertices, faces)
         used = read_joined(path).used
         merged = np.flatnonzero(used != np.arange(len(used)))
-        words = [word for v in merged[[5, 40, 80]] for word in ("--require", v)]
+        words = [word for v in merged[[5, 40, 80]] for word in ("--required-cones", v)]
         done = run("flatten", path, "-q", "-o", "a.obj", "--report", "a.json", *words)
         assert done.exit_code == 0, done.output
         found = json.loads((tmp_path / "a.json").read_text())
         assert set(used[merged[[5, 40, 80]]].tolist()) <= set(found["cone_vertices"])
         one = int(merged[0])
-        done = run("flatten", path, "--cone", one, "--cone", int(used[one]), "--cone", 7)
+        done = run("flatten", path, "--cones", f"{one},{int(used[one])},7")
         assert "lie at the same place" in str(done.exception)
 
 
@@ -319,7 +319,7 @@ def test_seams_of_a_ply_are_kept(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     first = coneflat.flatten(*shapes.sphere(2), charts="atlas")
     first.save("first.ply")
-    done = run("flatten", "first.ply", "-q", "-o", "again.npz", "--charts", "atlas", "--keep-seams")
+    done = run("flatten", "first.ply", "-q", "-o", "again.npz", "--charts", "atlas", "--seams", "input")
     assert done.exit_code == 0
     again = coneflat.read_flattening("again.npz")
     middles = [np.sort(each.vertices[each.seams].mean(axis=1), axis=0) for each in (first, again)]

@@ -14,7 +14,7 @@ from coneflat.errors import ConeflatError, MeshFileError
 
 @pytest.fixture(scope="module")
 def result():
-    return coneflat.flatten(*shapes.hill(), quantum=np.pi / 2)
+    return coneflat.flatten(*shapes.hill(), quantise=np.pi / 2)
 
 
 class TestReadingResults:

@@ -36,10 +36,14 @@ def boundary_loop(vertices, faces):
 
 
 @pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("at_cones", ["scale", "curvature"])
-def test_angles_of_the_layout_are_flat_but_at_cones(name, at_cones):
+@pytest.mark.parametrize("prescribed", ["scale", "curvature"])
+def test_angles_of_the_layout_are_flat_but_at_cones(name, prescribed):
     vertices, faces = SHAPES[name]
-    result = flatten(vertices, faces, cones="greedy", epsilon=0.5, at_cones=at_cones)
+    greedy = {"cones": "greedy", "epsilon": 0.5}
+    if prescribed == "curvature":
+        found = flatten(vertices, faces, method="linear", charts="one", **greedy)
+        greedy = {"cones": dict(zip(found.cones.tolist(), found.curvatures.tolist(), strict=True)) or "none"}
+    result = flatten(vertices, faces, charts="one", **greedy)
     d = result.distortion
     assert d.flipped == d.degenerate == 0
     assert d.curvature_error_max < 1e-10
@@ -49,7 +53,7 @@ def test_angles_of_the_layout_are_flat_but_at_cones(name, at_cones):
     expected = np.full(len(vertices), 2 * np.pi)
     expected[result.cones] -= result.curvatures
     np.testing.assert_allclose(turned_angles(result)[inside], expected[inside], atol=1e-8)
-    if at_cones == "scale" and len(result.cones):
+    if prescribed == "scale" and len(result.cones):
         np.testing.assert_allclose(np.ptp(result.log_scale[result.cones]), 0, atol=1e-12)
 
 
@@ -132,10 +136,8 @@ def test_boundary_lengths_are_kept():
         ({"boundary": [0, 1]}, errors.CurvatureError, "corner 0 would have a curvature of 1 pi"),
         ({"boundary": {0: 3.0, 1: 3.0}}, errors.CurvatureError, r"must sum to 2 pi, but sum to 1\.90986 pi"),
         ({"boundary": "disk", "method": "linear"}, errors.OptionError, "has a free boundary"),
-        ({"boundary": "disk", "at_cones": "scale"}, errors.OptionError, "prescribed boundary needs"),
-        ({"cones": {40: 1.0}, "at_cones": "scale"}, errors.OptionError, "give positions only"),
         ({"refine": True, "method": "linear"}, errors.OptionError, "no common subdivision"),
-        ({"at_cones": "both"}, errors.OptionError, "unknown at_cones 'both'"),
+        ({"at_cones": "scale"}, errors.OptionError, "no option at_cones any more"),
     ],
 )
 def test_bad_choices_are_named(options, kind, message):

@@ -111,12 +111,12 @@ class TestFlatten:
         assert not (folder / "a.obj").exists()
 
     def test_vertices_and_measures_go_together(self, folder):
-        words = ("--require", "3", "--require", "flipped=0", "--report", "r.json")
+        words = ("--required-cones", "3", "--require", "flipped=0", "--report", "r.json")
         done = run("flatten", "ball.obj", "-q", "-o", "a.obj", *words)
         assert done.exit_code == 0
         assert 3 in json.loads((folder / "r.json").read_text())["cone_vertices"]
-        done = run("flatten", "ball.obj", "--cones", "none", "--require", "3")
-        assert "leave out --require" in str(done.output)
+        done = run("flatten", "ball.obj", "--cones", "none", "--required-cones", "3")
+        assert "leave out --required-cones" in str(done.output)
         assert run("flatten", "hill.obj", "-q", "--cones", "none", "--require", "flipped=0").exit_code == 0
 
 

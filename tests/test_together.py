@@ -61,7 +61,7 @@ def test_seams_keep_to_the_quanta_of_all(rotate):
     x, y, z = vertices.T
     limbs = vertices * (1 + 2.5 * np.abs(np.cos(2.5 * np.arctan2(y, x))) ** 6 * (1 - z**2))[:, None]
     before = [
-        coneflat.flatten(limbs, faces, quantum=2 * np.pi / parts, charts="atlas", distortion=0.1)
+        coneflat.flatten(limbs, faces, quantise=2 * np.pi / parts, charts="atlas", distortion=0.1)
         for parts in (4, 6)
     ]
     assert min(one.distortion.charts for one in before) > 1

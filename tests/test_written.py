@@ -145,7 +145,7 @@ def test_marked_seams_of_an_obj_turn_freely_whatever_its_diagonals(tmp_path):
     # All around the quads of one triangle of the ball.
     sides = {(a, b) for row in faces[:3].tolist() for a, b in zip(row, row[1:] + row[:1], strict=True)}
     ring = np.array(sorted((a, b) for a, b in sides if (b, a) not in sides))
-    result = flatten(tmp_path / "in.obj", seams=ring, quantum=np.pi / 2, charts="atlas")
+    result = flatten(tmp_path / "in.obj", seams=ring, quantise=np.pi / 2, charts="atlas")
     written = result.as_written(".obj")
     edges, others = (
         set(map(tuple, TriangleMesh(vertices, one.faces).edges.tolist())) for one in (result, written)

@@ -73,7 +73,7 @@ def curvature_figure(path: Path) -> Any:
 def quarters_figure(path: Path) -> Any:
     """Return a figure of a model with a checkerboard: with any cones, and with cones of whole quarter turns."""
     free = coneflat.flatten(path)
-    quarters = coneflat.flatten(path, quantum=np.pi / 2, correct_handles=True)
+    quarters = coneflat.flatten(path, quantise=np.pi / 2, correct_handles=True)
     assert quarters.rotations is not None
     off = f"{quarters.rotations.worst:.0e}"
     labels = (

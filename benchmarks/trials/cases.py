@@ -60,7 +60,7 @@ def warm_up() -> None:
 
     for charts in ("one", "atlas"):
         for mesh in (shapes.hill(6, 5), shapes.sphere(1), shapes.torus(8, 5)):
-            coneflat.flatten(*mesh, charts=charts, quantum=np.pi / 2 if charts == "one" else None)
+            coneflat.flatten(*mesh, charts=charts, quantise=np.pi / 2 if charts == "one" else None)
 
 
 def _resident(name: str) -> float:

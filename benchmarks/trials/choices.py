@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from coneflat.options import PURSUIT_FIELDS
+from coneflat.options.declared import ASKING
 
 from .topology import Topology
 
@@ -16,19 +16,16 @@ Random = np.random.Generator
 METHODS = (
     "linear",
     "circle-patterns",
-    "circle-patterns/fixed",
     "ricci",
     "linear-abf",
-    "linear-abf/free",
     "abf++",
-    "abf++/free",
     "lscm",
     "spectral",
     "bff",
 )
 #: What the exact method alone has, and what a search for cones alone has.
-OF_EXACT = ("boundary", "at_cones", "refine", "correct_handles")
-OF_SEARCH = (*PURSUIT_FIELDS, "correct_handles")
+OF_EXACT = ("boundary", "refine", "correct_handles")
+OF_SEARCH = (*ASKING, "correct_handles")
 INVALID = (None, -1, 0, 1e308, 1e-300, math.nan, math.inf, "abc", "", [], (), {}, [1], [[0, 1]], True, 2**70)
 
 
@@ -66,7 +63,7 @@ def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[s
     maybe(0.05, "allowed_cones", some(inside, max(1, size // 2)))
     maybe(
         0.16,
-        "quantum",
+        "quantise",
         math.pi / 2,
         math.pi / 2,
         math.pi / 3,
@@ -75,10 +72,8 @@ def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[s
         0.1,
         rng.uniform(1e-3, 6),
     )
-    maybe(0.3 if "quantum" in options else 0, "correct_handles", True)
+    maybe(0.3 if "quantise" in options else 0, "correct_handles", True)
     maybe(0.03, "epsilon", 0.1, 1e-3, 10.0)
-    maybe(0.02, "length_rule", "mean")
-    maybe(0.08, "at_cones", "scale", "curvature")
     if len(border):
         maybe(0.3, "boundary", "lengths", "lengths", "disk", "disk", "straight", "straight", some(border, 6))
         if rng.random() < 0.05:
@@ -112,7 +107,7 @@ def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[s
     if rng.random() < 0.03:
         names = (
             "distortion",
-            "quantum",
+            "quantise",
             "cones",
             "boundary",
             "seams",
@@ -166,10 +161,8 @@ def _drop_clashes(rng: Random, options: dict[str, Any]) -> None:
             options.pop(name, None)
         if options["method"] not in (
             "circle-patterns",
-            "circle-patterns/fixed",
             "ricci",
             "abf++",
-            "abf++/free",
         ):
             options.pop("best_effort", None)
     if not isinstance(options.get("cones", "auto"), str) or options.get("cones") in ("greedy", "none"):
@@ -177,10 +170,6 @@ def _drop_clashes(rng: Random, options: dict[str, Any]) -> None:
             options.pop(name, None)
         if options.get("boundary") == "straight":
             del options["boundary"]
-    if options.get("at_cones") == "scale" and (
-        isinstance(options.get("cones"), dict) or options.get("boundary", "free") not in ("free", "lengths")
-    ):
-        del options["at_cones"]
     if options.get("padding", 2.0) >= options.get("resolution", 1024) / 4:
         options["padding"] = 0.0
     if "allowed_cones" in options and "forbidden_cones" in options:

@@ -229,7 +229,7 @@ def _check_boundary_turns(trial: Trial) -> None:
     curvature = np.pi - _angle_sums(trial)
     slack = ANGLE + _angle_rounding(trial)
     if trial.boundary == "straight":
-        quantum = trial.options.get("quantum")
+        quantum = trial.options.get("quantise")
         # Corners are found like cones, and may be many; between them sides are straight.
         off = topology.is_border & (np.abs(curvature - np.nan_to_num(result.prescribed)) > slack)
         if off.any() and quantum is None:
@@ -270,7 +270,7 @@ def _check_boundary_turns(trial: Trial) -> None:
 
 def _check_rotations(trial: Trial) -> None:
     """With a quantum the sides of seams are turned by multiples of it; the report says by how much they are off."""
-    quantum = trial.options.get("quantum")
+    quantum = trial.options.get("quantise")
     if quantum is None:
         return
     here, there = trial.topology.sides.T
@@ -346,7 +346,7 @@ def _check_cones(trial: Trial) -> None:
         trial.broken("cones", f"cones: not so many{why}", f"{len(cones)} instead of {count}")
     if options.get("positive_only") and (curvatures < -ANGLE).any():
         trial.broken("cones", "cones: negative", curvatures.min())
-    quantum = options.get("quantum")
+    quantum = options.get("quantise")
     if quantum is not None and len(cones) and plane.off_multiple(curvatures, quantum).max() > ANGLE:
         trial.broken("rotation", "cones: no multiples", plane.off_multiple(curvatures, quantum).max())
 

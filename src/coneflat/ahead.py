@@ -37,7 +37,7 @@ def compile_kernels() -> None:
     flatten(points * [10, 1, 1], faces)  # has triangles to be turned over
     for method in ("ricci", "circle-patterns"):
         flatten(*_tube(closed=True), method=method)
-    flatten(*_tube(closed=True), quantum=np.pi / 2)
+    flatten(*_tube(closed=True), quantise=np.pi / 2)
     visible_share(*_tube(closed=True))
     flatten(*_tube(closed=False), boundary="disk", best_effort=True)
     _make_a_dart_convex()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +14,8 @@ from .cones.choose import Surface, only_choice, search_on
 from .errors import OptionError
 from .geometry.operators import area_distortion, weighted_areas
 from .input.components import Component, prepare
-from .options import Options
-from .progress import Progress, Stages
-from .text import shown
+from .options import CurveOptions, FindOptions, Options, read_options, takes
+from .progress import Stages
 from .threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -68,98 +65,49 @@ class ConeCurve:
         return int(counts[np.argmin(counts / (across or 1) + distortions / (down or 1.0))])
 
 
-def find_cones(
-    mesh: Any,
-    faces: ArrayLike | None = None,
-    *,
-    distortion: float = 0.2,
-    cone_count: int | None = None,
-    min_cone_angle: float = math.pi / 2,
-    max_cone_angle: float | None = 4 * math.pi,
-    positive_only: bool = False,
-    weights: ArrayLike | str | None = None,
-    required_cones: Iterable[int] = (),
-    forbidden_cones: Iterable[int] = (),
-    allowed_cones: Iterable[int] | None = None,
-    repair: bool = False,
-    strict: bool = False,
-    progress: Progress | None = None,
-) -> FoundCones:
+@takes(FindOptions)
+def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> FoundCones:
     """Find the cones of the largest component of a mesh, without flattening it.
 
-    Arguments are those of `coneflat.flatten`, and so are the errors; `progress` is called with what is being done
-    and the fraction that is done.
+    Args:
+        mesh, faces: as for `coneflat.flatten`, and so are the errors.
+        options: see below.
     """
     from .cones.pursuit import pursue
 
-    options = Options(
-        distortion=distortion,
-        cone_count=cone_count,
-        min_cone_angle=min_cone_angle,
-        max_cone_angle=max_cone_angle,
-        positive_only=positive_only,
-        weights=weights,
-        required_cones=required_cones,
-        forbidden_cones=forbidden_cones,
-        allowed_cones=allowed_cones,
-        repair=repair,
-        strict=strict,
-    )
-    stages = Stages(progress)
+    asked = read_options(options, FindOptions)
+    chosen = Options(**vars(asked))
+    stages = Stages(chosen.progress)
     with one_blas_thread():
-        opened = _open(mesh, faces, options, stages)
+        opened = _open(mesh, faces, chosen, stages)
         if isinstance(opened, FoundCones):
             return opened
         search, part = opened
         with stages("cones"):
-            found = pursue(search, distortion=options.distortion, count=options.cone_count)
+            found = pursue(search, distortion=chosen.distortion, count=chosen.cone_count)
     return _named(found.solution, found.distortion, part)
 
 
-def cone_curve(
-    mesh: Any,
-    faces: ArrayLike | None = None,
-    *,
-    most: int = 30,
-    min_cone_angle: float = math.pi / 2,
-    max_cone_angle: float | None = 4 * math.pi,
-    positive_only: bool = False,
-    weights: ArrayLike | str | None = None,
-    required_cones: Iterable[int] = (),
-    forbidden_cones: Iterable[int] = (),
-    allowed_cones: Iterable[int] | None = None,
-    repair: bool = False,
-    strict: bool = False,
-    progress: Progress | None = None,
-) -> ConeCurve:
-    """Search for the best cones of every number up to `most`, on the largest component of a mesh.
+@takes(CurveOptions)
+def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> ConeCurve:
+    """Search for the best cones of every number of them, on the largest component of a mesh.
 
-    Arguments are those of `coneflat.flatten`, and so are the errors.
+    Args:
+        mesh, faces: as for `coneflat.flatten`, and so are the errors.
+        options: see below.
     """
-    is_number = isinstance(most, (int, float, np.integer, np.floating)) and not isinstance(most, bool)
-    if not is_number or not float(most).is_integer() or most < 1:
-        raise OptionError(f"the largest number of cones must be a whole number from 1, not {shown(most)}")
-    options = Options(
-        min_cone_angle=min_cone_angle,
-        max_cone_angle=max_cone_angle,
-        positive_only=positive_only,
-        weights=weights,
-        required_cones=required_cones,
-        forbidden_cones=forbidden_cones,
-        allowed_cones=allowed_cones,
-        repair=repair,
-        strict=strict,
-    )
-    stages = Stages(progress)
+    asked = read_options(options, CurveOptions)
+    chosen = Options(**{name: value for name, value in vars(asked).items() if name != "most"})
+    stages = Stages(chosen.progress)
     with one_blas_thread():
-        opened = _open(mesh, faces, options, stages)
+        opened = _open(mesh, faces, chosen, stages)
         if isinstance(opened, FoundCones):
             return ConeCurve((opened,))
         search, part = opened
         with stages("cones"):
-            found = search.best_of_sizes(int(most))
+            found = search.best_of_sizes(asked.most)
     if not found:
-        raise OptionError(f"no set of up to {most} cones carries this surface's curvature; allow more")
+        raise OptionError(f"no set of up to {asked.most} cones carries this surface's curvature; allow more")
     return ConeCurve(tuple(_named(search.solution(members), energy, part) for energy, members in found))
 
 

@@ -17,6 +17,7 @@ from ..input.constraints import Constraints
 from ..mesh import TriangleMesh
 from ..options import Options
 from ..progress import Stages
+from ..text import plural
 from ..threads import HUGE
 from . import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
 
@@ -31,6 +32,8 @@ ROOM = 0.6 * np.pi
 FINE, WIDEST = 30_000, 0.95 * np.pi
 # Up to so many corners of a polyhedron are all made cones. Below so many radians a vertex is none.
 FEW, FLAT = 24, 1e-6
+# The distortion asked for may be missed by so much, relatively, without a word.
+NARROWLY = 1e-3
 # How much larger E may get for the sake of rotations along handles.
 DEARER = 1.15
 
@@ -77,7 +80,7 @@ def pursues(mesh: TriangleMesh, options: Options) -> bool:
     is_prescribed = options.boundary_kind in ("disk", "polygon") and mesh.is_boundary_vertex.any()
     return options.cone_choice == "pursuit" or (
         options.cone_choice == "auto"
-        and (options.constrains_cones or not (is_prescribed or has_many_handles(mesh, options)))
+        and (options.asks_for_pursuit or not (is_prescribed or has_many_handles(mesh, options)))
     )
 
 
@@ -85,7 +88,7 @@ def has_many_handles(mesh: TriangleMesh, options: Options) -> bool:
     """Whether a mesh has so many handles, and needs so many cones for them, that few of them are no aim."""
     from .cone_search import MOST_CONES
 
-    if options.cone_choice != "auto" or options.constrains_cones or mesh.is_boundary_vertex.any():
+    if options.cone_choice != "auto" or options.asks_for_pursuit or mesh.is_boundary_vertex.any():
         return False
     # Each handle but one takes two cones of 4 pi.
     return -mesh.euler_characteristic > MOST_CONES // 2
@@ -123,7 +126,7 @@ def choose_cones(
 
 def corners_alone(surface: Surface, constraints: Constraints, options: Options) -> ConeSolution | None:
     """Return a polyhedron's corners as cones if they are few: it unfolds without any distortion. Else None."""
-    if options.cone_choice != "auto" or options.constrains_cones or options.boundary_kind == "straight":
+    if options.cone_choice != "auto" or options.asks_for_pursuit or options.boundary_kind == "straight":
         return None
     mesh, curvature = surface.mesh, surface.curvature
     corners = np.flatnonzero((np.abs(curvature) > FLAT) & ~mesh.is_boundary_vertex)
@@ -153,11 +156,11 @@ def _pursued(
     search = search_on(surface, constraints, options, stages)
 
     distortion, count = options.distortion, options.cone_count
-    if options.quantum is None:
+    if options.quantise is None:
         found = pursue(search, distortion=distortion, count=count, most=options.max_cones).solution
     else:
         quantised = quantise_cones(
-            search, options.quantum, distortion=distortion, count=count, most=options.max_cones
+            search, options.quantise, distortion=distortion, count=count, most=options.max_cones
         )
         if turned is not None and mesh.genus():
             by_scale = open_turning(mesh).by_log_scale(surface.lengths)
@@ -229,3 +232,36 @@ def search_on(surface: Surface, constraints: Constraints, options: Options, stag
     if len(mesh.faces) <= HUGE:  # else it holds too much memory
         surface.search = search
     return search
+
+
+def cone_notes(mesh: TriangleMesh, cone_count: int, distortion: float, options: Options) -> tuple[str, ...]:
+    """Return what falls short of what was asked of the cones, one sentence each.
+
+    Args:
+        mesh: connected.
+        cone_count: how many cones were found.
+        distortion: the area distortion of the linear model with them.
+        options: what was asked.
+    """
+    if has_many_handles(mesh, options):
+        return (
+            f"A surface with {mesh.genus():,} handles needs so many cones that the greedy search placed them.",
+        )
+    if not pursues(mesh, options):
+        return ()
+    if options.cone_count is not None:
+        if cone_count == options.cone_count:
+            return ()
+        return (
+            f"{plural(cone_count, 'cone')} instead of the {options.cone_count:,} asked for: more of them, within the "
+            "bounds given, would gain nothing or have no vertex inside to be at.",
+        )
+    if distortion <= options.distortion * (1 + NARROWLY):
+        return ()
+    why = "no better was found within the bounds given"
+    if options.quantise is not None and mesh.genus() and distortion <= options.distortion * DEARER:
+        why = "cones were moved a little for the sake of the rotations along handles"
+    return (
+        f"The area distortion is {distortion:.3g} with {plural(cone_count, 'cone')}, above the "
+        f"{options.distortion:g} allowed: {why}.",
+    )

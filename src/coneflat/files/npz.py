@@ -253,6 +253,6 @@ def _rotations(report: dict[str, Any]) -> Rotations | None:
 
     if report["rotation_deviation"] is None:
         return None
-    return Rotations(
-        report["settings"]["quantum"], report["rotation_deviation"], tuple(report["handle_deviations"])
-    )
+    settings = report["settings"]
+    quantum = settings.get("quantise", settings.get("quantum"))  # as it was called at first
+    return Rotations(quantum, report["rotation_deviation"], tuple(report["handle_deviations"]))

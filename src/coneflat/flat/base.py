@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +11,7 @@ from .._arrays import FloatArray, IntArray
 from ..cones import ConeSolution
 from ..errors import ConvergenceError, MetricError
 from ..geometry import angle_defect, double_areas, edge_lengths
+from ..geometry.operators import area_distortion
 from ..geometry.planar import heights, sides_between, signed_angles, signed_double_areas
 from ..mesh import TriangleMesh
 from ..quality.statistics import SolveStatistics
@@ -58,6 +59,21 @@ class LaidOut:
     def area(self) -> float:
         """The area of the mesh in space."""
         return float(double_areas(edge_lengths(self.mesh.vertices, self.mesh.faces)).sum() / 2)
+
+    def with_area_distortion(self, linear: FloatArray, areas: FloatArray) -> LaidOut:
+        """Return it with the area distortion of its metric, and of the linear model that its cones were chosen in.
+
+        Args:
+            linear: (n,) log scale of that model at the vertices of the mesh that was given.
+            areas: (n,) what each of these counts.
+        """
+        linear_distortion, reached = (
+            area_distortion(phi, areas) for phi in (linear, self.log_scale[: len(linear)])
+        )
+        statistics = replace(
+            self.statistics, area_distortion_linear=linear_distortion, area_distortion=reached
+        )
+        return replace(self, statistics=statistics)
 
 
 class FlatMetric(Protocol):

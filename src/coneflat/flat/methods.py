@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import TypeAlias
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray
 from ..cones import ConeSolution
-from ..cones.choose import Surface
+from ..cones.choose import Surface, Turned
 from ..errors import OptionError
 from ..geometry.handles import open_turning
 from ..input.constraints import Constraints
@@ -29,9 +30,33 @@ def find_metric(
     """Return the flat metric that the options name."""
     mesh, lengths = surface.mesh, surface.lengths
     if options.method == "linear":
-        return linear_flattening(mesh, lengths, solution, options.length_rule)
+        return linear_flattening(mesh, lengths, solution)
     if options.method != "exact":
         return other_method(options.method)(mesh, lengths, solution, options.best_effort)
+    choices = _exact_choices(surface, solution, constraints, options)
+    if options.correct_handles and options.quantise is not None and mesh.genus():
+        return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantise)
+    return exact_flattening(mesh, lengths, solution, choices)
+
+
+def turning_meter(surface: Surface, constraints: Constraints, options: Options) -> Turned | None:
+    """Return what tells by how much loops across handles turn with given cones; None where nobody asks."""
+    if options.quantise is None or options.method != "exact" or not surface.mesh.genus():
+        return None
+    mesh, turning = surface.mesh, open_turning(surface.mesh)
+    plain = replace(options, correct_handles=False, best_effort=True)
+
+    def turned(solution: ConeSolution) -> FloatArray:
+        choices = _exact_choices(surface, solution, constraints, plain)
+        return turning.of_flat(exact_flattening(mesh, surface.lengths, solution, choices).straight())
+
+    return turned
+
+
+def _exact_choices(
+    surface: Surface, solution: ConeSolution, constraints: Constraints, options: Options
+) -> ExactChoices:
+    mesh, lengths = surface.mesh, surface.lengths
     boundary = None
     if mesh.is_boundary_vertex.any():
         if options.boundary_kind == "straight":
@@ -45,7 +70,7 @@ def find_metric(
                 constraints.corners.curvatures,
                 constraints.names,
             )
-    choices = ExactChoices(
+    return ExactChoices(
         scale_at_cones=options.scale_at_cones,
         boundary=boundary,
         kept=_kept_boundary(mesh, constraints, options),
@@ -55,9 +80,6 @@ def find_metric(
         refine=options.refine,
         names=constraints.names,
     )
-    if options.correct_handles and options.quantum is not None and mesh.genus():
-        return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantum)
-    return exact_flattening(mesh, lengths, solution, choices)
 
 
 def _kept_boundary(mesh: TriangleMesh, constraints: Constraints, options: Options) -> BoolArray:

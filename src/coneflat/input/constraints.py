@@ -133,7 +133,7 @@ def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh)
     is_allowed[required.vertices] = True
     return Constraints(
         names,
-        _locate(checked, "cone", options.given_cones),
+        _locate(checked, "cone", options.named_cones),
         _locate(checked, "corner", options.corners),
         required,
         is_allowed,
@@ -158,7 +158,7 @@ def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) 
         for name in names[on_boundary]:
             raise OptionError(
                 f"cone {name} lies on the boundary, which takes what curvature it needs: choose inner vertices, "
-                "or prescribe the boundary's curvature (boundary, --corner)"
+                "or prescribe the boundary's curvature (boundary)"
             )
     else:
         for name in names[~on_boundary]:

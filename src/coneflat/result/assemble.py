@@ -16,7 +16,7 @@ from ..input.numbering import result_numbering, turn_corners
 from ..input.polygons import Polygons
 from ..layout.convex import make_convex
 from ..mesh import TriangleMesh
-from ..options import CONED, Options
+from ..options import CONED, Options, settings
 from ..progress import Stages
 from ..quality.distortion import curvature_errors, measure
 from ..quality.rotations import Rotations, measure_rotations
@@ -64,7 +64,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
             padding=options.padding,
             tiles=options.tiles,
             up=options.up,
-            quantum=options.quantum,
+            quantum=options.quantise,
         )
         uv = np.empty_like(points)
         uv[corners] = packed.corner_uv
@@ -122,7 +122,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
             *_distinct_notes(laid_out),
             *[POLYGONS_LOST] * (refined and given.source is not None),
         ),
-        settings=options.as_dict(),
+        settings=settings(options),
         solve=SolveStatistics.of_all(
             [one.statistics for one in laid_out], [one.area if len(laid_out) > 1 else 1.0 for one in laid_out]
         ),
@@ -140,11 +140,11 @@ def _rotations(laid_out: Sequence[LaidOut], corner_uv: FloatArray, options: Opti
 
     corner_uv: (m, 3, 2) points of the triangle corners, component after component.
     """
-    if options.quantum is None:
+    if options.quantise is None:
         return None
     flat = np.split(corner_uv, np.cumsum([len(one.corners) for one in laid_out])[:-1])
     return Rotations.of_all(
-        measure_rotations(one.mesh, own, options.quantum) for one, own in zip(laid_out, flat, strict=True)
+        measure_rotations(one.mesh, own, options.quantise) for one, own in zip(laid_out, flat, strict=True)
     )
 
 

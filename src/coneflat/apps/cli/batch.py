@@ -9,9 +9,10 @@ from typing import Any
 
 import click
 
+from ...options import Options, read_options
 from ...text import plural, printable
-from .method import check_combinations, method_keywords, method_options
-from .shared import require_option, talk_options
+from .options import check_combinations, flag_of, keywords, option_flags, paper_option
+from .shared import checking, input_options, measures_alone, require_option, verbosity_options
 
 FAILED = 1
 LONGEST = 3  # meshes that are named
@@ -48,9 +49,11 @@ LONGEST = 3  # meshes that are named
     "--dask", metavar="ADDRESS", help="Work on the cluster of this Dask scheduler, tcp://host:8786 say."
 )
 @click.option("--redo", is_flag=True, help="Flatten again what is done.")
-@method_options
+@paper_option
+@option_flags(Options, one_mesh=False)
+@input_options
 @require_option
-@talk_options
+@verbosity_options
 @click.pass_context
 def batch(
     context: click.Context,
@@ -63,9 +66,10 @@ def batch(
     time_limit: float,
     dask: str | None,
     redo: bool,
+    repair: bool,
     weld: bool | None,
     required: tuple[str, ...],
-    talk: str | None,
+    verbosity: str | None,
     **method: Any,
 ) -> None:
     """Flatten all meshes that the patterns name: files, folders, or *, ? and ** in quotes.
@@ -79,7 +83,6 @@ def batch(
       coneflat batch models --out flat --dask tcp://10.0.0.1:8786
     """
     from ...files.atomic import make_folder
-    from ...options import Options
     from ...result.requirements import REPORTED, parse_requirements
     from ..batch import find_jobs, run_batch
     from .console import Console
@@ -87,15 +90,14 @@ def batch(
     check_combinations(context)
     if jobs is not None and dask is not None:
         raise click.UsageError("the cluster has its own processes: leave out --jobs", context)
-    options = method_keywords(method, f".{ending}")
-    if options.get("weights") is not None and not isinstance(options["weights"], str):
-        raise click.UsageError("a file of --weights fits one mesh: name a property, or color", context)
-    parse_requirements(required, REPORTED)
-    Options(**options)  # Says what makes no sense before the work.
+    options = {**keywords(method), **checking(repair)}
+    _fits_any_mesh(context, options)
+    parse_requirements(measures_alone(required), REPORTED)
+    read_options(options)  # Says what makes no sense before the work.
     todo = find_jobs(patterns, out.absolute(), f".{ending}", options, weld, required)
     make_folder(out)
     rows = []
-    with Console(talk) as console:
+    with Console(verbosity) as console:
 
         def tell(row: dict[str, Any], done: int, count: int) -> None:
             rows.append(row)
@@ -145,3 +147,16 @@ def _slowest(rows: Sequence[dict[str, Any]], elapsed: float) -> Iterator[str]:
     if took:
         longest = ", ".join(f"{name} {seconds:.1f}" for seconds, name in took[:LONGEST])
         yield f"time {elapsed:.1f} s, {sum(seconds for seconds, _ in took):.1f} s of work; the longest: {longest}"
+
+
+def _fits_any_mesh(context: click.Context, options: dict[str, Any]) -> None:
+    """Refuse what names the vertices of one mesh."""
+    for name, what in (
+        ("cones", "vertices that are cones fit one mesh"),
+        ("boundary", "corners fit one mesh"),
+        ("seams", "a file of seams fits one mesh: say input"),
+        ("weights", "a file of weights fits one mesh: name a property, or color"),
+        ("seam_weights", "a file of weights fits one mesh: name a property"),
+    ):
+        if not isinstance(options.get(name, ""), str):
+            raise click.UsageError(f"{what}, in {flag_of(name)}", context)

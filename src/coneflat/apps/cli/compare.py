@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import click
-from click.core import ParameterSource
 
-from .search import as_keywords, place_options, search_options
-from .shared import Eye, checking, input_options, talk_options, up_option
+from ...options import PAPER, FindOptions
+from .options import flag_of, is_given, keywords, option_flags
+from .shared import Eye, checking, input_options, up_option, verbosity_options
 
 #: What `compare` writes.
 COMPARED = ("compare.md", "compare.csv", "layouts.png", "quality.png")
@@ -39,12 +39,11 @@ eye_option = click.option(
 )
 @click.option("--no-peers", is_flag=True, help="Leave out other packages (libigl, xatlas, uvunwrap).")
 @click.option("--paper", is_flag=True, help="The cones of the published method (greedy, epsilon 1).")
-@search_options
-@place_options
+@option_flags(FindOptions, one_mesh=True)
 @eye_option
 @up_option
 @input_options
-@talk_options
+@verbosity_options
 @click.pass_context
 def compare(
     context: click.Context,
@@ -58,7 +57,7 @@ def compare(
     up: str,
     repair: bool,
     weld: bool | None,
-    talk: str | None,
+    verbosity: str | None,
     **search: Any,
 ) -> None:
     """Flatten MESH by all methods, and by other packages that are installed, and tell how they compare.
@@ -70,26 +69,26 @@ def compare(
     """
     from ...errors import MetricError
     from ...files.read import read_joined
-    from ...options import METHODS, PAPER
+    from ...options import METHODS
     from ..compare.run import compare_methods
     from ..compare.table import comparison_csv, comparison_lines, comparison_markdown
     from .console import Console
     from .run import FLATTENED, READ
 
     for name in search if paper else ():
-        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            raise click.UsageError(f"--paper says which cones: leave out --{name.replace('_', '-')}", context)
+        if is_given(context, name):
+            raise click.UsageError(f"--paper says which cones: leave out {flag_of(name)}", context)
     for name in ("eye", "up") if output is None else ():
-        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+        if is_given(context, name):
             raise click.UsageError(f"pictures need a folder: give -o, or leave out --{name}", context)
-    options = {**checking(repair), **(PAPER if paper else as_keywords(search))}
+    options = {**checking(repair), **(PAPER if paper else keywords(search, FindOptions))}
     chosen = METHODS if methods is None else tuple(name.strip() for name in methods.split(","))
     if output is not None:
         from ..compare.pictures import Sight, draw_layouts, draw_qualities
         from ..compare.write import open_folder, write_folder
 
         sight = Sight(eye, up)
-    with Console(talk) as console:
+    with Console(verbosity) as console:
         with console.stage("read", 0.0):
             source = read_joined(mesh, weld)
         if output is not None:
@@ -128,8 +127,8 @@ def compare(
 )
 @eye_option
 @up_option
-@talk_options
-def paper(meshes: tuple[Path, ...], output: Path, eye: Any, up: str, talk: str | None) -> None:
+@verbosity_options
+def paper(meshes: tuple[Path, ...], output: Path, eye: Any, up: str, verbosity: str | None) -> None:
     """Run the experiments of the paper (Section 5) on MESHES, files or folders, its numbers beside ours.
 
     Models are known by their names: fandisk, rocker-arm, foot, gargoyle, elephant, horse, hand, torso, isi-horse.
@@ -151,7 +150,7 @@ def paper(meshes: tuple[Path, ...], output: Path, eye: Any, up: str, talk: str |
     for mesh in meshes:
         find_meshes(str(mesh))
     open_folder(output, FILES)
-    with Console(talk) as console:
+    with Console(verbosity) as console:
         with console.stage("compare", 0.0):
             found = reproduce(meshes, progress=console.part(0.0, FLATTENED))
         with console.stage("draw", FLATTENED):

@@ -10,9 +10,13 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from ...options import FindOptions
 from ...text import plural
-from .search import as_keywords, place_options, search_options
-from .shared import checking, input_options, talk_options
+from .options import keywords, option_flags
+from .shared import checking, input_options, verbosity_options
+
+#: What is allowed by default.
+DISTORTION = FindOptions().distortion
 
 if TYPE_CHECKING:
     from ...curve import ConeCurve, FoundCones
@@ -24,10 +28,9 @@ if TYPE_CHECKING:
     "-o",
     "--output",
     type=click.Path(path_type=Path),
-    help="File to write the cones to, VERTEX CURVATURE on each line, for flatten --cones-file.",
+    help="File to write the cones to, VERTEX CURVATURE on each line, for flatten --cones.",
 )
-@search_options
-@place_options
+@option_flags(FindOptions, one_mesh=True)
 @click.option(
     "--curve", is_flag=True, help="A table and a picture of the area distortion against the number of cones."
 )
@@ -40,7 +43,7 @@ if TYPE_CHECKING:
     help="With --curve: the picture to write.  [default: MESH's name with _cones, as .png]",
 )
 @input_options
-@talk_options
+@verbosity_options
 @click.pass_context
 def cones(
     context: click.Context,
@@ -52,7 +55,7 @@ def cones(
     picture: Path | None,
     repair: bool,
     weld: bool | None,
-    talk: str | None,
+    verbosity: str | None,
     **search: Any,
 ) -> None:
     """Find the cones of MESH's largest component, without flattening it.
@@ -84,24 +87,24 @@ def cones(
         check_target(output)
     if picture is not None:
         check_figure_target(picture)
-    keywords = {**as_keywords(search), **checking(repair)}
-    with Console(talk) as console:
+    given = {**keywords(search, FindOptions), **checking(repair)}
+    with Console(verbosity) as console:
         with console.stage("read", 0.0):
             joined = read_joined(mesh, weld)
-            source, keywords = joined.mesh, joined.renamed(keywords)
+            source, given = joined.mesh, joined.renamed(given)
         with console.stage("cones", READ):
-            chosen = find_cones(source, progress=console.part(READ, 0.5 if curve else FLATTENED), **keywords)
+            chosen = find_cones(source, progress=console.part(READ, 0.5 if curve else FLATTENED), **given)
         console.say(f"note: {note}" for note in joined.notes())
         if curve:
-            wanted = keywords.pop("distortion")
-            del keywords["cone_count"]
+            wanted = given.pop("distortion", DISTORTION)
+            given.pop("cone_count", None)
             with console.stage("curve", 0.5):
                 most = max(most, len(chosen.vertices))
-                found = cone_curve(source, most=most, progress=console.part(0.5, FLATTENED), **keywords)
+                found = cone_curve(source, most=most, progress=console.part(0.5, FLATTENED), **given)
             console.say(_curve_lines(found, wanted))
         else:
             console.say(
-                _cone_lines(chosen, None if keywords["cone_count"] is not None else keywords["distortion"])
+                _cone_lines(chosen, None if "cone_count" in given else given.get("distortion", DISTORTION))
             )
         if picture is not None:
             with console.stage("draw", FLATTENED):

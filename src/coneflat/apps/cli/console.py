@@ -37,8 +37,8 @@ class Console:
         seconds: wall time of each stage.
     """
 
-    def __init__(self, talk: str | None = None) -> None:
-        self.quiet, self.verbose = talk == QUIET, talk == VERBOSE
+    def __init__(self, verbosity: str | None = None) -> None:
+        self.quiet, self.verbose = verbosity == QUIET, verbosity == VERBOSE
         self._stages = Stages(self.progress)
         self.seconds = self._stages.seconds
         self._start = time.perf_counter()
@@ -47,7 +47,7 @@ class Console:
         self._lock = threading.Lock()
         self._over = threading.Event()
         self._bar: Progress | None = None
-        if talk is None and sys.stderr.isatty():
+        if verbosity is None and sys.stderr.isatty():
             self._bar = Progress(
                 SpinnerColumn(),
                 TextColumn("{task.description:28}"),

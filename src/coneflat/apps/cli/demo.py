@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .shared import talk_options
+from .shared import verbosity_options
 
 DRAWING = 0.95  # The fraction of the whole that is done before.
 
@@ -20,8 +20,8 @@ DRAWING = 0.95  # The fraction of the whole that is done before.
     show_default=True,
     help="Folder to write to; made if it is missing.",
 )
-@talk_options
-def demo(output: Path, talk: str | None) -> None:
+@verbosity_options
+def demo(output: Path, verbosity: str | None) -> None:
     """Flatten the sample that comes with coneflat; write the textured mesh, its report and a picture."""
     from ...files.atomic import make_folder
     from ...sample import sample_path
@@ -32,7 +32,7 @@ def demo(output: Path, talk: str | None) -> None:
     new_figure(1, 1)  # says what is missing before the work
     make_folder(output)
     mesh, report, picture = (output / f"sample.{ending}" for ending in ("obj", "json", "png"))
-    with Console(talk) as console:
+    with Console(verbosity) as console:
         result = flatten_file(sample_path(), console, {"charts": "atlas"})
         result = save(result, console, mesh, report)
         with console.stage("draw", DRAWING):

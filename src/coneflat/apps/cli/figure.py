@@ -8,7 +8,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from .shared import Eye, again_option, input_options, talk_options, up_option
+from .shared import Eye, again_option, input_options, up_option, verbosity_options
 
 KINDS = ("layout", "checker", "quality", "cones", "curvature", "curve")
 
@@ -68,7 +68,7 @@ _TAKEN_BY = {
 @again_option
 @input_options
 @click.option("--title", default="", help="A line above all.")
-@talk_options
+@verbosity_options
 @click.pass_context
 def figure(
     context: click.Context,
@@ -81,7 +81,7 @@ def figure(
     again: bool,
     repair: bool,
     weld: bool | None,
-    talk: str | None,
+    verbosity: str | None,
     **look: Any,
 ) -> None:
     """Draw MESH for print: the UVs that it has, or those of a result (.npz); without any it is flattened first.
@@ -103,7 +103,7 @@ def figure(
     output = check_figure_target(output or Path(f"{mesh.stem}_{kind}.png"))
     look |= {"eyes": eye or ("front-right",), "size": look["size"] or None}
     Look(**look)
-    with Console(talk) as console:
+    with Console(verbosity) as console:
         shown: Any
         if kind == "curve":
             with console.stage("read", 0.0):

@@ -51,6 +51,8 @@ def main() -> NoReturn:
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         code = USER_ERROR
+    except click.NoSuchOption as error:
+        code = _fail(f"{_renamed(error) or error.format_message()}{_hint(error)}", USER_ERROR)
     except click.ClickException as error:
         code = _fail(f"{error.format_message()}{_hint(error)}", USER_ERROR)
     except ConeflatError as error:
@@ -80,6 +82,14 @@ def main() -> NoReturn:
 def _fail(message: str, code: int) -> int:
     click.echo(f"coneflat: error: {' '.join(message.split())}", err=True)
     return code
+
+
+def _renamed(error: click.NoSuchOption) -> str:
+    """Return what an option of before is called now; "" for one that never was."""
+    from ...options.reading import GONE, RENAMED, unknown_option
+
+    name = error.option_name.lstrip("-").replace("-", "_")
+    return unknown_option(name, (), "--") if name in RENAMED or name in GONE else ""
 
 
 def _hint(error: click.ClickException) -> str:

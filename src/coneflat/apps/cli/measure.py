@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .shared import QUIET, check_required, input_options, require_option, talk_options
+from .shared import QUIET, check_required, input_options, require_option, verbosity_options
 
 if TYPE_CHECKING:
     from ...result.measure_uv import UVMeasures
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Print all measures as JSON instead of a table.")
 @require_option
 @input_options
-@talk_options
+@verbosity_options
 def measure(
     file: Path,
     report: Path | None,
@@ -29,7 +29,7 @@ def measure(
     required: tuple[str, ...],
     repair: bool,
     weld: bool | None,
-    talk: str | None,
+    verbosity: str | None,
 ) -> None:
     """Measure the UVs of FILE: a mesh with UVs (.obj, .ply, .gltf, .glb), whatever wrote it, or a result (.npz).
 
@@ -50,7 +50,7 @@ def measure(
     if report is not None:
         check_target(report)
     require_distinct({"input": file, "report": report})
-    with Console(talk) as console:
+    with Console(verbosity) as console:
         with console.stage("read", 0.0):
             mapped = as_mapped(file, weld=weld)
         with console.stage("measure", 0.3):
@@ -60,7 +60,7 @@ def measure(
             with atomic_write(report, "w") as stream:
                 json.dump(found, stream, indent=2)
                 stream.write("\n")
-        if as_json and talk != QUIET:
+        if as_json and verbosity != QUIET:
             click.echo(json.dumps(found, indent=2))
         elif not as_json:
             console.say(f"note: {note}" for note in measured.notes)

@@ -40,7 +40,7 @@ def run(
     weld: bool | None = None,
     report: Path | None = None,
     texture: str | None = None,
-    talk: str | None = None,
+    verbosity: str | None = None,
     ending: str = ".obj",
     requirements: Sequence[Requirement] = (),
 ) -> None:
@@ -54,7 +54,7 @@ def run(
         weld: merge vertices at the same position; None for the default, see `read_joined`.
         report: JSON file for the measures.
         texture: of a .glb: "checker", or an image file.
-        talk: how much to print, see `talk_options`.
+        verbosity: how much to print, see `verbosity_options`.
         ending: format of what goes to standard output, or of a file without a name.
         requirements: what measures must be; the files are written in any case.
     """
@@ -65,7 +65,7 @@ def run(
         check_target(report)
     require_distinct({"input": mesh, "output": output, "report": report})
 
-    with _kept_apart(output) as stdout, Console(talk) as console:
+    with _kept_apart(output) as stdout, Console(verbosity) as console:
         result = flatten_file(mesh, console, options, weld)
         result = save(result, console, output, report, texture, stdout, ending)
         console.finish([path for path in (output, report) if path is not None and path != PIPE], result)

@@ -101,20 +101,26 @@ def check_required(requirements: Iterable[Requirement], measures: dict[str, Any]
     raise click.exceptions.Exit(NOT_MET)
 
 
-def numbers_among(words: Sequence[str]) -> tuple[list[int], list[str]]:
-    """Return those words that are whole numbers, and the others."""
-    numbers = [int(word) for word in words if word.strip().lstrip("+-").isdecimal()]
-    return numbers, [word for word in words if not word.strip().lstrip("+-").isdecimal()]
+def measures_alone(words: Sequence[str]) -> Sequence[str]:
+    """Return what `--require` is given, unless it is a vertex, as it once could be."""
+    for word in words:
+        if word.strip().lstrip("+-").isdecimal():
+            raise click.UsageError(
+                f"--require takes measures, flipped=0 say; a vertex that is a cone in any case: --required-cones {word}"
+            )
+    return words
 
 
 QUIET, VERBOSE = "quiet", "verbose"
 
 
-def talk_options(command: Command) -> Command:
-    """Add -v and -q, of which the last counts; the command's `talk` is VERBOSE, QUIET or None."""
+def verbosity_options(command: Command) -> Command:
+    """Add -v and -q, of which the last counts; the command's `verbosity` is VERBOSE, QUIET or None."""
     for short, long, value, meaning in (
         ("-q", "--quiet", QUIET, "Print nothing but errors."),
         ("-v", "--verbose", VERBOSE, "Print every step as it begins, and how the result was found."),
     ):
-        command = click.option(short, long, "talk", flag_value=value, default=None, help=meaning)(command)
+        command = click.option(short, long, "verbosity", flag_value=value, default=None, help=meaning)(
+            command
+        )
     return command

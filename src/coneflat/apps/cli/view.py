@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .shared import again_option, input_options, talk_options, up_option
+from .shared import again_option, input_options, up_option, verbosity_options
 
 
 @click.command(short_help="Show a mesh and its layout in the browser.")
@@ -35,7 +35,7 @@ from .shared import again_option, input_options, talk_options, up_option
     show_default=True,
     help="Thin a larger mesh to so many, for display only.",
 )
-@talk_options
+@verbosity_options
 def view(
     file: Path,
     output: Path | None,
@@ -46,7 +46,7 @@ def view(
     repair: bool,
     weld: bool | None,
     most_triangles: int,
-    talk: str | None,
+    verbosity: str | None,
 ) -> None:
     """Write a page, one HTML file, that shows FILE and its layout side by side.
 
@@ -69,7 +69,7 @@ def view(
     page = check_page(Path(f"{file.stem}_view.html") if output is None else output)
     if texture is not None:
         read_picture(texture)
-    with Console(talk) as console:
+    with Console(verbosity) as console:
         result = open_result(file, console, again=again, repair=repair, weld=weld)
         with console.stage("page", FLATTENED):
             text = page_of(

@@ -14,8 +14,10 @@ from numpy.typing import ArrayLike
 
 from ...errors import ConeflatError, OptionError
 from ...input.mesh_file import MeshFile
-from ...options import METHODS, VARIANTS
-from ...pipeline import flatten
+from ...options import METHODS, VARIANTS, Options, read_options
+from ...options.declared import option
+from ...options.kinds import Choice
+from ...pipeline import flatten_as
 from ...progress import Progress
 from ...result.flattening import Flattening
 from .peers import PEERS, installed_peers, run_peer
@@ -45,6 +47,18 @@ TIMED = ("metric", "layout")
 QUICK = 3.0
 # A mesh on which every method has its code loaded before the clock starts: a tetrahedron and its corners.
 SMALL = np.eye(4)[:, :3] - 0.25, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnyMethod(Options):
+    """Options with the methods as they were used in 2008, too."""
+
+    method: str = option("exact", Choice(METHODS + VARIANTS), "The method.")
+
+
+def flatten(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flattening:
+    """Flatten a mesh by any method, `coneflat.options.VARIANTS` among them; in one chart, as they all can."""
+    return flatten_as(mesh, faces, read_options({"charts": "one", **options}, AnyMethod))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +118,8 @@ def compare_methods(
         methods: names that its `method` takes.
         peers: names of other packages' methods, of `coneflat.apps.compare.PEERS`; by default those that are installed.
         progress: called with what is done and the fraction done.
-        options: arguments of `coneflat.flatten`; those of cones hold for all, by the method "exact" if they do not
-            name another.
+        options: arguments of `coneflat.flatten`, in one chart by default; those of cones hold for all, by the method
+            "exact" if they do not name another.
 
     Raises:
         OptionError: a method or peer is unknown or not installed.

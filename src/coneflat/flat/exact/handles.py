@@ -6,7 +6,7 @@ they are (Abel and Jacobi). Here the conformal structure is changed: edge length
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -18,7 +18,10 @@ from ...geometry import corner_angles, double_areas
 from ...geometry.handles import Turning, curvature_by_log_lengths, edge_means, off_multiple
 from ...geometry.triangles import slacks
 from ...mesh import TriangleMesh
+from ...quality.distortion import measure
+from ...quality.rotations import measure_rotations
 from ...solver import factorize
+from ..base import LaidOut
 from .flatten import ExactChoices, ExactFlatMetric, exact_flattening
 
 # Steps at most, and radians at which to stop; it takes six or so if the cones are well placed.
@@ -34,9 +37,35 @@ SCALING = 1e-3
 RINGS, SPARED = 3, 1e3
 
 
+@dataclass(frozen=True, eq=False)
+class CorrectedMetric:
+    """A flat metric whose rotations along handles are multiples of a quantum, beside the conformal one it was made of.
+
+    Attributes:
+        conformal, corrected: the metrics.
+        quantum: radians.
+    """
+
+    conformal: ExactFlatMetric
+    corrected: ExactFlatMetric
+    quantum: float
+
+    def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
+        """Lay out the corrected metric, with a note that says what the correction cost."""
+        before, after = (metric.lay_out(disk, seams) for metric in (self.conformal, self.corrected))
+        flat = before.points[before.corners]
+        qc = [measure(one.mesh, one.points[one.corners]).qc_mean for one in (before, after)]
+        off = np.abs(measure_rotations(before.mesh, flat, self.quantum).handles).max(initial=0.0)
+        cost = (
+            f"Rotations along handles were off by up to {off:.2g} rad; making them whole changed the mean QC "
+            f"distortion from {qc[0]:.5f} to {qc[1]:.5f}."
+        )
+        return replace(after, notes=(*after.notes, cost))
+
+
 def corrected_flattening(
     lengths: FloatArray, solution: ConeSolution, choices: ExactChoices, turning: Turning, quantum: float
-) -> ExactFlatMetric:
+) -> CorrectedMetric:
     """Return a flat metric with the cones of a solution whose rotations along handles are multiples of a quantum.
 
     For each loop there is a change of edge lengths that turns it and no other, with the least shear. Large changes are
@@ -52,13 +81,13 @@ def corrected_flattening(
         ConvergenceError: the rotations did not get there.
     """
     mesh = turning.mesh
-    metric = exact_flattening(mesh, lengths, solution, choices)
+    conformal = metric = exact_flattening(mesh, lengths, solution, choices)
     off = off_multiple(turning.of_flat(metric.straight()), quantum)
     fixed = choices.is_open(mesh)
     changes = None
     for _ in range(STEPS):
         if np.abs(off).max() <= TOLERANCE:
-            return metric
+            return CorrectedMetric(conformal, metric, quantum)
         if changes is None:
             sides = np.abs(metric.straight().sides).reshape(-1, 3)
             changes = least_changes(turning, sides, shear_norm(mesh, lengths, solution.cones), fixed)

@@ -1,16 +1,17 @@
-"""Cones and corners as a user writes them."""
+"""Values of options as they are written at the command line and in text files."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ..._arrays import FloatArray, IntArray
 from ...errors import MeshFileError, OptionError
+
+if TYPE_CHECKING:
+    from ..._arrays import FloatArray, IntArray
 
 _CURVATURE = re.compile(
     r"(?P<number>[-+]?(?:\d+\.?\d*(?:e[-+]?\d+)?|\.\d+)?)\s*\*?\s*(?P<unit>pi|π|deg|°|rad)?\s*(?:/\s*(?P<by>\d+\.?\d*))?",
@@ -19,36 +20,43 @@ _CURVATURE = re.compile(
 _UNITS = {"pi": math.pi, "π": math.pi, "deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0, None: 1.0}
 
 
-def parse_vertices(noun: str, words: Sequence[str], path: Path | None = None) -> dict[int, float | None]:
-    """Return vertex -> curvature (radians, None where it is to be computed) from options and a file.
+def read_vertex_map(flag: str, noun: str, texts: Sequence[str]) -> dict[int, float | None]:
+    """Return vertex -> curvature (radians, None where it is to be computed).
 
     Args:
-        noun: "cone" or "corner", which is the option's name, too.
-        words: values of the option, VERTEX or VERTEX:CURVATURE.
-        path: a file with VERTEX [CURVATURE] on each line.
+        flag: the option's name.
+        noun: "cone" or "corner".
+        texts: each VERTEX[:CURVATURE], several of them with commas, or a file with VERTEX [CURVATURE] on each line.
 
     Raises:
         OptionError: what stands there is neither, or a vertex is named twice.
         MeshFileError: the file cannot be read.
     """
-    entries = [(word, word.split(":", 1), f"--{noun}") for word in words]
-    if path is not None:
-        for number, line in enumerate(_lines(path), start=1):
-            text = line.split("#", 1)[0].strip()
-            if text:
-                entries.append((text, re.split(r"[\s,:;]+", text, maxsplit=1), f"{path}, line {number}:"))
-        if not entries:
-            raise OptionError(f"{path} holds no {noun}s")
     given: dict[int, float | None] = {}
-    for text, parts, where in entries:
+    for text, where in _entries(flag, noun, texts):
+        parts = re.split(r"[\s,:;]+", text, maxsplit=1)
         try:
             vertex = int(parts[0])
         except ValueError as error:
-            raise OptionError(f"{where} {text!r} is not VERTEX or VERTEX:CURVATURE") from error
+            raise OptionError(
+                f"{where} {text!r} is not VERTEX or VERTEX:CURVATURE, nor a file that is there"
+            ) from error
         if vertex in given:
             raise OptionError(f"{where} vertex {vertex} is given as a {noun} twice")
         given[vertex] = parse_curvature(parts[1], f"{where} {text!r}") if len(parts) > 1 else None
     return given
+
+
+def _entries(flag: str, noun: str, texts: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield what names a vertex, and where it stands."""
+    for word in texts:
+        if not is_file(word):
+            yield from ((text.strip(), flag) for text in word.split(","))
+            continue
+        lines = [line.split("#", 1)[0].strip() for line in _lines(Path(word))]
+        if not any(lines):
+            raise OptionError(f"{word} holds no {noun}s")
+        yield from ((text, f"{word}, line {number}:") for number, text in enumerate(lines, 1) if text)
 
 
 def read_vertices(option: str, text: str) -> tuple[int, ...]:
@@ -68,14 +76,16 @@ def read_vertices(option: str, text: str) -> tuple[int, ...]:
     return tuple(dict.fromkeys(int(word) for word in words))
 
 
-def read_pairs(path: Path) -> IntArray:
+def read_pairs(name: str) -> IntArray:
     """Return (k, 2) the two vertices on each line of a text file.
 
     Raises:
         OptionError: a line holds something else.
         MeshFileError: the file cannot be read.
     """
-    pairs = []
+    import numpy as np
+
+    path, pairs = Path(name), []
     for number, line in enumerate(_lines(path), start=1):
         text = line.split("#", 1)[0].strip()
         if not text:
@@ -94,6 +104,8 @@ def read_weights(text: str) -> str | FloatArray:
     Raises:
         MeshFileError: the file cannot be read.
     """
+    import numpy as np
+
     path = Path(text)
     if not is_file(text):
         if path.suffix:

@@ -1,0 +1,34 @@
+"""Options: declared once, parsed at the door."""
+
+from .declared import (
+    CONED,
+    LEAST_QUANTUM,
+    METHODS,
+    MOST_PREFERENCE,
+    PAPER,
+    UNFOLDED,
+    VARIANTS,
+    WIDEST_CONE,
+    CurveOptions,
+    FindOptions,
+    Options,
+)
+from .reading import declarations, read_options, settings, takes
+
+__all__ = [
+    "CONED",
+    "LEAST_QUANTUM",
+    "METHODS",
+    "MOST_PREFERENCE",
+    "PAPER",
+    "UNFOLDED",
+    "VARIANTS",
+    "WIDEST_CONE",
+    "CurveOptions",
+    "FindOptions",
+    "Options",
+    "declarations",
+    "read_options",
+    "settings",
+    "takes",
+]
