@@ -139,6 +139,17 @@ class TriangleMesh:
         local[on_boundary] = labels
         return count, local
 
+    def boundary_walk(self) -> IntArray:
+        """Return (b,) the half-edges of the one boundary loop in order, with the mesh to the left."""
+        sides = self.edge_halfedges[self.is_boundary_edge, 0]
+        leaving = np.empty(len(self.vertices), dtype=np.int64)
+        leaving[self.tails[sides]] = np.arange(len(sides))
+        after = leaving[self.heads[sides]].tolist()
+        order = [0]
+        while (following := after[order[-1]]) != 0:
+            order.append(following)
+        return sides[order]
+
     @cached_property
     def components(self) -> tuple[int, IntArray]:
         """The number of connected components, and the component of each vertex (n,)."""

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..geometry.charts import label_charts
 from ..geometry.graph import MultiGraph, trace_back
-from ..mesh import TriangleMesh, label_components
+from ..mesh import TriangleMesh
 
 
 def separate(disk: TriangleMesh, one: BoolArray, other: BoolArray, costs: FloatArray) -> IntArray | None:
@@ -23,7 +24,7 @@ def separate(disk: TriangleMesh, one: BoolArray, other: BoolArray, costs: FloatA
         one, other: (m,) True for the triangles to be separated: two sets, connected each, without a common member.
         costs: (e,) of each edge, positive.
     """
-    border = border_edges(disk)
+    border = disk.halfedge_edges[disk.boundary_walk()]
     both = _both_to_the_border(disk, border, one, other)
     if both is None:
         return None
@@ -34,21 +35,7 @@ def separate(disk: TriangleMesh, one: BoolArray, other: BoolArray, costs: FloatA
     cut = _cheapest_path(disk, starts, ends, one, other, costs)
     glued = ~disk.is_boundary_edge
     glued[cut] = False
-    faces = disk.edge_faces[glued]
-    return label_components(len(disk.faces), faces[:, 0], faces[:, 1])[1]
-
-
-def border_edges(disk: TriangleMesh) -> IntArray:
-    """Return the edges of a disk's border in their order around it, as its triangles run."""
-    edges = np.flatnonzero(disk.is_boundary_edge)
-    sides = disk.edge_halfedges[edges, 0]
-    leaving = np.empty(len(disk.vertices), dtype=np.int64)
-    leaving[disk.tails[sides]] = np.arange(len(edges))
-    after = leaving[disk.heads[sides]].tolist()
-    order = [0]
-    while (following := after[order[-1]]) != 0:
-        order.append(following)
-    return edges[order]
+    return label_charts(disk, glued)[1]
 
 
 def _both_to_the_border(

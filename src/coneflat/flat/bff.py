@@ -10,7 +10,6 @@ from .._arrays import ComplexArray, FloatArray, IntArray
 from ..cones import ConeSolution
 from ..cones.solution import GroundedLaplacian
 from ..geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
-from ..geometry.boundary_walk import walk_boundary
 from ..layout.unfold import closed_chain
 from ..mesh import TriangleMesh
 from .base import LaidOut, laid_out_at
@@ -49,7 +48,7 @@ class BoundaryFirst:
         distortion and seam mismatch: fandisk 1.063, 0 and 1.034, 0.026; bunny 1.056, 0 and 1.029, 0.054. Without
         seams both are alike: a face 1.02676 and 1.02675.
         """
-        border = walk_boundary(disk)
+        border = disk.boundary_walk()
         inside = HarmonicExtension(disk, self.lengths)
         corners, change = self._boundary_curve(disk, border, inside)
         curve = np.zeros((2, len(disk.vertices)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import FloatArray, IntArray, as_faces, require_finite
+from .._arrays import FloatArray, IntArray, as_faces, require_finite, unit_exponent
 from ..errors import ArrayShapeError, OptionError
 from .coverage import covered_twice
 
@@ -92,7 +92,7 @@ def _corners(points: ArrayLike, triangles: ArrayLike | None) -> FloatArray:
 
 def _at_unit_size(corners: FloatArray) -> tuple[FloatArray, int]:
     """Return the corners divided by a power of two, which rounds nothing, and its exponent."""
-    exponent = int(np.frexp(max(corners.max(), -corners.min()))[1])
+    exponent = unit_exponent(corners)
     # By a product, which takes a fifth of the time, unless the factor is not finite.
     scaled = corners * 2.0**-exponent if exponent > -1000 else np.ldexp(corners, -exponent)
     scaled[np.abs(scaled) < TINY] = 0.0

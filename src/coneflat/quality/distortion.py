@@ -9,12 +9,12 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray, dots
 from ..errors import ArrayShapeError
+from ..geometry.charts import both_sides, joined_edges, label_charts
 from ..geometry.overlap import Overlaps, find_overlaps
-from ..mesh import TriangleMesh, end_corners, label_components
+from ..mesh import TriangleMesh
 from ..threads import meanwhile
 
 ZERO_AREA = 1e-12  # twice the area over the longest side squared: no digit of the shape is left below
-JOINED = 1e-6  # UV distance over UV edge length at which two sides of an edge count as one
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +170,9 @@ def measure_map(
     weights = area[valid]
     mean_scale = _mean(log_scale[valid], weights)
 
-    seams, charts, chart = _seams_and_charts(mesh, corner_uv)
+    joined = joined_edges(mesh, corner_uv)
+    seams = np.flatnonzero(~joined & ~mesh.is_boundary_edge)
+    charts, chart = label_charts(mesh, joined)
     way = np.where(has_uv_area, np.sign(uv_area), 0)
     majority = np.sign(np.bincount(chart, weights=np.abs(uv_area) * way, minlength=charts))
     against = way * majority[chart] < 0
@@ -199,38 +201,16 @@ def measure_map(
     )
 
 
-def _sides(mesh: TriangleMesh, corner_uv: FloatArray, edges: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return the UV ends (k, 2, 2) of interior edges as each of their two faces sees them, in one order."""
-    corners = corner_uv.reshape(-1, 2)
-    one, two = (end_corners(mesh.edge_halfedges[edges, side]) for side in (0, 1))
-    return corners[np.stack(one, axis=1)], corners[np.stack(two[::-1], axis=1)]
-
-
 def _side_lengths(ends: FloatArray) -> FloatArray:
     side = ends[:, 1] - ends[:, 0]
     return np.sqrt(dots(side, side))
-
-
-def seams_of(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
-    """Return the inner edges whose two sides have different UVs."""
-    return _seams_and_charts(mesh, np.ascontiguousarray(corner_uv, dtype=np.float64))[0]
-
-
-def _seams_and_charts(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[IntArray, int, IntArray]:
-    """Return the interior edges whose UVs differ, the number of charts, and the chart of each face."""
-    from .distortion_kernel import find_joined
-
-    joined = find_joined(mesh.edge_halfedges, corner_uv, JOINED)
-    faces = mesh.edge_faces[joined]
-    count, chart = label_components(len(mesh.faces), faces[:, 0], faces[:, 1])
-    return np.flatnonzero(~joined & ~mesh.is_boundary_edge), count, chart
 
 
 def _seam_mismatch(
     mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the length on the model of each seam edge, and the relative difference of its UV lengths."""
-    here, there = (_side_lengths(ends) for ends in _sides(mesh, corner_uv, seams))
+    here, there = (_side_lengths(ends) for ends in both_sides(mesh, seams, corner_uv))
     ends = mesh.vertices[mesh.edges[seams]]
     return _side_lengths(ends), np.abs(here - there) / np.maximum((here + there) / 2, np.finfo(float).tiny)
 
@@ -239,7 +219,7 @@ def _seam_motion_mismatch(
     mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray, cones: IntArray | None
 ) -> float:
     """Return the largest change, radians, of the rotation between a seam's sides along it."""
-    here, there = _sides(mesh, corner_uv, seams)
+    here, there = both_sides(mesh, seams, corner_uv)
     one = (here[:, 1] - here[:, 0]) @ np.array([1, 1j])
     two = (there[:, 1] - there[:, 0]) @ np.array([1, 1j])
     # `here` is the side of the first half-edge, which may be either side of the seam: each edge tells the

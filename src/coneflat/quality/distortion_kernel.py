@@ -66,36 +66,6 @@ def measure_triangles(
 
 
 @compiled
-def find_joined(edge_halfedges: IntArray, corner_uv: FloatArray, near: float) -> BoolArray:
-    """Return (e,) whether the two sides of each edge have the same ends in the plane; not so on the boundary.
-
-    Args:
-        edge_halfedges: (e, 2) the half-edges of each edge, which run opposite ways; -1 on the boundary.
-        corner_uv: (m, 3, 2).
-        near: how far ends may be apart, as a share of the longer side.
-    """
-    joined = np.zeros(len(edge_halfedges), np.bool_)
-    for e in range(len(edge_halfedges)):
-        h, t = edge_halfedges[e]
-        if t < 0:
-            continue
-        f, g = h // 3, t // 3
-        start, end = corner_uv[f, (h + 1) % 3], corner_uv[f, (h + 2) % 3]
-        other_end, other_start = corner_uv[g, (t + 1) % 3], corner_uv[g, (t + 2) % 3]
-        gap = max(
-            math.hypot(start[0] - other_start[0], start[1] - other_start[1]),
-            math.hypot(end[0] - other_end[0], end[1] - other_end[1]),
-        )
-        if gap == 0.0:
-            joined[e] = True
-            continue
-        length = math.hypot(end[0] - start[0], end[1] - start[1])
-        other_length = math.hypot(other_end[0] - other_start[0], other_end[1] - other_start[1])
-        joined[e] = gap <= near * max(length, other_length)
-    return joined
-
-
-@compiled
 def sum_angles(faces: IntArray, corner_uv: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
     """Return (n,) the sum of the angles in the plane around each vertex, and by what a rounded point changes it.
 
