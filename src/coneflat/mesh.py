@@ -218,7 +218,7 @@ def end_corners(halfedges: IntArray) -> tuple[IntArray, IntArray]:
 def label_nodes(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
     """Return the number of connected components of a graph and the component of each node, in the order of nodes.
 
-    Of two trees of nodes that an edge joins, the root of larger index is put under the other; ways to roots are halved.
+    Of two trees of nodes that an edge joins, the root of larger index goes under the other; paths to roots are halved.
     """
     parent = np.arange(count)
     for e in range(len(tails)):

@@ -150,7 +150,9 @@ def cover(
 
 
 @compiled
-def _mark(x0: float, y0: float, x1: float, y1: float, way: int, winding: IntArray, touched: IntArray) -> None:
+def _mark(
+    x0: float, y0: float, x1: float, y1: float, sign: int, winding: IntArray, touched: IntArray
+) -> None:
     """Mark the cells that a side going up runs through, and where rows of cell centres cross it."""
     rows, columns = touched.shape[0], touched.shape[1] - 1
     slope = (x1 - x0) / (y1 - y0) if y1 > y0 else 0.0
@@ -166,4 +168,4 @@ def _mark(x0: float, y0: float, x1: float, y1: float, way: int, winding: IntArra
         centre = row + 0.5
         if y0 <= centre < y1:
             column = int(np.ceil(x0 + (centre - y0) * slope - 0.5))
-            winding[row, min(max(column, 0), columns)] += way
+            winding[row, min(max(column, 0), columns)] += sign

@@ -32,7 +32,7 @@ def orient_charts(
     """Return (m, 3, 2) charts that lie straight, each turned about the origin and otherwise as it was.
 
     The rectangle of least area around a chart is parallel to the axes. Without an up direction its long side
-    lies along u and the heavier half of the chart below; with one, of the four ways the chart stands in the one
+    lies along u and the heavier half of the chart below; with one, of the four quarter turns the chart stands in that
     in which the surface rises the most along v.
 
     Args:
@@ -122,9 +122,9 @@ def _spans(hull: ComplexArray, angles: FloatArray) -> ComplexArray:
 
 def _extents(hull: ComplexArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the hull's extents along directions and across them."""
-    way = np.exp(1j * angles)
-    width = (np.conj(way) * _spans(hull, angles)).real
-    height = (np.conj(1j * way) * _spans(hull, angles + QUARTER)).real
+    axis = np.exp(1j * angles)
+    width = (np.conj(axis) * _spans(hull, angles)).real
+    height = (np.conj(1j * axis) * _spans(hull, angles + QUARTER)).real
     return width, height
 
 

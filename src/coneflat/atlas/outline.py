@@ -63,12 +63,12 @@ def find_outlines(
 
 
 def _uncancelled(corners: NDArray[np.complex128], chart: IntArray) -> BoolArray:
-    """Return (3m,) False for sides that run as often one way as the other between their ends, all in one chart."""
+    """Return (3m,) False for sides that run as often there as back between their ends, all in one chart."""
 
     table = np.full(2 ** int(np.ceil(np.log2(2 * corners.size))), -1, dtype=np.int32)
-    same, ways = np.empty((2, corners.size), dtype=np.int32)
-    match_sides(np.ascontiguousarray(corners).view(np.uint64).reshape(-1, 2), chart, table, same, ways)
-    kept: BoolArray = ways[same] != 0
+    same, balance = np.empty((2, corners.size), dtype=np.int32)
+    match_sides(np.ascontiguousarray(corners).view(np.uint64).reshape(-1, 2), chart, table, same, balance)
+    kept: BoolArray = balance[same] != 0
     return kept
 
 
@@ -78,7 +78,7 @@ def match_sides(
     chart: IntArray,
     table: NDArray[np.int32],
     same: NDArray[np.int32],
-    ways: NDArray[np.int32],
+    balance: NDArray[np.int32],
 ) -> None:
     """Find the sides of a chart that have the same ends, by a table of the sides seen so far.
 
@@ -87,14 +87,14 @@ def match_sides(
         chart: (m,) chart of each triangle.
         table: 2^p numbers, at least twice as many as sides, all -1; overwritten.
         same: (3m,) filled: the first side with the same ends, in either order.
-        ways: (3m,) filled: of each such side, how often it is there as it runs less how often the other way.
+        balance: (3m,) filled: of each such side, how often it is there as it runs less how often against it.
     """
     mask = np.uint64(len(table) - 1)
     for side in range(len(bits)):
         start, end = side, side - side % 3 + (side + 1) % 3
         # The hash must not depend on the order of the ends.
         key = _mixed(_hash(bits[start]) + _hash(bits[end]) + np.uint64(chart[side // 3]))
-        ways[side] = 0
+        balance[side] = 0
         while True:
             slot = np.int64(key & mask)
             other = table[slot]
@@ -104,11 +104,11 @@ def match_sides(
             if chart[other // 3] == chart[side // 3]:
                 if _equal(bits, start, other_start) and _equal(bits, end, other_end):
                     same[side] = other
-                    ways[other] += 1
+                    balance[other] += 1
                     break
                 if _equal(bits, start, other_end) and _equal(bits, end, other_start):
                     same[side] = other
-                    ways[other] -= 1
+                    balance[other] -= 1
                     break
             key += np.uint64(1)
 

@@ -29,10 +29,10 @@ def overlap_layers(pairs: IntArray, triangles: IntArray) -> list[tuple[IntArray,
     """
     if not len(pairs):
         return []
-    count, label = _label_ways(pairs, triangles)
+    count, label = _label_ordered(pairs, triangles)
     order = sort_by_counting(label, count)
     regions = np.split(order, np.cumsum(np.bincount(label, minlength=count))[:-1])
-    # An odd one is the same region the other way round.
+    # An odd one is the same region in the other order.
     return [_layers(pairs, members) for members in regions if members[0] % 2 == 0]
 
 
@@ -41,7 +41,7 @@ def largest_layers(pairs: IntArray, triangles: IntArray, areas: FloatArray) -> t
 
     areas: (m,) of the triangles.
     """
-    count, label = _label_ways(pairs, triangles)
+    count, label = _label_ordered(pairs, triangles)
     kept, moved = pairs.ravel(), pairs[:, ::-1].ravel()
     layers = [np.unique(label * len(areas) + side) for side in (kept, moved)]
     sizes = [np.bincount(one // len(areas), areas[one % len(areas)], count) for one in layers]
@@ -53,10 +53,10 @@ def largest_layers(pairs: IntArray, triangles: IntArray, areas: FloatArray) -> t
     return _layers(pairs, np.flatnonzero(label == np.argmax(size)))
 
 
-def _label_ways(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray]:
-    """Return how many parts the pairs form, each both ways round, and the part of each; numbered as in `_steps`.
+def _label_ordered(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray]:
+    """Return how many parts the pairs form, each in both orders, and the part of each; numbered as in `_steps`.
 
-    Which triangle is in which layer goes on with the overlap: a region has two parts, one the other way round, unless
+    Which triangle is in which layer goes on with the overlap: a region has two parts, one in the other order, unless
     it is wound up.
     """
     source, place = _steps(pairs, triangles)
@@ -75,20 +75,20 @@ def _layers(pairs: IntArray, members: IntArray) -> tuple[IntArray, IntArray]:
 def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
     """Return between which pairs an overlap goes on when its second triangle gives way to a neighbour.
 
-    Pair i is numbered 2i as it stands and 2i + 1 the other way round.
+    Pair i is numbered 2i as it stands and 2i + 1 in the other order.
     """
     if not len(pairs):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     count = len(triangles)
     one, two = _neighbours(np.unique(pairs), triangles)
     two = two[sort_by_counting(one, count)]
-    ways = np.bincount(one, minlength=count)
-    starts = np.cumsum(ways) - ways
-    # Every pair both ways round; the second triangle goes to each of its neighbours.
+    degree = np.bincount(one, minlength=count)
+    starts = np.cumsum(degree) - degree
+    # Every pair in both orders; the second triangle goes to each of its neighbours.
     kept, moved = pairs.ravel(), pairs[:, ::-1].ravel()
-    first, ways = starts[moved], ways[moved]
-    source = np.repeat(np.arange(len(moved)), ways)
-    step = np.arange(len(source)) - np.repeat(np.cumsum(ways) - ways - first, ways)
+    first, degree = starts[moved], degree[moved]
+    source = np.repeat(np.arange(len(moved)), degree)
+    step = np.arange(len(source)) - np.repeat(np.cumsum(degree) - degree - first, degree)
     kept, moved = kept[source], two[step]
     keys = pairs[:, 0] * count + pairs[:, 1]
     wanted = np.minimum(kept, moved) * count + np.maximum(kept, moved)
@@ -98,7 +98,7 @@ def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _neighbours(chosen: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the chosen triangles that share a side, two and two, each both ways round."""
+    """Return the chosen triangles that share a side, two and two, each in both orders."""
     tails, heads = triangles[chosen].ravel(), triangles[chosen][:, NEXT].ravel()
     order, first = sort_pairs(tails, heads, int(triangles.max()) + 1)
     again = np.flatnonzero(~first)

@@ -41,7 +41,7 @@ def separate(disk: TriangleMesh, one: BoolArray, other: BoolArray, costs: FloatA
 def _both_to_the_border(
     disk: TriangleMesh, border: IntArray, one: BoolArray, other: BoolArray
 ) -> tuple[BoolArray, BoolArray] | None:
-    """Return two sets of triangles with ways from each to the border; of one around the other, a single triangle."""
+    """Return two sets of triangles with a path from each to the border; of one around the other, a single triangle."""
     for first, second in (
         (one, other),
         (_single(one), other),
@@ -67,9 +67,9 @@ def _single(chosen: BoolArray) -> BoolArray:
 def _to_the_border(
     disk: TriangleMesh, border: IntArray, chosen: BoolArray, barred: BoolArray
 ) -> BoolArray | None:
-    """Return chosen triangles, with the shortest way from them to the border if none of them is there.
+    """Return chosen triangles, with the shortest path from them to the border if none of them is there.
 
-    None if there is no way that does not lead through those that are barred.
+    None if there is no path that does not lead through those that are barred.
     """
     beside = disk.edge_faces[border, 0]
     if chosen[beside].any():
@@ -96,8 +96,8 @@ def widen(
     """
     inside = disk.edge_faces[~disk.is_boundary_edge]
     middles = disk.vertices[disk.faces].mean(axis=1)
-    ways = np.linalg.norm(middles[inside[:, 0]] - middles[inside[:, 1]], axis=1)
-    dual = MultiGraph(len(disk.faces), inside[:, 0], inside[:, 1], ways)
+    lengths = np.linalg.norm(middles[inside[:, 0]] - middles[inside[:, 1]], axis=1)
+    dual = MultiGraph(len(disk.faces), inside[:, 0], inside[:, 1], lengths)
     distance, _, source = dual.shortest_paths(np.flatnonzero(one | other))
     order = np.argsort(distance, kind="stable")
 

@@ -66,7 +66,7 @@ def _moves(
     both = corners[pairs]
     across, depth = _least_depth(places[both])
     hardly = depth < touching
-    both, across, way = both[hardly], across[hardly], depth[hardly] / 2 + apart
+    both, across, move = both[hardly], across[hardly], depth[hardly] / 2 + apart
     # Where they have a point in common, it stays.
     shared = (
         (both[:, 0, :, None] == both[:, 1, None, :]).any(axis=2),
@@ -74,8 +74,8 @@ def _moves(
     )
     for side, sign in ((0, -1.0), (1, 1.0)):
         ahead = sign * (np.conj(across[:, None]) * places[both[:, side]]).real
-        reaches = (ahead - ahead.min(axis=1, keepdims=True) < 2 * way[:, None]) & ~shared[side]
-        step = np.broadcast_to((sign * way * across)[:, None], reaches.shape)
+        reaches = (ahead - ahead.min(axis=1, keepdims=True) < 2 * move[:, None]) & ~shared[side]
+        step = np.broadcast_to((sign * move * across)[:, None], reaches.shape)
         np.add.at(moves, both[:, side][reaches], step[reaches])
     return moves
 

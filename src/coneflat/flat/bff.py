@@ -15,7 +15,7 @@ from ..mesh import TriangleMesh
 from .base import LaidOut, laid_out_at
 from .linear import linear_flattening
 
-# A change of boundary lengths, relative, that is worth a note.
+# A change of boundary lengths, relative, that is noted.
 NOTABLE = 0.01
 # Where sides of seams can close the curve together only by a change of this, root mean square and relative, each gets a
 # length of its own: together they can do little if they are hardly turned against each other.

@@ -32,7 +32,7 @@ ARMIJO, HALVINGS = 1e-4, 20
 RIDGE = 1e-10
 # Patches at rest are left out of the equations when they make up this part of them.
 AT_REST = 0.25
-# Parts of the way found that are tried in the end, so that no vertex moves further than it need.
+# Parts of the shifts found that are tried in the end, so that no vertex moves further than it need.
 PARTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 
 

@@ -173,9 +173,9 @@ def measure_map(
     joined = joined_edges(mesh, corner_uv)
     seams = np.flatnonzero(~joined & ~mesh.is_boundary_edge)
     charts, chart = label_charts(mesh, joined)
-    way = np.where(has_uv_area, np.sign(uv_area), 0)
-    majority = np.sign(np.bincount(chart, weights=np.abs(uv_area) * way, minlength=charts))
-    against = way * majority[chart] < 0
+    sign = np.where(has_uv_area, np.sign(uv_area), 0)
+    majority = np.sign(np.bincount(chart, weights=np.abs(uv_area) * sign, minlength=charts))
+    against = sign * majority[chart] < 0
     seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
     return Distortion(
         qc=qc,

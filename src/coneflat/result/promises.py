@@ -172,8 +172,8 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
     sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
     # By a power of two, lest squares underflow.
     exponent = unit_exponent(mesh.vertices)
-    ways = np.ldexp(mesh.vertices[mesh.heads[sides]] - mesh.vertices[mesh.tails[sides]], -exponent)
-    lengths = np.linalg.norm(ways, axis=1) * np.ldexp(result.uv_scale, exponent)
+    sides_in_space = np.ldexp(mesh.vertices[mesh.heads[sides]] - mesh.vertices[mesh.tails[sides]], -exponent)
+    lengths = np.linalg.norm(sides_in_space, axis=1) * np.ldexp(result.uv_scale, exponent)
     off = np.abs(np.abs(sides_between(result.corner_uv).ravel()[sides]) - lengths)
     beyond = off > EXACT * lengths + ROUNDINGS * unit
     if beyond.any():

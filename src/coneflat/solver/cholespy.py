@@ -13,7 +13,7 @@ from .types import NotPositiveDefinite
 class CholespyFactor:
     """A sparse Cholesky factorization."""
 
-    worth = 60
+    break_even = 60
 
     def __init__(self, matrix: csc_matrix) -> None:
         if not (matrix.diagonal() > 0).all():

@@ -17,7 +17,7 @@ ACCURACY, ITERATIONS = 1e-11, 400
 class MultigridSolver:
     """A hierarchy of coarser systems that precondition the conjugate gradients."""
 
-    worth = 4
+    break_even = 4
 
     def __init__(self, matrix: csc_matrix) -> None:
         import pyamg

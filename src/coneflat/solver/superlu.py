@@ -13,7 +13,7 @@ from ..errors import MetricError
 class SuperLUFactor:
     """A sparse LU factorization that keeps a symmetric ordering."""
 
-    worth = 60
+    break_even = 60
 
     def __init__(self, matrix: csc_matrix) -> None:
         try:

@@ -18,10 +18,10 @@ class Factor(Protocol):
     """A factorized matrix.
 
     Attributes:
-        worth: how many solutions, with what conjugate gradients do besides, take as long as another factorization.
+        break_even: how many solutions, with what conjugate gradients do besides, take as long as another factorization.
     """
 
-    worth: int
+    break_even: int
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
@@ -39,7 +39,7 @@ class Factor(Protocol):
 class EmptyFactor:
     """The factor of a matrix without rows, which a mesh without free vertices has."""
 
-    worth = 1
+    break_even = 1
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return an empty solution."""

@@ -25,7 +25,7 @@ class Inverse(Protocol):
     """What applies the inverse of a Laplacian, or something close to it; see `coneflat.solver.Factor`."""
 
     @property
-    def worth(self) -> int:
+    def break_even(self) -> int:
         """How many solutions take as long as another factorization."""
         ...
 
@@ -48,9 +48,9 @@ class HeldInverse:
     held: BoolArray
 
     @property
-    def worth(self) -> int:
+    def break_even(self) -> int:
         """How many solutions take as long as another factorization."""
-        return self.factor.worth
+        return self.factor.break_even
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return (n,) the solution, 0 where it is held."""
@@ -77,9 +77,9 @@ class CorrectedInverse:
     factor: Factor
 
     @property
-    def worth(self) -> int:
+    def break_even(self) -> int:
         """How many solutions take as long as another factorization."""
-        return self.inverse.worth
+        return self.inverse.break_even
 
     @property
     def laplacian(self) -> csc_matrix:
@@ -125,7 +125,7 @@ def conjugate_gradients(
     solution, residual = np.zeros_like(right), right.copy()
     step = towards = inverse.solve(residual)
     size = first = float(residual @ towards)
-    for done in range(1, inverse.worth + 1):
+    for done in range(1, inverse.break_even + 1):
         if not 0 < size < np.inf:
             return None
         image = matrix @ step
@@ -138,7 +138,7 @@ def conjugate_gradients(
         size, before = float(residual @ towards), size
         if abs(size) <= accuracy**2 * first:
             return solution
-        if done == FIRST_FEW and not size <= accuracy ** (2 * FIRST_FEW / inverse.worth) * first:
+        if done == FIRST_FEW and not size <= accuracy ** (2 * FIRST_FEW / inverse.break_even) * first:
             return None
         step = towards + size / before * step
     return None
