@@ -10,8 +10,6 @@ from types import SimpleNamespace
 import numpy as np
 
 from coneflat import check_mesh, cut_open, edge_lengths, find_seams
-from coneflat.geometry.delaunay import make_delaunay
-from coneflat.geometry.intrinsic import intrinsic_triangulation
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "meshes"
 
@@ -280,9 +278,3 @@ def cut_disk(vertices, faces, cones=()):
 
 def lengths_of(mesh):
     return edge_lengths(mesh.vertices, mesh.faces)
-
-
-def intrinsic_delaunay(mesh, lengths):
-    """The intrinsic Delaunay triangulation of a mesh, and the half-edges flipped, in order."""
-    triangulation = intrinsic_triangulation(mesh, lengths)
-    return triangulation, make_delaunay(triangulation)

@@ -18,6 +18,7 @@ from coneflat.flat.circle_patterns.coherent_angles import LEAST_PART, coherent_a
 from coneflat.flat.circle_patterns.flatten import RadiiProblem, circle_pattern, circle_patterns
 from coneflat.flat.circle_patterns.proper import make_proper
 from coneflat.geometry import angle_defect, corner_angles, edge_lengths
+from coneflat.geometry.delaunay import intrinsic_delaunay
 from coneflat.geometry.intrinsic import intrinsic_triangulation
 from coneflat.geometry.straight import straight_triangles
 from coneflat.geometry.ties import tie_key
@@ -113,7 +114,7 @@ class TestAngles:
 class TestRadii:
     def test_the_residual_is_the_slope_of_the_papers_energy(self):
         mesh = noisy(shapes.hill(5, 4), 0.1)
-        triangulation, _ = shapes.intrinsic_delaunay(mesh, lengths_of(mesh))
+        triangulation, _ = intrinsic_delaunay(mesh, lengths_of(mesh))
         own = corner_angles(triangulation.length.reshape(-1, 3)).ravel()
         full = np.full(len(mesh.vertices), 2 * np.pi)
         angles = coherent_angles(triangulation, own, full, ~mesh.is_boundary_vertex)
@@ -237,7 +238,7 @@ class TestRefusals:
 def test_proper_triangulations(seed):
     """On a spiky surface, being Delaunay joins vertices more than once, which as many flips as can be made undo."""
     mesh = noisy(shapes.sphere(2), 0.45, seed)
-    triangulation, flips = shapes.intrinsic_delaunay(mesh, lengths_of(mesh))
+    triangulation, flips = intrinsic_delaunay(mesh, lengths_of(mesh))
     before = triangulation.copy()
     more = make_proper(triangulation, np.full(len(mesh.vertices), 4))
     assert len(more)

@@ -8,7 +8,7 @@ import shapes
 
 from coneflat import TriangleMesh
 from coneflat.geometry import angle_defect, corner_angles, double_areas, edge_lengths
-from coneflat.geometry.delaunay import make_delaunay
+from coneflat.geometry.delaunay import intrinsic_delaunay, make_delaunay
 from coneflat.geometry.intrinsic import halfedge_twins, intrinsic_triangulation
 from coneflat.geometry.straight import straight_triangles
 
@@ -43,14 +43,14 @@ class TestIntrinsicDelaunay:
     @pytest.mark.parametrize("name", SURFACES)
     def test_every_edge_satisfies_the_condition(self, name):
         mesh = noisy_mesh(SURFACES[name])
-        triangulation, _ = shapes.intrinsic_delaunay(mesh, edge_lengths(mesh.vertices, mesh.faces))
+        triangulation, _ = intrinsic_delaunay(mesh, edge_lengths(mesh.vertices, mesh.faces))
         assert opposite_angle_sums(triangulation).max() <= np.pi + 1e-9
 
     @pytest.mark.parametrize("name", SURFACES)
     def test_area_and_curvature_stay_the_same(self, name):
         mesh = noisy_mesh(SURFACES[name])
         lengths = edge_lengths(mesh.vertices, mesh.faces)
-        triangulation, flips = shapes.intrinsic_delaunay(mesh, lengths)
+        triangulation, flips = intrinsic_delaunay(mesh, lengths)
         assert len(flips) or name == "tetrahedron"
         before = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
         np.testing.assert_allclose(curvature(triangulation, mesh.is_boundary_vertex), before, atol=1e-11)
@@ -58,7 +58,7 @@ class TestIntrinsicDelaunay:
         assert areas.sum() == pytest.approx(double_areas(lengths).sum(), rel=1e-12)
 
     def test_gluing_is_consistent(self):
-        triangulation, _ = shapes.intrinsic_delaunay(
+        triangulation, _ = intrinsic_delaunay(
             mesh := noisy_mesh(shapes.genus(3)), edge_lengths(mesh.vertices, mesh.faces)
         )
         slots = np.arange(len(triangulation.twin))
@@ -70,26 +70,26 @@ class TestIntrinsicDelaunay:
 
     def test_a_delaunay_mesh_needs_no_flip(self):
         mesh = TriangleMesh(*shapes.sphere(4, bumps=0.0))
-        assert len(shapes.intrinsic_delaunay(mesh, edge_lengths(mesh.vertices, mesh.faces))[1]) == 0
+        assert len(intrinsic_delaunay(mesh, edge_lengths(mesh.vertices, mesh.faces))[1]) == 0
 
     def test_one_flip_of_a_thin_quad(self):
         vertices = np.array([[0, 0, 0], [4, 0, 0], [2, 0.5, 0], [2, -0.5, 0]], dtype=float)
         mesh = TriangleMesh(vertices, np.array([[0, 1, 2], [1, 0, 3]]))
-        triangulation, flips = shapes.intrinsic_delaunay(mesh, edge_lengths(mesh.vertices, mesh.faces))
+        triangulation, flips = intrinsic_delaunay(mesh, edge_lengths(mesh.vertices, mesh.faces))
         assert len(flips) == 1
         assert triangulation.length[flips[0]] == pytest.approx(1.0, rel=1e-15)
 
     def test_a_grid_of_squares_is_left_alone(self):
         mesh = TriangleMesh(*shapes.grid(12, 12))
         turned = TriangleMesh(mesh.vertices @ shapes.rotation(), mesh.faces)
-        assert len(shapes.intrinsic_delaunay(turned, edge_lengths(turned.vertices, turned.faces))[1]) == 0
+        assert len(intrinsic_delaunay(turned, edge_lengths(turned.vertices, turned.faces))[1]) == 0
 
     @pytest.mark.parametrize("scale", [1e-30, 1e30])
     def test_scale_does_not_matter(self, scale):
         mesh = noisy_mesh(shapes.sphere(3))
         lengths = edge_lengths(mesh.vertices, mesh.faces)
-        _, flips = shapes.intrinsic_delaunay(mesh, lengths)
-        np.testing.assert_array_equal(shapes.intrinsic_delaunay(mesh, scale * lengths)[1], flips)
+        _, flips = intrinsic_delaunay(mesh, lengths)
+        np.testing.assert_array_equal(intrinsic_delaunay(mesh, scale * lengths)[1], flips)
 
 
 class TestPtolemyFlips:
@@ -108,7 +108,7 @@ class TestPtolemyFlips:
     @pytest.mark.parametrize("name", ["sphere", "genus 3", "tetrahedron"])
     def test_lengths_come_back_when_the_scaling_does(self, name):
         mesh = noisy_mesh(SURFACES[name])
-        triangulation, _ = shapes.intrinsic_delaunay(mesh, edge_lengths(mesh.vertices, mesh.faces))
+        triangulation, _ = intrinsic_delaunay(mesh, edge_lengths(mesh.vertices, mesh.faces))
         before = np.sort(triangulation.length)
         phi = np.random.default_rng(5).normal(0, 1.5, len(mesh.vertices))
         assert len(make_delaunay(triangulation, phi))
@@ -127,7 +127,7 @@ class TestUndoing:
         """Flipped and unflipped in one and the same metric, the triangles are the input's."""
         mesh = noisy_mesh(SURFACES[name])
         lengths = edge_lengths(mesh.vertices, mesh.faces)
-        triangulation, flips = shapes.intrinsic_delaunay(mesh, lengths)
+        triangulation, flips = intrinsic_delaunay(mesh, lengths)
         flat = straight_triangles(triangulation, flips)
         np.testing.assert_array_equal(flat.twin, halfedge_twins(mesh))
         np.testing.assert_allclose(np.abs(flat.sides).reshape(-1, 3), lengths, rtol=1e-11)
@@ -135,7 +135,7 @@ class TestUndoing:
 
     def test_triangles_agree_across_their_edges(self):
         mesh = noisy_mesh(shapes.genus(3))
-        triangulation, flips = shapes.intrinsic_delaunay(mesh, edge_lengths(mesh.vertices, mesh.faces))
+        triangulation, flips = intrinsic_delaunay(mesh, edge_lengths(mesh.vertices, mesh.faces))
         flat = straight_triangles(triangulation, flips)
         np.testing.assert_allclose(flat.turns * flat.sides[flat.twin], -flat.sides, rtol=1e-12)
         assert np.abs(flat.sides.reshape(-1, 3).sum(axis=1)).max() < 1e-14

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from .intrinsic import IntrinsicTriangulation
+from ..mesh import TriangleMesh
+from .intrinsic import IntrinsicTriangulation, intrinsic_triangulation
 
 # Flips per edge after which flipping stops. Finite by theory; in floating point this catches what the
 # tolerance of the test does not.
@@ -64,3 +65,14 @@ def make_delaunay(
         records.append(record[:count])
         left -= count
     return np.concatenate(records)
+
+
+def intrinsic_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> tuple[IntrinsicTriangulation, IntArray]:
+    """Return the intrinsic Delaunay triangulation of a mesh and the half-edges flipped, in order.
+
+    Args:
+        mesh: the mesh.
+        lengths: (m, 3) side lengths, model units, with the triangle inequality.
+    """
+    triangulation = intrinsic_triangulation(mesh, lengths)
+    return triangulation, make_delaunay(triangulation)
