@@ -9,9 +9,7 @@ from scipy.sparse.csgraph import maximum_flow
 import coneflat
 from coneflat.atlas import Layout, Seams, injective_charts, overlap_layers
 from coneflat.atlas.glue import glue_charts
-from coneflat.atlas.regions import largest_layers
-from coneflat.atlas.separate import separate, widen
-from coneflat.atlas.split import split_overlaps
+from coneflat.atlas.split import largest_layers, separate, split_overlaps, widen
 from coneflat.geometry.overlap import find_overlaps
 from coneflat.mesh import TriangleMesh
 

@@ -17,7 +17,7 @@ from coneflat.flat.exact.hessian import HessianPattern
 from coneflat.flat.exact.metric import exact_metric
 from coneflat.flat.ricci import FixedPackingProblem, PackingProblem, packed_radii, ricci_flow
 from coneflat.geometry import angle_defect, corner_angles, edge_lengths
-from coneflat.geometry.flips import other_inversive_distance, tilts
+from coneflat.geometry.delaunay import other_inversive_distance, tilts
 from coneflat.geometry.intrinsic import intrinsic_triangulation
 
 BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"

@@ -23,7 +23,6 @@ PREVIOUS = np.array([2, 0, 1])
 
 def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
     """Return the number of connected components of a graph and the component of each of its nodes."""
-
     number, labels = label_nodes(count, np.asarray(tails, dtype=np.int64), np.asarray(heads, dtype=np.int64))
     return int(number), labels
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
 from ..compiled import compiled
-from .outline import Outlines
+from .charts import Outlines
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,6 @@ class Masks:
 
 def cover_charts(outlines: Outlines, angles: FloatArray, cell: float) -> Masks:
     """Return the cells, of the given width, of charts turned by (k, t) angles."""
-
     count, turns = angles.shape
     low, extent = turned_boxes(outlines, angles)
     size = np.column_stack([extent.real.ravel() // cell, extent.imag.ravel() // cell]).astype(np.int64) + 1

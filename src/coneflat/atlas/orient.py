@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import FloatArray, IntArray
 from ..compiled import compiled
 from ..errors import OptionError
-from .charts import Charts, read_charts
-from .outline import Outlines
+from .charts import Charts, Outlines, read_charts
 
 if TYPE_CHECKING:
     ComplexArray = NDArray[np.complex128]
@@ -97,7 +96,6 @@ def square_angle(points: ComplexArray) -> float:
 
 def convex_hull(points: ComplexArray) -> ComplexArray:
     """Return the corners of the convex hull, counterclockwise; the two ends if the points lie on a line."""
-
     points = np.unique(points)
     if len(points) == 1:
         return points

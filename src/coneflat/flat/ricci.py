@@ -114,7 +114,6 @@ class PackingProblem(ConformalProblem):
 
     def sum_angles(self, log_scale: FloatArray, sums: FloatArray, cots: FloatArray) -> int:
         """Fill the (n,) angle sums and (3m,) weights for the radii; return the number of broken triangles."""
-
         radii = self.radii * np.exp(centred(log_scale))
         return sum_packing_angles(self.triangulation.tail, self.triangulation.length, radii, sums, cots)
 

@@ -59,7 +59,6 @@ def make_convex(
 
 def _moved(points: FloatArray, triangles: IntArray, moving: IntArray) -> FloatArray:
     """Return the points, some of them moved so that triangles (t, 3) at them are upright, where that can be."""
-
     rank = np.full(len(points), -1, dtype=np.int64)
     rank[moving] = np.arange(len(moving))
     near = triangles[(rank[triangles] >= 0).any(axis=1)]

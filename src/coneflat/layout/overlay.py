@@ -9,7 +9,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..compiled import compiled
 from ..errors import MetricError
-from ..geometry.flips import relink
+from ..geometry.delaunay import relink
 from ..geometry.intrinsic import IntrinsicTriangulation
 
 
@@ -97,7 +97,6 @@ def _count(
     source: IntrinsicTriangulation, flat: IntrinsicTriangulation, flips: IntArray
 ) -> tuple[IntArray, IntArray]:
     """Return the number of crossings on each flat half-edge, and its place among the input ones."""
-
     flipped = source.copy()
     counts = np.full(len(source.twin), -1, dtype=np.int64)
     first = np.arange(len(source.twin))
@@ -115,7 +114,6 @@ def _trace(
     source: IntrinsicTriangulation, flat: IntrinsicTriangulation, counts: IntArray, first: IntArray
 ) -> tuple[IntArray, IntArray, IntArray, IntArray, FloatArray, FloatArray]:
     """Return the crossings along both sets of edges and the lambda lengths around them."""
-
     found = np.flatnonzero(counts > 0)
     lower = found[found < flat.twin[found]]
     total = int(counts[lower].sum())

@@ -13,7 +13,7 @@ from ..compiled import compiled
 from ..errors import MetricError
 from ..geometry.straight import FlatTriangles
 from ..mesh import label_components
-from ..solver.superlu import SuperLUFactor
+from ..solver.factors import SuperLUFactor
 
 # Height over longest side up to which a triangle counts as degenerate: coordinates in the plane are good to
 # about 1e-12 of an edge, and a triangle must stay upright when they are rounded.
@@ -108,7 +108,6 @@ class Patches:
         Newton's method with the Hessian made positive triangle by triangle. Every patch has its own
         regularisation and step length, and rests as soon as it is done or stuck.
         """
-
         shifts = np.zeros(len(self.vertices), dtype=np.complex128)
         active = np.ones(self.count, dtype=bool)
         gap = np.full(self.count, np.inf)
@@ -213,7 +212,6 @@ class _Equations:
         self, a: ComplexArray, b: ComplexArray, epsilon: FloatArray
     ) -> tuple[ComplexArray, FloatArray]:
         """Return the step of each vertex of all patches, and what it adds to the slope of the energy."""
-
         k = len(self.vertices)
         gradient, values = np.zeros(2 * k), np.zeros(4 * len(self.columns))
         add_derivatives(a, b, epsilon, self.a_of, self.b_of, self.corners, self.slots, gradient, values)

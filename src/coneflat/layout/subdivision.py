@@ -72,7 +72,6 @@ def find_pieces(
 
 def _outlines(counts: IntArray, cut: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     """Return the outlines of the pieces of triangles, see `outline_pieces`, and the triangle of each piece."""
-
     ends = np.maximum(counts, 0).reshape(-1, 3)[cut]
     # Edges that start from a corner end once on a side, the others twice.
     starting = np.maximum(2 * ends.max(axis=1, initial=0) - ends.sum(axis=1), 0)

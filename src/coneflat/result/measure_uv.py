@@ -200,7 +200,7 @@ def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
 
     A triangle that is turned over, or folds that wind around a point twice, make it large.
     """
-    from ..quality.distortion_kernel import sum_angles
+    from ..quality.distortion import sum_angles
 
     points, fan = uv_points(mesh, corner_uv)
     joined = np.zeros(mesh.faces.size, dtype=bool)

@@ -56,7 +56,6 @@ class Straightener:
 
     def _straightest(self, parts: Parts, limit: float) -> IntArray:
         """Return the half-edges of the best path between two terminals; none if that is not found within the limit."""
-
         work, terminals = self.work, parts.terminals
         near, far = parts.ends
         seeds = terminals.leaving(near)

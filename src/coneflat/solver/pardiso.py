@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
 from .._arrays import FloatArray
-from .types import NotPositiveDefinite
+from .factors import NotPositiveDefinite
 
 AnyArray: TypeAlias = NDArray[Any]
 

@@ -107,7 +107,6 @@ class ConformalProblem:
 
     def sum_angles(self, log_scale: FloatArray, sums: FloatArray, cots: FloatArray) -> int:
         """Fill the (n,) angle sums and (3m,) weights of the scaled metric; return the number of broken triangles."""
-
         scale = np.exp(centred(log_scale) / 2)
         return sum_angles(self.triangulation.tail, self.triangulation.length, scale, sums, cots)
 
@@ -117,7 +116,6 @@ class ConformalProblem:
 
     def evaluate(self, log_scale: FloatArray) -> State:
         """Flip to Delaunay in the scaled metric and return the curvature there."""
-
         sums = np.empty(len(log_scale))
         cots = np.empty(len(self.triangulation.tail))
         broken = self.sum_angles(log_scale, sums, cots)
