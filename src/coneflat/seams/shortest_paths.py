@@ -33,32 +33,16 @@ def label_terminals(
     count = 0
     n = 0
     starts[0] = 0
-    for side in sides:
-        if terminal[side] >= 0:
-            continue
-        h = side
-        while terminal[h] < 0:
-            terminal[h] = count
-            around[n] = h
-            n += 1
-            h = h - h % 3 + (h + 1) % 3
-            while not cut[h]:
-                terminal[h] = count
-                around[n] = h
-                n += 1
-                h = twin[h]
-                h = h - h % 3 + (h + 1) % 3
-        count += 1
-        starts[count] = n
-    for v in points:
-        h = leaving[v]
+    for k in range(len(sides) + len(points)):
+        h = sides[k] if k < len(sides) else leaving[points[k - len(sides)]]
         if terminal[h] >= 0:
             continue
         while terminal[h] < 0:
             terminal[h] = count
             around[n] = h
             n += 1
-            h = twin[h]
+            if not cut[h]:
+                h = twin[h]
             h = h - h % 3 + (h + 1) % 3
         count += 1
         starts[count] = n
