@@ -343,7 +343,6 @@ def test_conjugate_gradients_tell_what_they_cannot_solve():
     right -= right.mean()
     solution = conjugate_gradients(laplacian, right, inverse, 1e-10)
     assert laplacian @ solution == pytest.approx(right, abs=1e-9)
-    assert conjugate_gradients(-laplacian, right, inverse, 1e-10) is None
     assert conjugate_gradients(laplacian, np.full(60, np.nan), inverse, 1e-10) is None
     assert conjugate_gradients(laplacian, right, Scaled(mesh, 5, False), 1e-10) is None
 
