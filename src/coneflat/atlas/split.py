@@ -50,7 +50,7 @@ def split_overlaps(
         sides = disk.edge_halfedges[:, 0]
         pieces = separate(disk, one, other, costs[3 * faces[sides // 3] + sides % 3])
         if pieces is None:
-            # They stay together, and overlap: so it is measured, and told.
+            # They stay together and overlap, which the measures show.
             continue
         left = np.where(pieces[pairs[:, 0]] == pieces[pairs[:, 1]], pieces[pairs[:, 0]], -1)
         for piece in range(int(pieces.max()) + 1):

@@ -90,7 +90,7 @@ class Patches:
         self.a, self.a_of, self.b, self.b_of = found
 
     def fingerprints(self) -> list[bytes]:
-        """Return for each patch what tells it, as it is, from any other."""
+        """Return a key of each patch, the same for patches that are the same."""
         vertices, faces = (
             np.split(
                 np.argsort(label, kind="stable"), np.cumsum(np.bincount(label, minlength=self.count))[:-1]
@@ -105,8 +105,9 @@ class Patches:
     def solve(self, most_work: float) -> ComplexArray:
         """Return shifts (k,) that make the determinants positive, where this succeeds within so much work.
 
-        Newton's method with the Hessian made positive triangle by triangle. Every patch has its own
-        regularisation and step length, and rests as soon as it is done or stuck.
+        Newton's method with the Hessian made positive triangle by triangle. All patches take their steps together, in
+        one system, but every patch has its own regularisation and step length, and stops as soon as it is done or
+        stuck: `solver.newton` has one of each.
         """
         shifts = np.zeros(len(self.vertices), dtype=np.complex128)
         active = np.ones(self.count, dtype=bool)

@@ -101,7 +101,8 @@ def _close_gaps(
     """Move the points that are not pinned, in place, to spread the gaps in the layout.
 
     Conjugate gradients on the sum of the squared relative gaps, preconditioned by the diagonal. The gaps are
-    jumps along lines where fronts have met; k iterations spread a jump over about k triangles.
+    jumps along lines where fronts have met; k iterations spread a jump over about k triangles. SciPy's would divide by
+    zero where no gap is left, as on small charts.
     """
     squared = sides.real**2 + sides.imag**2
     weight = 1 / np.maximum(squared, NO_LENGTH**2 * squared.max())

@@ -28,7 +28,7 @@ def shorten(work: OpenMesh, fixed: Fixed, enough: int) -> None:
 
     Args:
         work: open, every piece of it a disk.
-        fixed: what the seams hold on to.
+        fixed: where seams may end.
         enough: the effort after which to stop.
     """
     work.measure_heights()

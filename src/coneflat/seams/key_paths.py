@@ -14,7 +14,7 @@ from .open_mesh import NOTHING, OpenMesh, Terminals
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """What seams have to hold on to.
+    """Where seams may end.
 
     Attributes:
         sides: (3m,) half-edges of the border that is there without them: boundaries, and edges that must be cut.
@@ -67,7 +67,7 @@ class KeyPaths:
 
     Attributes:
         work: the mesh that they open.
-        fixed: what they hold on to.
+        fixed: where they may end.
         paths: the key paths.
         at: the paths that end at each vertex; loops twice.
         curves: for each border curve the paths along it, in order; most are there twice, with both sides.

@@ -69,7 +69,7 @@ def coherent_angles(
     Notes:
         Without the sums, each edge has a problem of its own, to project two angles to a triangle. The sums
         are equations, whose multipliers minimise a convex function that has what they are off by for its gradient;
-        its second derivative jumps where bounds begin or cease to hold, which Newton's method does not mind.
+        its second derivative jumps where bounds begin or cease to hold; Newton's method converges all the same.
         Where none holds, the first step is the least squares solution.
     """
     count = len(angles)
