@@ -34,9 +34,9 @@ import shapes  # noqa: E402
 from coneflat.files import read_mesh  # noqa: E402
 from coneflat.flat.exact.metric import ExactMetric, exact_metric  # noqa: E402
 from coneflat.geometry import edge_lengths  # noqa: E402
-from coneflat.geometry.mollify import mollify  # noqa: E402
 from coneflat.geometry.planar import heights  # noqa: E402
 from coneflat.geometry.straight import straight_triangles  # noqa: E402
+from coneflat.geometry.triangles import mollify  # noqa: E402
 from coneflat.input.triangulate import triangulate  # noqa: E402
 from coneflat.input.validation import check_mesh  # noqa: E402
 from coneflat.layout.patches import DEGENERATE  # noqa: E402

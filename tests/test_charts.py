@@ -9,9 +9,7 @@ from scipy.sparse.csgraph import maximum_flow
 import coneflat
 from coneflat.atlas import Layout, Seams, injective_charts, overlap_layers
 from coneflat.atlas.glue import glue_charts
-from coneflat.atlas.regions import largest_layers
-from coneflat.atlas.separate import border_edges, separate, widen
-from coneflat.atlas.split import split_overlaps
+from coneflat.atlas.split import largest_layers, separate, split_overlaps, widen
 from coneflat.geometry.overlap import find_overlaps
 from coneflat.mesh import TriangleMesh
 
@@ -64,7 +62,7 @@ class TestSeparate:
         one, other = np.zeros((2, len(disk.faces)), dtype=bool)
         first, second = rng.choice(len(disk.faces), 2, replace=False)
         if seed % 2:  # on the border
-            first = disk.edge_faces[border_edges(disk)[0], 0]
+            first = disk.edge_faces[disk.halfedge_edges[disk.boundary_walk()][0], 0]
         if first == second:
             second = (first + 1) % len(disk.faces)
         one[first] = other[second] = True
@@ -87,7 +85,7 @@ class TestSeparate:
 
     def test_the_border_is_one_round(self):
         disk = flat_grid()
-        edges = border_edges(disk)
+        edges = disk.halfedge_edges[disk.boundary_walk()]
         assert len(edges) == np.count_nonzero(disk.is_boundary_edge) == len(np.unique(edges))
         sides = disk.edge_halfedges[edges, 0]
         assert np.array_equal(disk.heads[sides], np.roll(disk.tails[sides], -1))

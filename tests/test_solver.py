@@ -118,7 +118,7 @@ def test_too_little_memory_for_a_factorization(monkeypatch, matrix):
     def no_memory(matrix):
         raise MemoryError
 
-    monkeypatch.setattr("coneflat.solver.cholespy.CholespyFactor", no_memory)
+    monkeypatch.setattr("coneflat.solver.back_ends.CholespyFactor", no_memory)
     with solving("auto") as choice:
         factorize(matrix)
     assert list(choice.used) == ["amg"]

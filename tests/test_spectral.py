@@ -11,7 +11,6 @@ from shapes import cut_disk, lengths_of
 from coneflat import TriangleMesh, edge_lengths, errors, flatten
 from coneflat.flat import disk_maps as spectral
 from coneflat.flat.disk_maps import conformal_equations, spectral_conformal
-from coneflat.geometry.boundary_walk import walk_boundary
 
 
 def energy(disk, points):
@@ -96,7 +95,7 @@ def test_renumbering_of_a_closed_mesh():
 
 def test_walk_around_the_boundary():
     disk = cut_disk(*shapes.sphere(2), cones=(5, 40, 111))
-    border = walk_boundary(disk)
+    border = disk.boundary_walk()
     assert len(border) == disk.is_boundary_edge.sum() == len(np.unique(border))
     np.testing.assert_array_equal(disk.heads[border], np.roll(disk.tails[border], -1))
 

@@ -9,7 +9,7 @@ import pytest
 import shapes
 
 from coneflat import flatten
-from coneflat.atlas.snap import snap_apart
+from coneflat.atlas.touch import snap_apart
 from coneflat.errors import MeshFileError
 from coneflat.files.polygons import merge_convex
 from coneflat.files.write import write_measured

@@ -22,6 +22,14 @@ def dots(one: FloatArray, other: FloatArray) -> FloatArray:
     return products
 
 
+def unit_exponent(values: FloatArray) -> int:
+    """Return the exponent of the least power of two that no value reaches: to divide by it rounds nothing.
+
+    So scaled, squares and products of lengths are no extremes, whatever the unit.
+    """
+    return int(np.frexp(max(values.max(), -values.min()))[1])
+
+
 def as_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
     """Return (m, 3) vertex indices; raises ArrayShapeError, EmptyMeshError, or FaceIndexError with the bad ones."""
     try:

@@ -23,7 +23,6 @@ PREVIOUS = np.array([2, 0, 1])
 
 def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
     """Return the number of connected components of a graph and the component of each of its nodes."""
-
     number, labels = label_nodes(count, np.asarray(tails, dtype=np.int64), np.asarray(heads, dtype=np.int64))
     return int(number), labels
 
@@ -139,6 +138,17 @@ class TriangleMesh:
         local[on_boundary] = labels
         return count, local
 
+    def boundary_walk(self) -> IntArray:
+        """Return (b,) the half-edges of the one boundary loop in order, with the mesh to the left."""
+        sides = self.edge_halfedges[self.is_boundary_edge, 0]
+        leaving = np.empty(len(self.vertices), dtype=np.int64)
+        leaving[self.tails[sides]] = np.arange(len(sides))
+        after = leaving[self.heads[sides]].tolist()
+        order = [0]
+        while (following := after[order[-1]]) != 0:
+            order.append(following)
+        return sides[order]
+
     @cached_property
     def components(self) -> tuple[int, IntArray]:
         """The number of connected components, and the component of each vertex (n,)."""
@@ -207,7 +217,7 @@ def end_corners(halfedges: IntArray) -> tuple[IntArray, IntArray]:
 def label_nodes(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
     """Return the number of connected components of a graph and the component of each node, in the order of nodes.
 
-    Of two trees of nodes that an edge joins, the root of larger index is put under the other; ways to roots are halved.
+    Of two trees of nodes that an edge joins, the root of larger index goes under the other; paths to roots are halved.
     """
     parent = np.arange(count)
     for e in range(len(tails)):

@@ -4,7 +4,7 @@ from .chart_seams import Layout, Seams
 from .injective import injective_charts
 from .orient import orient_charts
 from .pack import Packed, pack_charts
-from .regions import overlap_layers, overlap_regions
+from .split import overlap_layers, overlap_regions
 from .touch import part_touching
 
 __all__ = [

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
-from ..mesh import TriangleMesh, end_corners, label_components
+from ..geometry.charts import both_sides, point_seams
+from ..mesh import TriangleMesh, label_components
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +68,9 @@ class Seams:
     """
 
     def __init__(self, mesh: TriangleMesh, layout: Layout) -> None:
-        inside = np.flatnonzero(~mesh.is_boundary_edge)
-        halfedges = mesh.edge_halfedges[inside]
-        flat = layout.corners.ravel()
-        here = flat[np.stack(end_corners(halfedges[:, 0]), axis=1)]
-        there = flat[np.stack(end_corners(halfedges[:, 1])[::-1], axis=1)]
-        cut = np.flatnonzero((here != there).any(axis=1))
-        self.edges, self.here, self.there = inside[cut], here[cut], there[cut]
-        self.charts = layout.chart[halfedges[cut] // 3]
+        self.edges = point_seams(mesh, layout.corners)
+        self.here, self.there = both_sides(mesh, self.edges, layout.corners)
+        self.charts = layout.chart[mesh.edge_faces[self.edges]]
 
     def within(self, *charts: int) -> IntArray:
         """Return which of the edges have both sides in given charts."""

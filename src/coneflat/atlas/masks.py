@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
 from ..compiled import compiled
-from .outline import Outlines
+from .charts import Outlines
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,6 @@ class Masks:
 
 def cover_charts(outlines: Outlines, angles: FloatArray, cell: float) -> Masks:
     """Return the cells, of the given width, of charts turned by (k, t) angles."""
-
     count, turns = angles.shape
     low, extent = turned_boxes(outlines, angles)
     size = np.column_stack([extent.real.ravel() // cell, extent.imag.ravel() // cell]).astype(np.int64) + 1
@@ -150,7 +149,9 @@ def cover(
 
 
 @compiled
-def _mark(x0: float, y0: float, x1: float, y1: float, way: int, winding: IntArray, touched: IntArray) -> None:
+def _mark(
+    x0: float, y0: float, x1: float, y1: float, sign: int, winding: IntArray, touched: IntArray
+) -> None:
     """Mark the cells that a side going up runs through, and where rows of cell centres cross it."""
     rows, columns = touched.shape[0], touched.shape[1] - 1
     slope = (x1 - x0) / (y1 - y0) if y1 > y0 else 0.0
@@ -166,4 +167,4 @@ def _mark(x0: float, y0: float, x1: float, y1: float, way: int, winding: IntArra
         centre = row + 0.5
         if y0 <= centre < y1:
             column = int(np.ceil(x0 + (centre - y0) * slope - 0.5))
-            winding[row, min(max(column, 0), columns)] += way
+            winding[row, min(max(column, 0), columns)] += sign

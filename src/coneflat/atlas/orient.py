@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import FloatArray, IntArray
 from ..compiled import compiled
 from ..errors import OptionError
-from .charts import Charts, read_charts
-from .outline import Outlines
+from .charts import Charts, Outlines, read_charts
 
 if TYPE_CHECKING:
     ComplexArray = NDArray[np.complex128]
@@ -32,7 +31,7 @@ def orient_charts(
     """Return (m, 3, 2) charts that lie straight, each turned about the origin and otherwise as it was.
 
     The rectangle of least area around a chart is parallel to the axes. Without an up direction its long side
-    lies along u and the heavier half of the chart below; with one, of the four ways the chart stands in the one
+    lies along u and the heavier half of the chart below; with one, of the four quarter turns the chart stands in that
     in which the surface rises the most along v.
 
     Args:
@@ -97,7 +96,6 @@ def square_angle(points: ComplexArray) -> float:
 
 def convex_hull(points: ComplexArray) -> ComplexArray:
     """Return the corners of the convex hull, counterclockwise; the two ends if the points lie on a line."""
-
     points = np.unique(points)
     if len(points) == 1:
         return points
@@ -122,9 +120,9 @@ def _spans(hull: ComplexArray, angles: FloatArray) -> ComplexArray:
 
 def _extents(hull: ComplexArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the hull's extents along directions and across them."""
-    way = np.exp(1j * angles)
-    width = (np.conj(way) * _spans(hull, angles)).real
-    height = (np.conj(1j * way) * _spans(hull, angles + QUARTER)).real
+    axis = np.exp(1j * angles)
+    width = (np.conj(axis) * _spans(hull, angles)).real
+    height = (np.conj(1j * axis) * _spans(hull, angles + QUARTER)).real
     return width, height
 
 

@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike
 from .._arrays import FloatArray, IntArray
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..text import shown
-from .charts import Charts, read_charts
+from .charts import Charts, Outlines, read_charts
 from .orient import square_angle, straight_angles
-from .outline import Outlines
-from .pack_masks import Packing, pack
+from .place import Packing, pack
 
 ROTATIONS = ("any", "quarter", "none")
 # Angles that a chart is tried at, for so many charts at most; more than that fill each other's gaps in quarter turns.

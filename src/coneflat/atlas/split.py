@@ -1,13 +1,17 @@
-"""Splitting a layout that overlaps itself."""
+"""A layout that overlaps itself split into charts: the layers of its overlaps, and the cheapest cuts between them.
+
+In the plane a minimum cut between two triangles, with lengths of edges as capacities, is a shortest path between the
+two parts of the border that lie between them (planar duality): no flow has to be computed.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
-from ..mesh import TriangleMesh, corner_fans
-from .regions import largest_layers
-from .separate import separate, widen
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..geometry.charts import label_charts
+from ..geometry.graph import MultiGraph, trace_back
+from ..mesh import NEXT, TriangleMesh, corner_fans, label_components, sort_by_counting, sort_pairs
 
 
 def split_overlaps(
@@ -46,7 +50,7 @@ def split_overlaps(
         sides = disk.edge_halfedges[:, 0]
         pieces = separate(disk, one, other, costs[3 * faces[sides // 3] + sides % 3])
         if pieces is None:
-            # They stay together, and overlap: so it is measured, and told.
+            # They stay together and overlap, which the measures show.
             continue
         left = np.where(pieces[pairs[:, 0]] == pieces[pairs[:, 1]], pieces[pairs[:, 0]], -1)
         for piece in range(int(pieces.max()) + 1):
@@ -71,3 +75,232 @@ def as_disk(points: FloatArray, corners: IntArray) -> TriangleMesh:
     vertices = np.empty((count, 2))
     vertices[fans] = pinched.vertices[pinched.faces]
     return TriangleMesh(vertices, fans)
+
+
+def separate(disk: TriangleMesh, one: BoolArray, other: BoolArray, costs: FloatArray) -> IntArray | None:
+    """Return (m,) the piece of each triangle after the cheapest cut between two sets of them, from 0.
+
+    None if each set, down to a single triangle, keeps the other from the border.
+
+    Args:
+        disk: a topological disk.
+        one, other: (m,) True for the triangles to be separated: two sets, connected each, without a common member.
+        costs: (e,) of each edge, positive.
+    """
+    border = disk.halfedge_edges[disk.boundary_walk()]
+    both = _both_to_the_border(disk, border, one, other)
+    if both is None:
+        return None
+    one, other = both
+    beside = disk.edge_faces[border, 0]
+    mark = np.where(one[beside], 1, np.where(other[beside], 2, 0))
+    starts, ends = _between(disk, border, mark)
+    cut = _cheapest_path(disk, starts, ends, one, other, costs)
+    glued = ~disk.is_boundary_edge
+    glued[cut] = False
+    return label_charts(disk, glued)[1]
+
+
+def _both_to_the_border(
+    disk: TriangleMesh, border: IntArray, one: BoolArray, other: BoolArray
+) -> tuple[BoolArray, BoolArray] | None:
+    """Return two sets of triangles with a path from each to the border; of one around the other, a single triangle."""
+    for first, second in (
+        (one, other),
+        (_single(one), other),
+        (one, _single(other)),
+        (_single(one), _single(other)),
+    ):
+        wide = _to_the_border(disk, border, first, second)
+        if wide is None:
+            continue
+        wider = _to_the_border(disk, border, second, wide)
+        if wider is not None:
+            return wide, wider
+    return None
+
+
+def _single(chosen: BoolArray) -> BoolArray:
+    """Return one of the chosen triangles alone."""
+    first = np.zeros_like(chosen)
+    first[np.argmax(chosen)] = True
+    return first
+
+
+def _to_the_border(
+    disk: TriangleMesh, border: IntArray, chosen: BoolArray, barred: BoolArray
+) -> BoolArray | None:
+    """Return chosen triangles, with the shortest path from them to the border if none of them is there.
+
+    None if there is no path that does not lead through those that are barred.
+    """
+    beside = disk.edge_faces[border, 0]
+    if chosen[beside].any():
+        return chosen
+    inside = disk.edge_faces[~disk.is_boundary_edge]
+    inside = inside[~barred[inside].any(axis=1)]
+    dual = MultiGraph(len(disk.faces), inside[:, 0], inside[:, 1], np.ones(len(inside)))
+    distance, before, _ = dual.shortest_paths(np.flatnonzero(chosen))
+    free = beside[~barred[beside]]
+    if not np.isfinite(distance[free]).any():
+        return None
+    nodes, _ = trace_back(free[[np.argmin(distance[free])]], before)
+    widened = chosen.copy()
+    widened[nodes] = True
+    return widened
+
+
+def widen(
+    disk: TriangleMesh, one: BoolArray, other: BoolArray, areas: FloatArray, least: float
+) -> tuple[BoolArray, BoolArray]:
+    """Return two sets of triangles, each with those nearest to it, and nearer to it than to the other, up to an area.
+
+    areas: (m,) of the triangles.
+    """
+    inside = disk.edge_faces[~disk.is_boundary_edge]
+    middles = disk.vertices[disk.faces].mean(axis=1)
+    lengths = np.linalg.norm(middles[inside[:, 0]] - middles[inside[:, 1]], axis=1)
+    dual = MultiGraph(len(disk.faces), inside[:, 0], inside[:, 1], lengths)
+    distance, _, source = dual.shortest_paths(np.flatnonzero(one | other))
+    order = np.argsort(distance, kind="stable")
+
+    def widened(chosen: BoolArray) -> BoolArray:
+        own = order[chosen[source[order]]]
+        full = max(np.count_nonzero(chosen), 1 + int(np.searchsorted(np.cumsum(areas[own]), least)))
+        wide = np.zeros_like(chosen)
+        wide[own[:full]] = True
+        return wide
+
+    return widened(one), widened(other)
+
+
+def _between(disk: TriangleMesh, border: IntArray, mark: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the vertices of the border between the sides marked 1 and those marked 2, and between 2 and 1.
+
+    border: (b,) edges in order. mark: (b,).
+    """
+    # Turned so that the sides marked 1 come last; as both sets are connected, they do not alternate.
+    marked = np.flatnonzero(mark)
+    turn = marked[np.flatnonzero((mark[marked] == 1) & (mark[np.roll(marked, -1)] == 2))[0]] + 1
+    border, mark = np.roll(border, -turn), np.roll(mark, -turn)
+    twos, ones = np.flatnonzero(mark == 2), np.flatnonzero(mark == 1)
+    tails = disk.tails[disk.edge_halfedges[border, 0]]
+    return tails[: twos[0] + 1], tails[twos[-1] + 1 : ones[0] + 1]
+
+
+def _cheapest_path(
+    disk: TriangleMesh,
+    starts: IntArray,
+    ends: IntArray,
+    one: BoolArray,
+    other: BoolArray,
+    costs: FloatArray,
+) -> IntArray:
+    """Return the edges of the cheapest path inside a disk that runs through neither set of triangles."""
+    faces = disk.edge_faces
+    passable = ~disk.is_boundary_edge
+    passable &= ~(one[faces].all(axis=1) | other[faces].all(axis=1))
+    edges = np.flatnonzero(passable)
+    ends_of = disk.edges[edges]
+    graph = MultiGraph(len(disk.vertices), ends_of[:, 0], ends_of[:, 1], costs[edges])
+    distance, before, _ = graph.shortest_paths(starts)
+    nodes, previous = trace_back(ends[[np.argmin(distance[ends])]], before)
+    return edges[graph.edges_between(nodes, previous)]
+
+
+def overlap_regions(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray]:
+    """Return the number of regions where a layout overlaps itself, and the region of each pair.
+
+    Two pairs are neighbours where they have a triangle in common, and their other triangles share a side: the
+    overlap goes on across it. Where two layers have sides in common, it ends for this purpose.
+
+    Args:
+        pairs: (k, 2) as in `Overlaps`: sorted, the smaller index first.
+        triangles: (m, 3) the points at their corners, by which they share sides.
+    """
+    source, place = _steps(pairs, triangles)
+    return label_components(len(pairs), source // 2, place // 2)
+
+
+def overlap_layers(pairs: IntArray, triangles: IntArray) -> list[tuple[IntArray, IntArray]]:
+    """Return for each region the triangles of its two layers: sets that are connected, without a common member.
+
+    Where an overlap is wound up so that its layers go over into each other, they are one of its pairs.
+    """
+    if not len(pairs):
+        return []
+    count, label = _label_ordered(pairs, triangles)
+    order = sort_by_counting(label, count)
+    regions = np.split(order, np.cumsum(np.bincount(label, minlength=count))[:-1])
+    # An odd one is the same region in the other order.
+    return [_layers(pairs, members) for members in regions if members[0] % 2 == 0]
+
+
+def largest_layers(pairs: IntArray, triangles: IntArray, areas: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return the layers of the region of which the smaller layer has the most area.
+
+    areas: (m,) of the triangles.
+    """
+    count, label = _label_ordered(pairs, triangles)
+    kept, moved = pairs.ravel(), pairs[:, ::-1].ravel()
+    layers = [np.unique(label * len(areas) + side) for side in (kept, moved)]
+    sizes = [np.bincount(one // len(areas), areas[one % len(areas)], count) for one in layers]
+    size = np.minimum(*sizes)
+    _, first = np.unique(label, return_index=True)
+    wound = np.unique(layers[0][np.isin(layers[0], layers[1])] // len(areas))
+    size[wound] = np.minimum(areas[kept], areas[moved])[first[wound]]
+    size[first % 2 == 1] = -1.0
+    return _layers(pairs, np.flatnonzero(label == np.argmax(size)))
+
+
+def _label_ordered(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray]:
+    """Return how many parts the pairs form, each in both orders, and the part of each; numbered as in `_steps`.
+
+    Which triangle is in which layer goes on with the overlap: a region has two parts, one in the other order, unless
+    it is wound up.
+    """
+    source, place = _steps(pairs, triangles)
+    return label_components(
+        2 * len(pairs), np.concatenate([source, source ^ 1]), np.concatenate([place, place ^ 1])
+    )
+
+
+def _layers(pairs: IntArray, members: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the first and second triangles of pairs, numbered as in `_steps`; of one pair if they share any."""
+    kept, moved = pairs.ravel()[members], pairs.ravel()[members ^ 1]
+    one, other = np.unique(kept), np.unique(moved)
+    return (kept[:1], moved[:1]) if len(np.intersect1d(one, other)) else (one, other)
+
+
+def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
+    """Return between which pairs an overlap goes on when its second triangle gives way to a neighbour.
+
+    Pair i is numbered 2i as it stands and 2i + 1 in the other order.
+    """
+    if not len(pairs):
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    count = len(triangles)
+    one, two = _neighbours(np.unique(pairs), triangles)
+    two = two[sort_by_counting(one, count)]
+    degree = np.bincount(one, minlength=count)
+    starts = np.cumsum(degree) - degree
+    # Every pair in both orders; the second triangle goes to each of its neighbours.
+    kept, moved = pairs.ravel(), pairs[:, ::-1].ravel()
+    first, degree = starts[moved], degree[moved]
+    source = np.repeat(np.arange(len(moved)), degree)
+    step = np.arange(len(source)) - np.repeat(np.cumsum(degree) - degree - first, degree)
+    kept, moved = kept[source], two[step]
+    keys = pairs[:, 0] * count + pairs[:, 1]
+    wanted = np.minimum(kept, moved) * count + np.maximum(kept, moved)
+    place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+    found = keys[place] == wanted
+    return source[found], 2 * place[found] + (kept > moved)[found]
+
+
+def _neighbours(chosen: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the chosen triangles that share a side, two and two, each in both orders."""
+    tails, heads = triangles[chosen].ravel(), triangles[chosen][:, NEXT].ravel()
+    order, first = sort_pairs(tails, heads, int(triangles.max()) + 1)
+    again = np.flatnonzero(~first)
+    one, two = chosen[order[again - 1] // 3], chosen[order[again] // 3]
+    return np.concatenate([one, two]), np.concatenate([two, one])

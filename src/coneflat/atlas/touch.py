@@ -1,7 +1,7 @@
-"""Triangles that only touch, but for rounding, moved apart by what rounding needs.
+"""Triangles that only touch, and what rounding does to them: moved apart, or turned back, by as little as it needs.
 
 Polyhedra unfold to charts that touch themselves along edges, and charts without padding touch each other. Turned and
-scaled, such edges may come to lie across each other by a digit.
+scaled, such edges may come to lie across each other by a digit; numbers of fewer digits turn thin triangles over.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray
 from ..geometry.overlap import Overlaps, find_overlaps
+from ..geometry.planar import signed_double_areas
 from ..mesh import NEXT
 
 # Of the extent of the layout: what overlaps by less touches, and is then moved by so much more than it overlaps.
@@ -66,7 +67,7 @@ def _moves(
     both = corners[pairs]
     across, depth = _least_depth(places[both])
     hardly = depth < touching
-    both, across, way = both[hardly], across[hardly], depth[hardly] / 2 + apart
+    both, across, move = both[hardly], across[hardly], depth[hardly] / 2 + apart
     # Where they have a point in common, it stays.
     shared = (
         (both[:, 0, :, None] == both[:, 1, None, :]).any(axis=2),
@@ -74,8 +75,8 @@ def _moves(
     )
     for side, sign in ((0, -1.0), (1, 1.0)):
         ahead = sign * (np.conj(across[:, None]) * places[both[:, side]]).real
-        reaches = (ahead - ahead.min(axis=1, keepdims=True) < 2 * way[:, None]) & ~shared[side]
-        step = np.broadcast_to((sign * way * across)[:, None], reaches.shape)
+        reaches = (ahead - ahead.min(axis=1, keepdims=True) < 2 * move[:, None]) & ~shared[side]
+        step = np.broadcast_to((sign * move * across)[:, None], reaches.shape)
         np.add.at(moves, both[:, side][reaches], step[reaches])
     return moves
 
@@ -83,7 +84,7 @@ def _moves(
 def _least_depth(corners: NDArray[np.complex128]) -> tuple[NDArray[np.complex128], FloatArray]:
     """Return (k,) unit vectors along which the second of two triangles (k, 2, 3) is out of the first soonest, and when.
 
-    They are across a side of either (as for `overlap_kernel.join`).
+    They are across a side of either (as for `geometry.overlap.join`).
     """
     sides = corners[..., NEXT] - corners
     turned = (np.conj(sides[..., 0]) * sides[..., 1]).imag < 0
@@ -96,3 +97,61 @@ def _least_depth(corners: NDArray[np.complex128]) -> tuple[NDArray[np.complex128
     best = depths.argmin(axis=1)
     chosen = np.arange(len(best)), best
     return across[chosen], np.maximum(depths[chosen], 0.0)
+
+
+# Of 32-bit numbers below 1: how far apart they are.
+SPACING = 2.0**-24
+# Places that are tried for a point: so many spacings away at most, along each axis.
+REACH = 3
+# Times all triangles that are upside down are looked at. More than MOST of them are too many to be cured one by one.
+LOOKS, MOST = 4, 5000
+
+
+def snap_apart(
+    points: FloatArray, corners: IntArray, stored: Callable[[FloatArray], FloatArray]
+) -> tuple[FloatArray, Overlaps]:
+    """Return points as they are stored, triangles upright and apart where they were and rounding admits it.
+
+    And what overlaps nevertheless.
+
+    Args:
+        points: (u, 2) of the plane.
+        corners: (m, 3) indices of points.
+        stored: returns the points that are read where some are written.
+    """
+    rounded = stored(points)
+    if np.array_equal(rounded, points):
+        return points, find_overlaps(points, corners)
+    upright = signed_double_areas(points[corners]) > 0
+    rounded = _turned_back(rounded, corners, upright, stored)
+    parted, overlaps = part_touching(rounded, corners, stored)
+    if (upright & (signed_double_areas(parted[corners]) <= 0)).any():
+        parted = _turned_back(parted, corners, upright, stored)
+        overlaps = find_overlaps(parted, corners)
+    return parted, overlaps
+
+
+def _turned_back(
+    points: FloatArray, corners: IntArray, upright: BoolArray, stored: Callable[[FloatArray], FloatArray]
+) -> FloatArray:
+    """Return points, some a few spacings away, at which triangles that rounding turned over are upright again.
+
+    upright: (m,) True for triangles that are to be.
+    """
+    points = points.copy()
+    steps = SPACING * np.mgrid[-REACH : REACH + 1, -REACH : REACH + 1].reshape(2, -1).T
+    steps = steps[np.argsort((steps**2).sum(axis=1), kind="stable")]
+    for _ in range(LOOKS):
+        bad = np.flatnonzero((signed_double_areas(points[corners]) <= 0) & upright)
+        if not 0 < len(bad) <= MOST:
+            break
+        near = np.flatnonzero(np.isin(corners, corners[bad]).any(axis=1) & upright)
+        for point in np.unique(corners[bad]).tolist():
+            star = corners[near[(corners[near] == point).any(axis=1)]]
+            places = stored(points[point] + steps * max(1.0, np.abs(points[point]).max()))
+            flat = np.repeat(points[star][None], len(places), axis=0)
+            flat[:, star == point] = places[:, None]
+            least = signed_double_areas(flat.reshape(-1, 3, 2)).reshape(len(places), -1).min(axis=1)
+            if least[0] <= 0 and least.max() > least[0]:
+                points[point] = places[np.argmax(least > 0) if (least > 0).any() else np.argmax(least)]
+    return points

@@ -370,5 +370,5 @@ class ConeSearch:
         absorbed = target_from_log_scale(self._laplacian, self.curvature, log_scale, self.is_boundary)
         is_zero = np.ones(len(target), dtype=bool)
         is_zero[operator.vertices] = False
-        inverse = LaplacianInverse(operator.solve_at_vertices, self._laplacian, is_zero, operator.worth)
+        inverse = LaplacianInverse(operator.solve_at_vertices, self._laplacian, is_zero, operator.break_even)
         return ConeSolution(cones, target + absorbed, log_scale, inverse)

@@ -44,9 +44,9 @@ class GreenOperator:
         return factorize(csc_matrix(inner))
 
     @property
-    def worth(self) -> int:
+    def break_even(self) -> int:
         """How many solutions take as long as another factorization."""
-        return self._factor.worth
+        return self._factor.break_even
 
     def solve(self, source: FloatArray) -> FloatArray:
         """Return G source for (f,) or (f, k): zero on the boundary; without one, mean-free.

@@ -25,13 +25,13 @@ class LaplacianInverse:
         apply: the function.
         laplacian: (n, n), of all vertices.
         is_zero: (n,) the vertices where its solutions are zero.
-        worth: how many solutions take as long as another factorization.
+        break_even: how many solutions take as long as another factorization.
     """
 
     apply: Callable[[FloatArray], FloatArray]
     laplacian: csc_matrix
     is_zero: BoolArray
-    worth: int
+    break_even: int
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return (n,) the solution for a source (n,)."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
-from ..atlas.snap import snap_apart
+from ..atlas.touch import snap_apart
 from ..errors import MeshFileError
 from ..input.mesh_file import COLOURS
 from ..input.polygons import polygon_of

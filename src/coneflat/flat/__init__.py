@@ -1,4 +1,4 @@
-"""The ways from cones to a layout: each a flat metric that knows how to lay itself out, a file per method."""
+"""From cones to a layout: each method is a flat metric that knows how to lay itself out, a file per method."""
 
 from .base import FlatMetric, LaidOut
 from .exact.flatten import ExactChoices, exact_flattening

@@ -10,13 +10,12 @@ from .._arrays import ComplexArray, FloatArray, IntArray
 from ..cones import ConeSolution
 from ..cones.solution import GroundedLaplacian
 from ..geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
-from ..geometry.boundary_walk import walk_boundary
 from ..layout.unfold import closed_chain
 from ..mesh import TriangleMesh
 from .base import LaidOut, laid_out_at
 from .linear import linear_flattening
 
-# A change of boundary lengths, relative, that is worth a note.
+# A change of boundary lengths, relative, that is noted.
 NOTABLE = 0.01
 # Where sides of seams can close the curve together only by a change of this, root mean square and relative, each gets a
 # length of its own: together they can do little if they are hardly turned against each other.
@@ -49,7 +48,7 @@ class BoundaryFirst:
         distortion and seam mismatch: fandisk 1.063, 0 and 1.034, 0.026; bunny 1.056, 0 and 1.029, 0.054. Without
         seams both are alike: a face 1.02676 and 1.02675.
         """
-        border = walk_boundary(disk)
+        border = disk.boundary_walk()
         inside = HarmonicExtension(disk, self.lengths)
         corners, change = self._boundary_curve(disk, border, inside)
         curve = np.zeros((2, len(disk.vertices)))

@@ -14,7 +14,6 @@ from .._arrays import ComplexArray, FloatArray, IntArray
 from ..cones import ConeSolution
 from ..errors import ConvergenceError, MetricError
 from ..geometry import corner_angles, double_areas
-from ..geometry.boundary_walk import walk_boundary
 from ..layout.least_squares import far_pins, pinned_least_squares
 from ..mesh import TriangleMesh
 from ..solver import HermitianFactor
@@ -120,7 +119,7 @@ def spectral_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
         ConvergenceError: the eigenvector was not found.
         MetricError: it is not finite.
     """
-    border = disk.tails[walk_boundary(disk)]
+    border = disk.tails[disk.boundary_walk()]
     count = len(border)
     equations = conformal_equations(disk, lengths)
     shift = np.zeros(len(disk.vertices))
@@ -141,7 +140,7 @@ def spectral_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
         return np.concatenate([z.real, z.imag])
 
     # Every eigenvalue is there twice, as a map may be turned; which of the turned ones comes out, the start decides.
-    sides = lengths.ravel()[walk_boundary(disk)]
+    sides = lengths.ravel()[disk.boundary_walk()]
     around = 2 * np.pi * (np.cumsum(sides) - sides) / sides.sum()
     start = np.concatenate([np.cos(around), np.sin(around)])
     operator = LinearOperator((2 * count, 2 * count), matvec=apply, dtype=np.float64)

@@ -26,7 +26,6 @@ def ricci_flow(
     lengths: FloatArray,
     solution: ConeSolution,
     best_effort: bool = False,
-    flips: bool = True,
 ) -> ExactFlatMetric:
     """Return the flat metric of a circle packing with the inversive distances of the input's.
 
@@ -35,8 +34,6 @@ def ricci_flow(
         lengths: (m, 3) side lengths, model units.
         solution: cones with their curvatures; on the boundary, which is free, radii stay as they are.
         best_effort: return a metric that did not converge.
-        flips: solve on the intrinsic Delaunay triangulation, and keep it weighted Delaunay. Without, as first
-            published, on the input's own, where a solution need not exist.
 
     Raises:
         ConvergenceError: no metric was found, unless `best_effort`.
@@ -46,7 +43,8 @@ def ricci_flow(
         M. Jin, J. Kim, X. Gu, "Discrete surface Ricci flow: theory and applications", 2007, minimised by Newton's
         method; inversive distances after R. Guo, "Local rigidity of inversive distance circle packing", 2011,
         and F. Luo, "Rigidity of polyhedral surfaces III", 2011; flips after A. Bobenko and C. Lutz, "Decorated
-        discrete conformal maps and convex polyhedral cusps", 2023.
+        discrete conformal maps and convex polyhedral cusps", 2023: as first published, on the input's own triangles, a
+        solution need not exist.
     """
     solved = exact_metric(
         mesh,
@@ -54,8 +52,7 @@ def ricci_flow(
         np.where(mesh.is_boundary_vertex, 0.0, solution.target),
         fixed=mesh.is_boundary_vertex,
         start=solution.log_scale,
-        kind=PackingProblem if flips else FixedPackingProblem,
-        delaunay=flips,
+        kind=PackingProblem,
     )
     failure = None
     if not solved.converged:
@@ -114,7 +111,6 @@ class PackingProblem(ConformalProblem):
 
     def sum_angles(self, log_scale: FloatArray, sums: FloatArray, cots: FloatArray) -> int:
         """Fill the (n,) angle sums and (3m,) weights for the radii; return the number of broken triangles."""
-
         radii = self.radii * np.exp(centred(log_scale))
         return sum_packing_angles(self.triangulation.tail, self.triangulation.length, radii, sums, cots)
 
@@ -126,15 +122,6 @@ class PackingProblem(ConformalProblem):
     def _ends(self, radii: FloatArray) -> tuple[FloatArray, FloatArray]:
         tail = self.triangulation.tail
         return radii[tail], radii[tail.reshape(-1, 3)[:, NEXT].ravel()]
-
-
-@dataclass(eq=False)
-class FixedPackingProblem(PackingProblem):
-    """The same on the triangles as they are; a minimum may lie where some break the triangle inequality."""
-
-    def flip(self, log_scale: FloatArray, suspects: IntArray | None) -> IntArray:
-        """Flip nothing."""
-        return np.empty(0, dtype=np.int64)
 
 
 def packed_radii(lengths: FloatArray, faces: IntArray) -> FloatArray:

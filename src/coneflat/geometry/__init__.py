@@ -1,8 +1,7 @@
 """Pure functions of edge lengths: angles, areas, curvature, Laplacian."""
 
-from .mollify import mollify
 from .operators import angle_defect, cotangent_laplacian
-from .triangles import corner_angles, cotangents, double_areas, edge_lengths, is_broken
+from .triangles import corner_angles, cotangents, double_areas, edge_lengths, is_broken, mollify
 
 __all__ = [
     "angle_defect",

@@ -51,7 +51,7 @@ def covered_twice(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
 def layers_of_raster(corners: FloatArray) -> tuple[float, float]:
     """Return about the area inside at least two triangles, and that inside at least one, by counting pixels.
 
-    corners: (m, 3, 2) of the triangles, either way around.
+    corners: (m, 3, 2) of the triangles, in either order.
     """
     from .raster import count_steps
 
@@ -74,15 +74,15 @@ def _cross(one: FloatArray, two: FloatArray) -> FloatArray:
 def _outline(corners: FloatArray) -> IntArray:
     """Return (m, 3) how often the side from each corner is in the outline, those with the same ends added up.
 
-    One side of each number of equal ones stands for all: positive as it runs, negative the other way.
+    One side of each number of equal ones stands for all: positive as it runs, negative if it runs against it.
     """
     _, ends = np.unique(corners.reshape(-1, 2) @ np.array([1, 1j]), return_inverse=True)
     tails, heads = ends, ends.reshape(-1, 3)[:, NEXT].ravel()
     order, first = sort_pairs(tails, heads, len(ends))
-    ways = np.where(tails < heads, 1, -1)
+    signs = np.where(tails < heads, 1, -1)
     sides = order[first]
     steps = np.zeros(len(ends), dtype=np.int64)
-    steps[sides] = np.add.reduceat(ways[order], np.flatnonzero(first)) * ways[sides]
+    steps[sides] = np.add.reduceat(signs[order], np.flatnonzero(first)) * signs[sides]
     return steps.reshape(-1, 3)
 
 
@@ -92,14 +92,14 @@ def _crossings(corners: FloatArray, on_outline: BoolArray, pairs: IntArray) -> F
     for i in range(3):
         for j in range(3):
             one, two = pairs[on_outline[pairs[:, 0], i] & on_outline[pairs[:, 1], j]].T
-            start, way = corners[one, i], corners[one, NEXT[i]] - corners[one, i]
+            start, along = corners[one, i], corners[one, NEXT[i]] - corners[one, i]
             other, across = corners[two, j], corners[two, NEXT[j]] - corners[two, j]
-            slope = _cross(way, across)
+            slope = _cross(along, across)
             with np.errstate(divide="ignore", invalid="ignore"):  # parallel sides
                 here = _cross(other - start, across) / slope
-                there = _cross(other - start, way) / slope
+                there = _cross(other - start, along) / slope
             meet = (here > 0) & (here < 1) & (there > 0) & (there < 1)
-            heights.append(start[meet, 1] + here[meet] * way[meet, 1])
+            heights.append(start[meet, 1] + here[meet] * along[meet, 1])
     return np.concatenate(heights)
 
 
@@ -114,7 +114,7 @@ def _sweep(corners: FloatArray, steps: IntArray, crossings: FloatArray) -> tuple
     start, end, step = corners[steps != 0], corners[:, NEXT][steps != 0], steps[steps != 0]
     falls = end[:, 1] < start[:, 1]
     low, high = np.where(falls[:, None], end, start), np.where(falls[:, None], start, end)
-    step, way = np.where(falls, step, -step), high - low
+    step, along = np.where(falls, step, -step), high - low
     heights = np.unique(np.concatenate([low[:, 1], high[:, 1], crossings]))
     first, last = np.searchsorted(heights, low[:, 1]), np.searchsorted(heights, high[:, 1])
     if int((last - first).sum()) > MOST_CROSSINGS:
@@ -126,7 +126,7 @@ def _sweep(corners: FloatArray, steps: IntArray, crossings: FloatArray) -> tuple
         side = np.repeat(np.arange(len(count)), count)
         strip = np.arange(len(side)) - np.repeat(np.cumsum(count) - count - bottom, count)
         above = (heights[strip] + heights[strip + 1]) / 2 - low[side, 1]
-        x = low[side, 0] + way[side, 0] * (above / way[side, 1])
+        x = low[side, 0] + along[side, 0] * (above / along[side, 1])
         order = np.lexsort((x, strip))
         layers = np.cumsum(step[side[order]])[:-1]  # 0 at the end of each strip
         areas = np.diff(x[order]) * np.diff(heights)[strip[order[:-1]]]

@@ -20,7 +20,7 @@ def handle_loops(mesh: TriangleMesh, holes: bool = False) -> list[IntArray]:
     """Return 2 genus closed strips of triangles that no cut along one of them, or at a boundary, makes shorter.
 
     Each is given by the half-edges that it crosses, in order: out of the triangle of one, over it, into the triangle
-    of its twin, which is that of the next. A tree of shortest ways between triangles and a tree of edges that these
+    of its twin, which is that of the next. A tree of shortest paths between triangles and a tree of edges that these
     do not cross leave 2 genus edges (tree-cotree, D. Eppstein 2003); each closes a loop.
 
     Args:
@@ -66,8 +66,8 @@ def _contract_loops(mesh: TriangleMesh, together: bool) -> IntArray:
 def _loop(dual: MultiGraph, across: IntArray, before: IntArray, edge: int) -> IntArray:
     """Return the half-edges that the loop over an edge and back through the tree crosses."""
     start, end = across[edge] // 3
-    there, back = _way(start, before), _way(end, before)
-    # What both ways to the root share is not walked to and fro.
+    there, back = _path_to_root(start, before), _path_to_root(end, before)
+    # What both paths to the root share is not walked to and fro.
     while len(there) > 1 and len(back) > 1 and there[-2] == back[-2]:
         there.pop(), back.pop()
     out, home = np.array(there[::-1]), np.array(back)
@@ -77,12 +77,12 @@ def _loop(dual: MultiGraph, across: IntArray, before: IntArray, edge: int) -> In
     return np.where(pairs[:, 0] // 3 == faces, pairs[:, 0], pairs[:, 1])
 
 
-def _way(face: int, before: IntArray) -> list[int]:
+def _path_to_root(face: int, before: IntArray) -> list[int]:
     """Return the faces from one to the root of the tree."""
-    way = [int(face)]
-    while before[way[-1]] >= 0:
-        way.append(int(before[way[-1]]))
-    return way
+    path = [int(face)]
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+    return path
 
 
 def corner_signs(loop: IntArray, twin: IntArray) -> tuple[IntArray, FloatArray]:

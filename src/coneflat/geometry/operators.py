@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csc_matrix, diags
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, unit_exponent
 from ..errors import OptionError
 from ..mesh import NEXT, PREVIOUS
 from .triangles import double_areas
@@ -42,7 +42,7 @@ def weighted_areas(areas: FloatArray, weights: FloatArray | None) -> FloatArray:
 
 def at_unit_scale(values: FloatArray) -> FloatArray:
     """Return values of 0 and more, not all 0, times the power of two that brings the largest to between 1/2 and 1."""
-    return np.ldexp(values, -np.frexp(values.max())[1])
+    return np.ldexp(values, -unit_exponent(values))
 
 
 def at_safe_scale(values: FloatArray) -> FloatArray:

@@ -50,7 +50,6 @@ def straight_triangles(
         face_count: how many triangles, the first ones, are the input's; None: all. The others are the mirror
             image of a doubled surface, and edges towards them are the boundary.
     """
-
     twin, tail = triangulation.twin.copy(), triangulation.tail.copy()
     sides = np.empty(len(twin), dtype=np.complex128)
     turns = np.empty(len(twin), dtype=np.complex128)

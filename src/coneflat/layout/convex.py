@@ -59,7 +59,6 @@ def make_convex(
 
 def _moved(points: FloatArray, triangles: IntArray, moving: IntArray) -> FloatArray:
     """Return the points, some of them moved so that triangles (t, 3) at them are upright, where that can be."""
-
     rank = np.full(len(points), -1, dtype=np.int64)
     rank[moving] = np.arange(len(moving))
     near = triangles[(rank[triangles] >= 0).any(axis=1)]
@@ -219,8 +218,8 @@ def _go_nearest(points: FloatArray, v: int, polygon: FloatArray, count: int) -> 
         square = along_x * along_x + along_y * along_y
         part = min(max((along_x * from_x + along_y * from_y) / square, 0.0), 1.0) if square > 0 else 0.0
         near_x, near_y = polygon[i, 0] + part * along_x, polygon[i, 1] + part * along_y
-        way = math.hypot(points[v, 0] - near_x, points[v, 1] - near_y)
-        if way < best:
-            best, x, y = way, near_x, near_y
+        distance = math.hypot(points[v, 0] - near_x, points[v, 1] - near_y)
+        if distance < best:
+            best, x, y = distance, near_x, near_y
     if not inside:
         points[v, 0], points[v, 1] = x, y

@@ -9,7 +9,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..compiled import compiled
 from ..errors import MetricError
-from ..geometry.flips import relink
+from ..geometry.delaunay import relink
 from ..geometry.intrinsic import IntrinsicTriangulation
 
 
@@ -44,12 +44,12 @@ class Overlay:
 
 
 def overlay(
-    given: IntrinsicTriangulation, flat: IntrinsicTriangulation, flips: IntArray, log_scale: FloatArray
+    source: IntrinsicTriangulation, flat: IntrinsicTriangulation, flips: IntArray, log_scale: FloatArray
 ) -> Overlay:
     """Return the crossings of the edges of two triangulations with the same discrete conformal structure.
 
     Args:
-        given: the triangulation before the flips; its lengths are not used.
+        source: the triangulation before the flips; its lengths are not used.
         flat: the one after, with flat lengths l_ij exp((phi_i + phi_j) / 2).
         flips: half-edges, Ptolemy flips all, in order.
         log_scale: (n,) phi.
@@ -70,13 +70,13 @@ def overlay(
         edge ab, and the right side, with factors exp(phi_s) and exp(phi_e), that on the edge se before the
         flips. The sum of the latter coefficients over that of the former is the conformal factor.
     """
-    counts, first = _count(given, flat, flips)
-    offset, number, crossed, leaving, near, far = _trace(given, flat, counts, first)
+    counts, first = _count(source, flat, flips)
+    offset, number, crossed, leaving, near, far = _trace(source, flat, counts, first)
     (near_a, near_b), (far_a, far_b) = near.T, far.T
     on_crossed = np.stack([near_b * far_b, near_a * far_a], axis=1)
     on_leaving = np.stack([far_a * far_b, near_a * near_b], axis=1)
     on_leaving *= (flat.length[crossed] ** 2 / (near_a * far_b + near_b * far_a))[:, None]
-    phi = np.stack([log_scale[given.tail[leaving]], log_scale[given.tail[given.twin[leaving]]]], axis=1)
+    phi = np.stack([log_scale[source.tail[leaving]], log_scale[source.tail[source.twin[leaving]]]], axis=1)
     largest = phi.max(axis=1, keepdims=True)
     on_leaving *= np.exp(phi - largest)
     flat_sum, sum_before = on_crossed.sum(axis=1), on_leaving.sum(axis=1)
@@ -94,28 +94,26 @@ def overlay(
 
 
 def _count(
-    given: IntrinsicTriangulation, flat: IntrinsicTriangulation, flips: IntArray
+    source: IntrinsicTriangulation, flat: IntrinsicTriangulation, flips: IntArray
 ) -> tuple[IntArray, IntArray]:
-    """Return the number of crossings on each flat half-edge, and its place among the given ones."""
-
-    flipped = given.copy()
-    counts = np.full(len(given.twin), -1, dtype=np.int64)
-    first = np.arange(len(given.twin))
+    """Return the number of crossings on each flat half-edge, and its place among the input ones."""
+    flipped = source.copy()
+    counts = np.full(len(source.twin), -1, dtype=np.int64)
+    first = np.arange(len(source.twin))
     arrays = flipped.twin, flipped.tail, flipped.length
-    fits = len(given.twin) == len(flat.twin) and replay_flips(given.twin, *arrays, flips, counts, first)
+    fits = len(source.twin) == len(flat.twin) and replay_flips(source.twin, *arrays, flips, counts, first)
     if not (fits and np.array_equal(flipped.twin, flat.twin) and np.array_equal(flipped.tail, flat.tail)):
         raise MetricError(
-            f"the {len(flips)} flips do not lead from this mesh of {given.face_count} triangles to the flat "
+            f"the {len(flips)} flips do not lead from this mesh of {source.face_count} triangles to the flat "
             f"triangulation, which has {flat.face_count}: they are of different meshes"
         )
     return counts, first
 
 
 def _trace(
-    given: IntrinsicTriangulation, flat: IntrinsicTriangulation, counts: IntArray, first: IntArray
+    source: IntrinsicTriangulation, flat: IntrinsicTriangulation, counts: IntArray, first: IntArray
 ) -> tuple[IntArray, IntArray, IntArray, IntArray, FloatArray, FloatArray]:
     """Return the crossings along both sets of edges and the lambda lengths around them."""
-
     found = np.flatnonzero(counts > 0)
     lower = found[found < flat.twin[found]]
     total = int(counts[lower].sum())
@@ -126,13 +124,13 @@ def _trace(
     near, far = np.empty((2, total, 2))
     touched = np.unique(found // 3)
     arrays = counts, first, touched, offset, number, crossed, leaving, near, far
-    trace_edges(given.twin, flat.twin, flat.length, *arrays)
+    trace_edges(source.twin, flat.twin, flat.length, *arrays)
     return offset, number, crossed, leaving, near, far
 
 
 @compiled
 def corner_counts(counts: IntArray, base: int, i: int) -> tuple[int, int]:
-    """Return how many pieces of given edges cut off corner i of a triangle, and how many start from it."""
+    """Return how many pieces of input edges cut off corner i of a triangle, and how many start from it."""
     a = max(counts[base + i], 0)
     b = max(counts[base + (i + 1) % 3], 0)
     c = max(counts[base + (i + 2) % 3], 0)
@@ -179,14 +177,14 @@ def replay_flips(
     counts: IntArray,
     first: IntArray,
 ) -> bool:
-    """Flip the given triangulation, keeping count of the crossings with the given edges.
+    """Flip the input triangulation, keeping count of the crossings with the input edges.
 
     Args:
         given_twin: twins before the flips.
         twin, tail, length: the triangulation, changed in place; the lengths are not looked at.
         flips: half-edges, in order.
-        counts: number of crossings on the edge of each half-edge, changed in place; -1 for given edges.
-        first: for each half-edge the given half-edge from the same vertex that is the same or the next
+        counts: number of crossings on the edge of each half-edge, changed in place; -1 for input edges.
+        first: for each half-edge the input half-edge from the same vertex that is the same or the next
             one counterclockwise, changed in place; -1 stands for the last edge around a boundary vertex.
 
     Returns:
@@ -236,10 +234,10 @@ def trace_edges(
     near: FloatArray,
     far: FloatArray,
 ) -> None:
-    """Follow each given edge that is crossed from triangle to triangle.
+    """Follow each input edge that is crossed from triangle to triangle.
 
-    Crossings are numbered along one given edge after the other. On the way go the lambda lengths between an
-    end of the given edge and the ends of the edges crossed: by Ptolemy's relation the one to the apex of the
+    Crossings are numbered along one input edge after the other. With them go the lambda lengths between an
+    end of the input edge and the ends of the edges crossed: by Ptolemy's relation the one to the apex of the
     next triangle is a sum of products of positive numbers, so that none loses digits.
 
     Args:
@@ -249,8 +247,8 @@ def trace_edges(
         offset: for each half-edge, where the places of its edge begin in `number`.
         number: filled: the crossing at each place along each edge, counted from the tail of its half-edge
             of smaller index.
-        crossed: filled: for each crossing the half-edge through which the given edge leaves a triangle.
-        leaving: filled: the given half-edge that runs in this direction.
+        crossed: filled: for each crossing the half-edge through which the input edge leaves a triangle.
+        leaving: filled: the input half-edge that runs in this direction.
         near: filled: (x, 2) lambda lengths from its tail to tail and head of the half-edge crossed.
         far: filled: (x, 2) the same from its head.
     """
@@ -290,7 +288,7 @@ def _forth(
     crossed: IntArray,
     near: FloatArray,
 ) -> tuple[int, int]:
-    """Follow a given edge from the apex over a half-edge to its end; return the crossings so far and the last
+    """Follow an input edge from the apex over a half-edge to its end; return the crossings so far and the last
     half-edge, whose opposite corner is the end."""
     at_tail = length[slot - slot % 3 + (slot + 2) % 3]
     at_head = length[slot - slot % 3 + (slot + 1) % 3]
@@ -329,7 +327,7 @@ def _back(
     stop: int,
     far: FloatArray,
 ) -> None:
-    """Go back along an given edge with the lambda lengths from its head."""
+    """Go back along an input edge with the lambda lengths from its head."""
     at_tail = length[last - last % 3 + (last + 1) % 3]
     at_head = length[last - last % 3 + (last + 2) % 3]
     for x in range(stop - 1, start - 1, -1):

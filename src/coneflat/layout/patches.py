@@ -13,7 +13,7 @@ from ..compiled import compiled
 from ..errors import MetricError
 from ..geometry.straight import FlatTriangles
 from ..mesh import label_components
-from ..solver.superlu import SuperLUFactor
+from ..solver.factors import SuperLUFactor
 
 # Height over longest side up to which a triangle counts as degenerate: coordinates in the plane are good to
 # about 1e-12 of an edge, and a triangle must stay upright when they are rounded.
@@ -32,7 +32,7 @@ ARMIJO, HALVINGS = 1e-4, 20
 RIDGE = 1e-10
 # Patches at rest are left out of the equations when they make up this part of them.
 AT_REST = 0.25
-# Parts of the way found that are tried in the end, so that no vertex moves further than it need.
+# Parts of the shifts found that are tried in the end, so that no vertex moves further than it need.
 PARTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 
 
@@ -90,7 +90,7 @@ class Patches:
         self.a, self.a_of, self.b, self.b_of = found
 
     def fingerprints(self) -> list[bytes]:
-        """Return for each patch what tells it, as it is, from any other."""
+        """Return a key of each patch, the same for patches that are the same."""
         vertices, faces = (
             np.split(
                 np.argsort(label, kind="stable"), np.cumsum(np.bincount(label, minlength=self.count))[:-1]
@@ -105,10 +105,10 @@ class Patches:
     def solve(self, most_work: float) -> ComplexArray:
         """Return shifts (k,) that make the determinants positive, where this succeeds within so much work.
 
-        Newton's method with the Hessian made positive triangle by triangle. Every patch has its own
-        regularisation and step length, and rests as soon as it is done or stuck.
+        Newton's method with the Hessian made positive triangle by triangle. All patches take their steps together, in
+        one system, but every patch has its own regularisation and step length, and stops as soon as it is done or
+        stuck: `solver.newton` has one of each.
         """
-
         shifts = np.zeros(len(self.vertices), dtype=np.complex128)
         active = np.ones(self.count, dtype=bool)
         gap = np.full(self.count, np.inf)
@@ -213,7 +213,6 @@ class _Equations:
         self, a: ComplexArray, b: ComplexArray, epsilon: FloatArray
     ) -> tuple[ComplexArray, FloatArray]:
         """Return the step of each vertex of all patches, and what it adds to the slope of the energy."""
-
         k = len(self.vertices)
         gradient, values = np.zeros(2 * k), np.zeros(4 * len(self.columns))
         add_derivatives(a, b, epsilon, self.a_of, self.b_of, self.corners, self.slots, gradient, values)

@@ -44,7 +44,7 @@ class Refinement:
     crossing_weights: FloatArray
 
     def edges_on(self, edges: IntArray) -> IntArray:
-        """Return the refined mesh's edges that lie on given edges of the input, its seams for instance."""
+        """Return the refined mesh's edges that lie on some edges of the input, its seams for instance."""
         return np.unique(self.mesh.halfedge_edges[np.isin(self.halfedge_edges, edges)])
 
     def interpolate(self, values: FloatArray, edges: IntArray) -> FloatArray:
@@ -102,26 +102,26 @@ def refine(mesh: TriangleMesh, metric: ExactMetric) -> Refinement:
             f"the metric comes from {metric.euclidean_flips} Euclidean flips, which leave the conformal class of "
             "the mesh's own triangles; call exact_metric with delaunay=False to refine the mesh"
         )
-    given = intrinsic_triangulation(mesh, np.ones((len(mesh.faces), 3)))
+    source = intrinsic_triangulation(mesh, np.ones((len(mesh.faces), 3)))
     original = np.arange(len(mesh.vertices))
     if metric.doubled:
-        given, original = double(given)
+        source, original = double(source)
     phi = metric.log_scale[original]
     flat = metric.triangulation
-    crossings = overlay(given, flat, metric.flips, phi)
-    ends = np.stack([given.tail[crossings.leaving], given.tail[given.twin[crossings.leaving]]], axis=1)
+    crossings = overlay(source, flat, metric.flips, phi)
+    ends = np.stack([source.tail[crossings.leaving], source.tail[source.twin[crossings.leaving]]], axis=1)
     positions = interpolate(mesh.vertices[original], ends, crossings.on_leaving)
     sides, turns = np.empty((2, len(flat.twin)), dtype=np.complex128)
     place_triangles(flat.length, sides)
     find_turns(flat.twin, sides, turns)
-    pieces = find_pieces(given, flat, sides, crossings, positions)
+    pieces = find_pieces(source, flat, sides, crossings, positions)
     log_scale = np.concatenate([phi, crossings.log_scale])
-    return _assemble(mesh, given, crossings, positions, log_scale, pieces, turns)
+    return _assemble(mesh, source, crossings, positions, log_scale, pieces, turns)
 
 
 def _assemble(
     mesh: TriangleMesh,
-    given: IntrinsicTriangulation,
+    source: IntrinsicTriangulation,
     crossings: Overlay,
     positions: FloatArray,
     log_scale: FloatArray,
@@ -133,25 +133,25 @@ def _assemble(
     turns: (3m,) from the frame across each half-edge of the flat triangulation to that of its own triangle.
     """
     leaving = crossings.leaving
-    halfedge = np.where(leaving < mesh.faces.size, leaving, given.twin[leaving])
+    halfedge = np.where(leaving < mesh.faces.size, leaving, source.twin[leaving])
     is_own = halfedge < mesh.faces.size
     edges, leaving = mesh.halfedge_edges[halfedge[is_own]], leaving[is_own]
     weights = crossings.on_leaving[is_own]
-    backwards = given.tail[leaving] != mesh.edges[edges, 0]
+    backwards = source.tail[leaving] != mesh.edges[edges, 0]
     weights[backwards] = weights[backwards, ::-1]
 
     kept = np.ones(len(positions), dtype=bool)
-    kept[len(mesh.vertices) : given.vertex_count] = False
-    kept[given.vertex_count :] = is_own
+    kept[len(mesh.vertices) : source.vertex_count] = False
+    kept[source.vertex_count :] = is_own
     number = np.cumsum(kept) - 1
     count = int(np.searchsorted(pieces.origin, len(mesh.faces)))
     refined = TriangleMesh(positions[kept], number[pieces.corners[:count]])
     twin = halfedge_twins(refined)
-    on_flat, on_given = pieces.on_flat[:count].ravel(), pieces.on_given[:count].ravel()
+    on_flat, on_input = pieces.on_flat[:count].ravel(), pieces.on_input[:count].ravel()
     return Refinement(
         refined,
         pieces.origin[:count],
-        np.where(on_given >= 0, mesh.halfedge_edges[on_given], -1),
+        np.where(on_input >= 0, mesh.halfedge_edges[on_input], -1),
         FlatTriangles(
             pieces.sides[:count].ravel(), np.where((on_flat >= 0) & (twin >= 0), turns[on_flat], 1.0), twin
         ),

@@ -19,37 +19,37 @@ MOST_CORNERS = 6
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """r triangles, each in a given triangle and in a flat one.
+    """r triangles, each in an input triangle and in a flat one.
 
     Attributes:
-        origin: (r,) the given triangle.
+        origin: (r,) the input triangle.
         corners: (r, 3) vertices; n + x stands for crossing x.
         sides: (r, 3) sides as vectors in the frame of the flat triangle.
         on_flat: (r, 3) the flat half-edge that each side lies on, -1 for none.
-        on_given: (r, 3) the given half-edge that each side lies on, -1 for none.
+        on_input: (r, 3) the input half-edge that each side lies on, -1 for none.
     """
 
     origin: IntArray
     corners: IntArray
     sides: ComplexArray
     on_flat: IntArray
-    on_given: IntArray
+    on_input: IntArray
 
 
 def find_pieces(
-    given: IntrinsicTriangulation,
+    source: IntrinsicTriangulation,
     flat: IntrinsicTriangulation,
     sides: ComplexArray,
     crossings: Overlay,
     positions: FloatArray,
 ) -> Pieces:
-    """Return the triangles of the common subdivision, in the order of the given triangles.
+    """Return the triangles of the common subdivision, in the order of the input triangles.
 
     Args:
-        given, flat: the triangulations.
+        source, flat: the triangulations.
         sides: (3m,) sides of the flat triangles as vectors, each in the frame of its triangle.
         crossings: where their edges cross.
-        positions: (n + x, 3) vertices and crossings on the given triangles.
+        positions: (n + x, 3) vertices and crossings on the input triangles.
     """
     is_cut = (crossings.counts > 0).reshape(-1, 3).any(axis=1)
     whole = np.flatnonzero(np.repeat(~is_cut, 3))
@@ -57,22 +57,21 @@ def find_pieces(
     on_flat[crossings.first[whole]] = whole
     uncut = np.flatnonzero(on_flat[::3] >= 0)
     on_flat = on_flat.reshape(-1, 3)[uncut]
-    on_given = 3 * uncut[:, None] + np.arange(3)
-    parts = [Pieces(uncut, given.faces[uncut], sides[on_flat], on_flat, on_given)]
+    on_input = 3 * uncut[:, None] + np.arange(3)
+    parts = [Pieces(uncut, source.faces[uncut], sides[on_flat], on_flat, on_input)]
 
     outline, size, triangle = _outlines(crossings.counts, np.flatnonzero(is_cut))
     for corners in range(3, MOST_CORNERS + 1):
         chosen = size == corners
-        polygons = _Polygons(given, flat, sides, crossings, triangle[chosen], outline[chosen, :corners])
+        polygons = _Polygons(source, flat, sides, crossings, triangle[chosen], outline[chosen, :corners])
         parts.append(polygons.triangulate(positions))
     order = np.argsort(np.concatenate([part.origin for part in parts]), kind="stable")
-    names = ("origin", "corners", "sides", "on_flat", "on_given")
+    names = ("origin", "corners", "sides", "on_flat", "on_input")
     return Pieces(*(np.concatenate([getattr(part, name) for part in parts])[order] for name in names))
 
 
 def _outlines(counts: IntArray, cut: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     """Return the outlines of the pieces of triangles, see `outline_pieces`, and the triangle of each piece."""
-
     ends = np.maximum(counts, 0).reshape(-1, 3)[cut]
     # Edges that start from a corner end once on a side, the others twice.
     starting = np.maximum(2 * ends.max(axis=1, initial=0) - ends.sum(axis=1), 0)
@@ -89,13 +88,13 @@ class _Polygons:
     Attributes:
         vertex: (p, k) vertex at each corner.
         point: (p, k, 3) barycentric coordinates of the corners in the flat triangle.
-        on_flat, on_given: (p, k) half-edges that the side after each corner lies on, -1 for none.
+        on_flat, on_input: (p, k) half-edges that the side after each corner lies on, -1 for none.
         shape: (p, 3) sides of the flat triangle.
     """
 
     def __init__(
         self,
-        given: IntrinsicTriangulation,
+        source: IntrinsicTriangulation,
         flat: IntrinsicTriangulation,
         sides: ComplexArray,
         crossings: Overlay,
@@ -125,19 +124,19 @@ class _Polygons:
         self.point[piece, corner, NEXT[halfedge % 3]] = np.where(is_own, one, two)
         self.point[piece, corner, PREVIOUS[halfedge % 3]] = np.where(is_own, two, one)
 
-        # The given half-edge through each crossing, out of the triangle. The side before the crossing, if it is
-        # on a given edge, runs along it, the side after against it.
+        # The input half-edge through each crossing, out of the triangle. The side before the crossing, if it is
+        # on an input edge, runs along it, the side after against it.
         leaving = np.full(slot.shape, -1, dtype=np.int64)
         through = crossings.leaving[x]
-        leaving[piece, corner] = np.where(is_own, through, given.twin[through])
-        entering = np.where(is_crossing, given.twin[leaving], np.roll(leaving, -1, axis=1))
+        leaving[piece, corner] = np.where(is_own, through, source.twin[through])
+        entering = np.where(is_crossing, source.twin[leaving], np.roll(leaving, -1, axis=1))
         shared = np.where(crossings.counts[side] < 0, crossings.first[side], -1)
-        self.on_given = np.where(side < 0, entering, shared)
+        self.on_input = np.where(side < 0, entering, shared)
 
     def triangulate(self, positions: FloatArray) -> Pieces:
         """Return triangles.
 
-        The corners of a piece are in general position, in the plane as in the given triangle, because a line
+        The corners of a piece are in general position, in the plane as in the input triangle, because a line
         has one side of it at most. Of its triangulations the one is taken whose flattest triangle is least flat.
         """
         count = self.vertex.shape[1]
@@ -149,15 +148,15 @@ class _Polygons:
         triangle = chosen.reshape(-1, 3)
         piece = np.repeat(np.arange(len(chosen)), count - 2)
         sides = np.empty(triangle.shape, dtype=np.complex128)
-        on_flat, on_given = np.full((2, *triangle.shape), -1, dtype=np.int64)
+        on_flat, on_input = np.full((2, *triangle.shape), -1, dtype=np.int64)
         for i in range(3):
             start, end = triangle[:, NEXT[i]], triangle[:, PREVIOUS[i]]
             sides[:, i] = _vectors(self.shape[piece], self.point[piece, start], self.point[piece, end])
             is_side = end == (start + 1) % count
             on_flat[is_side, i] = self.on_flat[piece, start][is_side]
-            on_given[is_side, i] = self.on_given[piece, start][is_side]
-        origin = self.on_given.max(axis=1, initial=0) // 3
-        return Pieces(origin[piece], self.vertex[piece[:, None], triangle], sides, on_flat, on_given)
+            on_input[is_side, i] = self.on_input[piece, start][is_side]
+        origin = self.on_input.max(axis=1, initial=0) // 3
+        return Pieces(origin[piece], self.vertex[piece[:, None], triangle], sides, on_flat, on_input)
 
     def _heights(self, triple: IntArray, positions: FloatArray) -> FloatArray:
         """Return (p,) height over longest side of the triangle of three corners, the least in plane and space."""
@@ -216,10 +215,10 @@ def outline_pieces(
     Args:
         counts: crossings on each half-edge, see `overlay.Overlay`.
         cut: (k,) triangles with crossings on their sides.
-        start: (k,) the first piece of each; it has one more than given edges run across it.
+        start: (k,) the first piece of each; it has one more than input edges run across it.
         outline: (p, 6, 3) filled; for each corner of a piece the half-edge that it lies on and its place among
             the crossings on it, or -1 and the corner of the triangle that it is; and the half-edge that the
-            side after it lies on, -1 if this side is a given edge.
+            side after it lies on, -1 if this side is an input edge.
         size: (p,) the corners so far, 0.
     """
     for k in range(len(cut)):

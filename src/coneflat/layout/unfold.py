@@ -43,7 +43,6 @@ def unfold(flat: FlatTriangles, corners: IntArray, cut: BoolArray) -> FloatArray
         | border first, 10 steps | 1e-13, 7e-13 | 8e-13, 7e-11 | 1e-11, 3e-9 |
         | border first, 100 steps | 1e-13, 8e-13 | 8e-13, 2e-11 | 1e-11, 2e-10 |
     """
-
     corner = np.ascontiguousarray(corners, dtype=np.int64).ravel()
     cut = cut | (flat.twin < 0)
     m, count = len(corners), int(corner.max()) + 1
@@ -80,7 +79,6 @@ def _next(halfedges: IntArray) -> IntArray:
 
 def _border(flat: FlatTriangles, cut: BoolArray, start: int) -> tuple[IntArray, ComplexArray]:
     """Return the border loop of a half-edge and frames of its triangles in which the loop closes."""
-
     room = int(cut.sum())
     border, frames = np.empty(room, dtype=np.int64), np.empty(room + 1, dtype=np.complex128)
     count = walk_border(flat.twin, cut, flat.turns, start, border, frames)
@@ -103,9 +101,9 @@ def _close_gaps(
     """Move the points that are not pinned, in place, to spread the gaps in the layout.
 
     Conjugate gradients on the sum of the squared relative gaps, preconditioned by the diagonal. The gaps are
-    jumps along lines where fronts have met; k iterations spread a jump over about k triangles.
+    jumps along lines where fronts have met; k iterations spread a jump over about k triangles. SciPy's would divide by
+    zero where no gap is left, as on small charts.
     """
-
     squared = sides.real**2 + sides.imag**2
     weight = 1 / np.maximum(squared, NO_LENGTH**2 * squared.max())
     ends = corner.reshape(-1, 3)

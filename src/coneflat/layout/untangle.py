@@ -34,7 +34,7 @@ class Untangled:
     Attributes:
         flat: the triangles; their frames and gluing are the ones before.
         moved: (k,) vertices that were moved.
-        largest_move: the longest way, relative to the mean length of the edges at the vertex.
+        largest_move: how far a vertex was moved at most, relative to the mean length of the edges at the vertex.
         left: (j,) triangles that are inverted or degenerate still.
         work: the number of times that a triangle's derivatives were computed.
     """

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray, dots
+from .._arrays import BoolArray, FloatArray, IntArray, dots
+from ..compiled import compiled
 from ..errors import ArrayShapeError
+from ..geometry.charts import both_sides, joined_edges, label_charts
 from ..geometry.overlap import Overlaps, find_overlaps
-from ..mesh import TriangleMesh, end_corners, label_components
+from ..mesh import TriangleMesh
 from ..threads import meanwhile
 
 ZERO_AREA = 1e-12  # twice the area over the longest side squared: no digit of the shape is left below
-JOINED = 1e-6  # UV distance over UV edge length at which two sides of an edge count as one
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +145,6 @@ def angle_sum_errors(
         corner_uv: (m, 3, 2) the UV point of every triangle corner.
         prescribed: (n,) curvature of vertices in the plane, NaN where it is free; so is the error then.
     """
-    from .distortion_kernel import sum_angles
-
     uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
     sums, change = sum_angles(mesh.faces, uv, len(mesh.vertices))
     full = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
@@ -158,8 +158,6 @@ def measure_map(
     cones: IntArray | None = None,
 ) -> Distortion:
     """Return all measures but those of overlaps; arguments are those of `measure`."""
-    from .distortion_kernel import measure_triangles
-
     corner_uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
     area, has_area, uv_area, has_uv_area, qc = measure_triangles(
         mesh.vertices, mesh.faces, corner_uv, ZERO_AREA
@@ -170,10 +168,12 @@ def measure_map(
     weights = area[valid]
     mean_scale = _mean(log_scale[valid], weights)
 
-    seams, charts, chart = _seams_and_charts(mesh, corner_uv)
-    way = np.where(has_uv_area, np.sign(uv_area), 0)
-    majority = np.sign(np.bincount(chart, weights=np.abs(uv_area) * way, minlength=charts))
-    against = way * majority[chart] < 0
+    joined = joined_edges(mesh, corner_uv)
+    seams = np.flatnonzero(~joined & ~mesh.is_boundary_edge)
+    charts, chart = label_charts(mesh, joined)
+    sign = np.where(has_uv_area, np.sign(uv_area), 0)
+    majority = np.sign(np.bincount(chart, weights=np.abs(uv_area) * sign, minlength=charts))
+    against = sign * majority[chart] < 0
     seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
     return Distortion(
         qc=qc,
@@ -199,38 +199,16 @@ def measure_map(
     )
 
 
-def _sides(mesh: TriangleMesh, corner_uv: FloatArray, edges: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return the UV ends (k, 2, 2) of interior edges as each of their two faces sees them, in one order."""
-    corners = corner_uv.reshape(-1, 2)
-    one, two = (end_corners(mesh.edge_halfedges[edges, side]) for side in (0, 1))
-    return corners[np.stack(one, axis=1)], corners[np.stack(two[::-1], axis=1)]
-
-
 def _side_lengths(ends: FloatArray) -> FloatArray:
     side = ends[:, 1] - ends[:, 0]
     return np.sqrt(dots(side, side))
-
-
-def seams_of(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
-    """Return the inner edges whose two sides have different UVs."""
-    return _seams_and_charts(mesh, np.ascontiguousarray(corner_uv, dtype=np.float64))[0]
-
-
-def _seams_and_charts(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[IntArray, int, IntArray]:
-    """Return the interior edges whose UVs differ, the number of charts, and the chart of each face."""
-    from .distortion_kernel import find_joined
-
-    joined = find_joined(mesh.edge_halfedges, corner_uv, JOINED)
-    faces = mesh.edge_faces[joined]
-    count, chart = label_components(len(mesh.faces), faces[:, 0], faces[:, 1])
-    return np.flatnonzero(~joined & ~mesh.is_boundary_edge), count, chart
 
 
 def _seam_mismatch(
     mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the length on the model of each seam edge, and the relative difference of its UV lengths."""
-    here, there = (_side_lengths(ends) for ends in _sides(mesh, corner_uv, seams))
+    here, there = (_side_lengths(ends) for ends in both_sides(mesh, seams, corner_uv))
     ends = mesh.vertices[mesh.edges[seams]]
     return _side_lengths(ends), np.abs(here - there) / np.maximum((here + there) / 2, np.finfo(float).tiny)
 
@@ -239,7 +217,7 @@ def _seam_motion_mismatch(
     mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray, cones: IntArray | None
 ) -> float:
     """Return the largest change, radians, of the rotation between a seam's sides along it."""
-    here, there = _sides(mesh, corner_uv, seams)
+    here, there = both_sides(mesh, seams, corner_uv)
     one = (here[:, 1] - here[:, 0]) @ np.array([1, 1j])
     two = (there[:, 1] - there[:, 0]) @ np.array([1, 1j])
     # `here` is the side of the first half-edge, which may be either side of the seam: each edge tells the
@@ -283,3 +261,85 @@ def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
     order = np.argsort(values)
     cumulated = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(cumulated, fraction * cumulated[-1])])
+
+
+@compiled
+def measure_triangles(
+    vertices: FloatArray, faces: IntArray, corner_uv: FloatArray, zero: float
+) -> tuple[FloatArray, BoolArray, FloatArray, BoolArray, FloatArray]:
+    """Return twice the area of triangles and whether they have any, the same in the plane, and their QC distortion.
+
+    Args:
+        vertices: (n, 3) positions.
+        faces: (m, 3).
+        corner_uv: (m, 3, 2).
+        zero: twice the area over the square of the longest side up to which there is none.
+
+    Returns:
+        (m,) each. Areas in the plane have a sign. QC is the ratio of the singular values of the map, NaN where one of
+        the areas is none.
+    """
+    count = len(faces)
+    area, uv_area, ratio = np.empty(count), np.empty(count), np.empty(count)
+    has_area, has_uv_area = np.empty(count, np.bool_), np.empty(count, np.bool_)
+    one, two, normal = np.empty(3), np.empty(3), np.empty(3)
+    for f in range(count):
+        along, inner, across, opposite = 0.0, 0.0, 0.0, 0.0
+        for x in range(3):
+            start = vertices[faces[f, 0], x]
+            one[x], two[x] = vertices[faces[f, 1], x] - start, vertices[faces[f, 2], x] - start
+            along += one[x] * one[x]
+            inner += one[x] * two[x]
+            across += two[x] * two[x]
+            opposite += (two[x] - one[x]) ** 2
+        square = 0.0
+        for x in range(3):
+            y, z = (x + 1) % 3, (x + 2) % 3
+            normal[x] = one[y] * two[z] - one[z] * two[y]
+            square += normal[x] * normal[x]
+        area[f] = math.sqrt(square)
+        has_area[f] = area[f] > zero * max(along, across, opposite)
+        u1, v1 = corner_uv[f, 1, 0] - corner_uv[f, 0, 0], corner_uv[f, 1, 1] - corner_uv[f, 0, 1]
+        u2, v2 = corner_uv[f, 2, 0] - corner_uv[f, 0, 0], corner_uv[f, 2, 1] - corner_uv[f, 0, 1]
+        uv_area[f] = u1 * v2 - v1 * u2
+        longest = max(u1 * u1 + v1 * v1, u2 * u2 + v2 * v2, (u2 - u1) ** 2 + (v2 - v1) ** 2)
+        has_uv_area[f] = abs(uv_area[f]) > zero * longest
+        ratio[f] = np.nan
+        if has_area[f] and has_uv_area[f]:
+            # The images of two orthonormal vectors, the first along the first side.
+            base = math.sqrt(along)
+            height = area[f] / base
+            x1, y1 = u1 / base, v1 / base
+            x2, y2 = (u2 - x1 * inner / base) / height, (v2 - y1 * inner / base) / height
+            larger = (math.hypot(x1 + y2, y1 - x2) + math.hypot(x1 - y2, y1 + x2)) / 2
+            # The smaller one from the determinant: their difference would cancel.
+            smaller = abs(uv_area[f]) / area[f] / larger
+            ratio[f] = max(larger / smaller, 1.0)
+    return area, has_area, uv_area, has_uv_area, ratio
+
+
+@compiled
+def sum_angles(faces: IntArray, corner_uv: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return (n,) the sum of the angles in the plane around each vertex, and by what a rounded point changes it.
+
+    Angles are those of the triangles' shapes, whichever way these are turned, so a vertex that its triangles go
+    around twice has 4 pi. Where a side has no length there is no angle. The change is in radians per unit that points
+    are off by, infinite beside such a side.
+
+    Args:
+        faces: (m, 3) the vertices, or whatever else angles are to be summed up at.
+        corner_uv: (m, 3, 2).
+        count: n.
+    """
+    sums, change = np.zeros(count), np.zeros(count)
+    for f in range(len(faces)):
+        for i in range(3):
+            at, one, two = corner_uv[f, i], corner_uv[f, (i + 1) % 3], corner_uv[f, (i + 2) % 3]
+            u1, v1, u2, v2 = one[0] - at[0], one[1] - at[1], two[0] - at[0], two[1] - at[1]
+            length1, length2 = math.hypot(u1, v1), math.hypot(u2, v2)
+            change[faces[f, i]] += 1.0 / length1 + 1.0 / length2
+            if length1 > 0.0 and length2 > 0.0:
+                # Of sides of length one, lest products of tiny or huge ones are no numbers.
+                u1, v1, u2, v2 = u1 / length1, v1 / length1, u2 / length2, v2 / length2
+                sums[faces[f, i]] += abs(math.atan2(u1 * v2 - v1 * u2, u1 * u2 + v1 * v2))
+    return sums, change

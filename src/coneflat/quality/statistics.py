@@ -20,7 +20,7 @@ class SolveStatistics:
         broken: triangles of the metric that break the triangle inequality.
         untangled_triangles: triangles that were inverted on their straight sides, and were turned over.
         untangled_vertices: vertices that were moved for this.
-        untangled_move: their longest way, relative to the mean edge around them.
+        untangled_move: how far one was moved at most, relative to the mean edge around them.
         refined_triangles: triangles that were added by the common subdivision.
         area_distortion_linear: E of the linear model that the cones were chosen in: the standard deviation of
             the log scale, by area (and importance, where weights were given).

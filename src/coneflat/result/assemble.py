@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ from ..layout.convex import make_convex
 from ..mesh import TriangleMesh
 from ..options import CONED, Options, settings
 from ..progress import Stages
-from ..quality.distortion import curvature_errors, measure
+from ..quality.distortion import Distortion, curvature_errors, measure
 from ..quality.rotations import Rotations, measure_rotations
 from ..quality.statistics import SolveStatistics
 from .flattening import Flattening
@@ -26,12 +26,89 @@ from .promises import broken_promises
 
 if TYPE_CHECKING:
     from ..flat import LaidOut
-    from ..input.components import Component, Prepared
+    from ..input.components import Prepared
 
 
 POLYGONS_LOST = (
     "The refinement has triangles of its own: polygons, groups and materials of the file are not kept."
 )
+
+
+@dataclass(frozen=True, eq=False)
+class _Numbering:
+    """The vertices of the result: those of the input as it numbers them, then those that were added.
+
+    Attributes:
+        positions: (r, 3).
+        vertex_origin: (r,) the vertex of the input, -1 for those that a refinement added.
+        of_checked: (n,) the number of each vertex of the checked mesh.
+        of_parts: the number of each vertex of each component.
+    """
+
+    positions: FloatArray
+    vertex_origin: IntArray
+    of_checked: IntArray
+    of_parts: list[IntArray]
+
+    def spread(self, values: Sequence[FloatArray]) -> FloatArray:
+        """Return (r,) values at the vertices of components, NaN at vertices that are of none."""
+        every = np.full(len(self.positions), np.nan)
+        for ids, value in zip(self.of_parts, values, strict=True):
+            every[ids] = value
+        return every
+
+    def renumber(self, vertices: Sequence[IntArray]) -> IntArray:
+        """Return the numbers of vertices of the components, one component after the other."""
+        return np.concatenate([ids[own] for ids, own in zip(self.of_parts, vertices, strict=True)])
+
+
+@dataclass(frozen=True, eq=False)
+class _Triangles:
+    """The triangles of the result, in the order of the input's faces.
+
+    Attributes:
+        order: (m,) which triangle each is, of those of all components.
+        faces: (m, 3) vertices of the result.
+        face_origin: (m,) the face of the input.
+    """
+
+    order: IntArray
+    faces: IntArray
+    face_origin: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Layout:
+    """The charts in the unit square.
+
+    Attributes:
+        uv: (u, 2) points.
+        corners: (m, 3) the point of each triangle corner, in the order of the result.
+        own: (m, 3) the same, component after component.
+        scale: UV units per unit of length of the checked mesh.
+        efficiency: part of the square that is covered.
+    """
+
+    uv: FloatArray
+    corners: IntArray
+    own: IntArray
+    scale: float
+    efficiency: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Curvature:
+    """Curvature at the vertices of the result, radians.
+
+    Attributes:
+        target: (r,) what was wanted of the metric.
+        prescribed: (r,) what vertices are to have in the plane; NaN where it is free.
+        residual: (r,) the target less what was reached.
+    """
+
+    target: FloatArray
+    prescribed: FloatArray
+    residual: FloatArray
 
 
 def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, stages: Stages) -> Flattening:
@@ -42,77 +119,40 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         laid_out: its flattened components.
         options, stages: what the result tells about itself.
     """
-    given, checked, parts = prepared.given, prepared.checked, prepared.components
-    points = np.asarray(given.vertices, dtype=np.float64)
-    number, vertex_origin = result_numbering(checked, len(points))
-    numbers, positions = _number_vertices(number, points[vertex_origin], parts, laid_out, checked.exponent)
-    face_origin = np.concatenate(
-        [part.faces[one.face_origin] for part, one in zip(parts, laid_out, strict=True)]
-    )
-    order = np.argsort(face_origin, kind="stable")
-    faces = np.concatenate([ids[one.mesh.faces] for ids, one in zip(numbers, laid_out, strict=True)])[order]
-
+    given, checked = prepared.given, prepared.checked
+    numbering = _number_vertices(prepared, laid_out)
+    triangles = _sort_triangles(prepared, laid_out, numbering)
+    corners_in_space = numbering.positions[triangles.faces]
     with stages("pack"):
-        points, corners, chart, component = _all_charts(laid_out)
-        own, corners, chart = corners, corners[order], chart[order]
-        packed = arrange_charts(
-            points[corners],
-            chart,
-            component,
-            positions[faces],
-            resolution=options.resolution,
-            padding=options.padding,
-            tiles=options.tiles,
-            up=options.up,
-            quantum=options.quantise,
-        )
-        uv = np.empty_like(points)
-        uv[corners] = packed.corner_uv
-
+        layout = _pack(laid_out, triangles, corners_in_space, options)
     refined = any(one.statistics.refined_triangles for one in laid_out)
     face_corners = (
         None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
     )
     if face_corners is not None and given.source is not None:
+        polygons = Polygons(given.source.offsets, face_corners)
         with stages("polygons"):
-            uv = make_convex(uv, corners, Polygons(given.source.offsets, face_corners), positions[faces])
-
-    def spread(values: Sequence[FloatArray]) -> FloatArray:
-        every = np.full(len(positions), np.nan)
-        for ids, value in zip(numbers, values, strict=True):
-            every[ids] = value
-        return every
-
-    target = spread([one.target for one in laid_out])
-    prescribed = spread([_prescribed(one, options) for one in laid_out])
-    # What was opened there has several copies of a vertex.
-    prescribed[number[prepared.seams]] = np.nan
-    residual = target - spread([one.curvature for one in laid_out])
-    cones = np.concatenate([ids[one.cones] for ids, one in zip(numbers, laid_out, strict=True)])
+            uv = make_convex(layout.uv, layout.corners, polygons, corners_in_space)
+            layout = replace(layout, uv=uv)
+    curvature = _curvature(prepared, laid_out, numbering, options)
+    cones = numbering.renumber([one.cones for one in laid_out])
     with stages("measure"):
-        scaled = _known_or_new(checked.mesh, np.ldexp(positions, checked.exponent), faces)
-        errors = curvature_errors(residual[np.isfinite(residual)])
-        measured = partial(measure, scaled, curvature_error=errors, cones=cones, prescribed=prescribed)
-        distortion = measured(uv[corners])
-        if options.charts == "atlas" and distortion.overlapping_pairs:
-            parted, overlaps = part_touching(uv, corners)
-            if len(overlaps.pairs) < distortion.overlapping_pairs:
-                uv, distortion = parted, measured(parted[corners], overlaps=overlaps)
-        rotations = _rotations(laid_out, uv[own], options)
+        layout, distortion = _measure(prepared, numbering, triangles, layout, curvature, cones, options)
+        rotations = _rotations(laid_out, layout.uv[layout.own], options)
     result = Flattening(
-        vertices=positions,
-        faces=faces,
-        uv=uv,
-        uv_faces=corners,
-        uv_scale=float(np.ldexp(packed.scale, checked.exponent)),
-        packing_efficiency=packed.efficiency,
+        vertices=numbering.positions,
+        faces=triangles.faces,
+        uv=layout.uv,
+        uv_faces=layout.corners,
+        uv_scale=float(np.ldexp(layout.scale, checked.exponent)),
+        packing_efficiency=layout.efficiency,
         cones=cones,
-        curvatures=target[cones],
-        log_scale=spread([one.log_scale for one in laid_out]),
-        prescribed=prescribed,
-        curvature_residual=residual,
+        curvatures=curvature.target[cones],
+        log_scale=numbering.spread([one.log_scale for one in laid_out]),
+        prescribed=curvature.prescribed,
+        curvature_residual=curvature.residual,
         seams=np.concatenate(
-            [number[prepared.seams], *(ids[one.seams] for ids, one in zip(numbers, laid_out, strict=True))]
+            [numbering.of_checked[prepared.seams], numbering.renumber([one.seams for one in laid_out])]
         ),
         distortion=distortion.rescaled(checked.exponent * np.log(2)),
         seconds=dict(stages.seconds),
@@ -127,12 +167,95 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
             [one.statistics for one in laid_out], [one.area if len(laid_out) > 1 else 1.0 for one in laid_out]
         ),
         rotations=rotations,
-        vertex_origin=np.concatenate([vertex_origin, np.full(len(positions) - len(vertex_origin), -1)]),
-        face_origin=checked.face_origin[face_origin[order]],
+        vertex_origin=numbering.vertex_origin,
+        face_origin=triangles.face_origin,
         face_corners=face_corners,
         source=given.source,
     )
     return replace(result, notes=(*result.notes, *broken_promises(result)))
+
+
+def _number_vertices(prepared: Prepared, laid_out: Sequence[LaidOut]) -> _Numbering:
+    """Return the numbers of vertices; those that a refinement added come last."""
+    checked, points = prepared.checked, np.asarray(prepared.given.vertices, dtype=np.float64)
+    number, vertex_origin = result_numbering(checked, len(points))
+    of_parts, blocks, count = [], [points[vertex_origin]], len(vertex_origin)
+    for part, one in zip(prepared.components, laid_out, strict=True):
+        added = one.mesh.vertices[len(part.vertices) :]
+        of_parts.append(np.concatenate([number[part.vertices], np.arange(count, count + len(added))]))
+        blocks.append(np.ldexp(added, -checked.exponent))
+        count += len(added)
+    vertex_origin = np.concatenate([vertex_origin, np.full(count - len(vertex_origin), -1)])
+    return _Numbering(np.concatenate(blocks), vertex_origin, number, of_parts)
+
+
+def _sort_triangles(prepared: Prepared, laid_out: Sequence[LaidOut], numbering: _Numbering) -> _Triangles:
+    """Return the triangles of all components in the order of the input's faces."""
+    origin = np.concatenate(
+        [part.faces[one.face_origin] for part, one in zip(prepared.components, laid_out, strict=True)]
+    )
+    order = np.argsort(origin, kind="stable")
+    faces = numbering.renumber([one.mesh.faces for one in laid_out])[order]
+    return _Triangles(order, faces, prepared.checked.face_origin[origin[order]])
+
+
+def _pack(
+    laid_out: Sequence[LaidOut], triangles: _Triangles, corners_in_space: FloatArray, options: Options
+) -> _Layout:
+    """Return the charts of all components, packed."""
+    points, own, chart, component = _all_charts(laid_out)
+    corners = own[triangles.order]
+    packed = arrange_charts(
+        points[corners],
+        chart[triangles.order],
+        component,
+        corners_in_space,
+        resolution=options.resolution,
+        padding=options.padding,
+        tiles=options.tiles,
+        up=options.up,
+        quantum=options.quantise,
+    )
+    uv = np.empty_like(points)
+    uv[corners] = packed.corner_uv
+    return _Layout(uv, corners, own, packed.scale, packed.efficiency)
+
+
+def _curvature(
+    prepared: Prepared, laid_out: Sequence[LaidOut], numbering: _Numbering, options: Options
+) -> _Curvature:
+    """Return the curvature wanted, prescribed and missed."""
+    target = numbering.spread([one.target for one in laid_out])
+    prescribed = numbering.spread([_prescribed(one, options) for one in laid_out])
+    # What was opened there has several copies of a vertex.
+    prescribed[numbering.of_checked[prepared.seams]] = np.nan
+    return _Curvature(target, prescribed, target - numbering.spread([one.curvature for one in laid_out]))
+
+
+def _measure(
+    prepared: Prepared,
+    numbering: _Numbering,
+    triangles: _Triangles,
+    layout: _Layout,
+    curvature: _Curvature,
+    cones: IntArray,
+    options: Options,
+) -> tuple[_Layout, Distortion]:
+    """Return the measures of a layout, and the layout, in which triangles of an atlas that only touch are apart."""
+    checked, residual = prepared.checked, curvature.residual
+    measured = partial(
+        measure,
+        _known_or_new(checked.mesh, np.ldexp(numbering.positions, checked.exponent), triangles.faces),
+        curvature_error=curvature_errors(residual[np.isfinite(residual)]),
+        cones=cones,
+        prescribed=curvature.prescribed,
+    )
+    distortion = measured(layout.uv[layout.corners])
+    if options.charts == "atlas" and distortion.overlapping_pairs:
+        parted, overlaps = part_touching(layout.uv, layout.corners)
+        if len(overlaps.pairs) < distortion.overlapping_pairs:
+            return replace(layout, uv=parted), measured(parted[layout.corners], overlaps=overlaps)
+    return layout, distortion
 
 
 def _rotations(laid_out: Sequence[LaidOut], corner_uv: FloatArray, options: Options) -> Rotations | None:
@@ -182,23 +305,3 @@ def _all_charts(laid_out: Sequence[LaidOut]) -> tuple[FloatArray, IntArray, IntA
         points, count = points + len(one.points), count + int(chart.max()) + 1
     every = np.concatenate([one.points for one in laid_out])
     return every, np.concatenate(corners), np.concatenate(charts), np.array(component, dtype=np.int64)
-
-
-def _number_vertices(
-    number: IntArray,
-    positions: FloatArray,
-    parts: Sequence[Component],
-    laid_out: Sequence[LaidOut],
-    exponent: int,
-) -> tuple[list[IntArray], FloatArray]:
-    """Return the number in the result of each vertex of each component, and the positions of all.
-
-    Vertices that a refinement added come last.
-    """
-    numbers, blocks, count = [], [positions], len(positions)
-    for part, one in zip(parts, laid_out, strict=True):
-        added = one.mesh.vertices[len(part.vertices) :]
-        numbers.append(np.concatenate([number[part.vertices], np.arange(count, count + len(added))]))
-        blocks.append(np.ldexp(added, -exponent))
-        count += len(added)
-    return numbers, np.concatenate(blocks)

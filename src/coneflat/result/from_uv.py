@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from .._arrays import unit_exponent
 from ..errors import MeshFileError, MissingUVError
 from ..geometry import double_areas, edge_lengths
+from ..geometry.charts import uv_seams
 from ..input.join import Joined
 from ..quality.checker import cell_side
-from ..quality.distortion import angle_sum_errors, seams_of
+from ..quality.distortion import angle_sum_errors
 from ..quality.statistics import SolveStatistics
 from .flattening import Flattening
 from .mapped import Mapped, has_uv, of_file
@@ -57,7 +59,7 @@ def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
         )
     mesh = measured.mesh
     uv, uv_faces = uv_points(mesh, measured.corner_uv)
-    exponent = int(np.frexp(np.abs(mesh.vertices).max())[1])
+    exponent = unit_exponent(mesh.vertices)
     area = float(double_areas(edge_lengths(np.ldexp(mesh.vertices, -exponent), mesh.faces)).sum()) / 2
     scale = cell_side(uv, uv_faces, 1.0) / np.sqrt(area) if area > 0 else float("nan")
     return Flattening(
@@ -72,7 +74,7 @@ def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
         log_scale=np.full(len(mesh.vertices), np.nan),
         prescribed=np.full(len(mesh.vertices), np.nan),
         curvature_residual=angle_sum_errors(mesh, measured.corner_uv, np.zeros(len(mesh.vertices)))[0],
-        seams=mesh.edges[seams_of(mesh, measured.corner_uv)],
+        seams=mesh.edges[uv_seams(mesh, measured.corner_uv)],
         distortion=measured.distortion,
         seconds={},
         notes=measured.notes,

@@ -10,15 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import FloatArray, IntArray, unit_exponent
 from ..errors import MissingUVError
+from ..geometry.charts import joined_edges, label_charts
 from ..geometry.coverage import RASTER, layers_of_raster
 from ..geometry.overlap import find_overlaps
 from ..geometry.planar import signed_double_areas
 from ..input.numbering import at_unit_size
 from ..input.validation import CheckedMesh, check_mesh, left_out
-from ..mesh import TriangleMesh, corner_fans, end_corners, label_components
-from ..quality.distortion import JOINED, Distortion, measure_map
+from ..mesh import TriangleMesh, corner_fans, end_corners
+from ..quality.distortion import Distortion, measure_map
 from ..text import plural
 from .mapped import Mapped, as_mapped
 from .report import MEASURES, path_text
@@ -136,7 +137,7 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
     """
     known = mapped.has_uv
     checked, corner_uv = surface_of(mapped, strict=strict)
-    exponent = int(np.frexp(np.abs(corner_uv).max())[1])
+    exponent = unit_exponent(corner_uv)
     unit = np.ldexp(corner_uv, -exponent)
     scaled = at_unit_size(checked)
     distortion = measure_map(scaled.mesh, unit).rescaled((scaled.exponent + exponent) * np.log(2))
@@ -186,16 +187,9 @@ def surface_of(mapped: Mapped, *, strict: bool = False) -> tuple[CheckedMesh, Fl
     return checked, corner_uv
 
 
-def joined_pairs(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
-    """Return (k, 2) the half-edges of edges whose two sides have the same UVs."""
-    from ..quality.distortion_kernel import find_joined
-
-    return mesh.edge_halfedges[find_joined(mesh.edge_halfedges, corner_uv, JOINED)]
-
-
 def uv_points(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return (u, 2) points of charts, and (m, 3) those of the corners: one where triangles are joined, else several."""
-    count, fan = corner_fans(mesh.faces, *joined_pairs(mesh, corner_uv).T)
+    count, fan = corner_fans(mesh.faces, *mesh.edge_halfedges[joined_edges(mesh, corner_uv)].T)
     points = np.empty((count, 2))
     points[fan] = corner_uv
     return points, fan
@@ -206,11 +200,11 @@ def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
 
     A triangle that is turned over, or folds that wind around a point twice, make it large.
     """
-    from ..quality.distortion_kernel import sum_angles
+    from ..quality.distortion import sum_angles
 
     points, fan = uv_points(mesh, corner_uv)
     joined = np.zeros(mesh.faces.size, dtype=bool)
-    joined[joined_pairs(mesh, corner_uv)] = True
+    joined[mesh.edge_halfedges[joined_edges(mesh, corner_uv)]] = True
     inside = np.ones(len(points), dtype=bool)
     for end in end_corners(np.flatnonzero(~joined)):
         inside[fan.reshape(-1)[end]] = False
@@ -225,8 +219,7 @@ def _tiles(mesh: TriangleMesh, unit: FloatArray, exponent: int) -> FloatArray:
 
     unit: (m, 3, 2) UVs over two to the power of the exponent.
     """
-    pairs = joined_pairs(mesh, unit) // 3
-    charts, chart = label_components(len(mesh.faces), pairs[:, 0], pairs[:, 1])
+    charts, chart = label_charts(mesh, joined_edges(mesh, unit))
     weights = np.abs(signed_double_areas(unit)) + np.finfo(np.float64).tiny
     total = np.bincount(chart, weights, charts)
     middles = [np.bincount(chart, weights * unit[..., k].mean(axis=1), charts) / total for k in (0, 1)]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._arrays import unit_exponent
 from ..geometry.overlap import Overlaps
 from ..geometry.planar import sides_between
 from ..mesh import TriangleMesh
@@ -74,7 +75,7 @@ def remeasured(
     told = broken_promises(result)
     old = result.distortion
     # By a power of two, lest squares of tiny or huge lengths are no numbers.
-    exponent = -int(np.frexp(np.abs(changed.vertices[changed.faces]).max())[1])
+    exponent = -unit_exponent(changed.vertices[changed.faces])
     distortion = measure(
         TriangleMesh(np.ldexp(changed.vertices, exponent), changed.faces),
         changed.corner_uv,
@@ -170,9 +171,9 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
     mesh = TriangleMesh(result.vertices, result.faces)
     sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
     # By a power of two, lest squares underflow.
-    exponent = int(np.frexp(np.abs(mesh.vertices).max())[1])
-    ways = np.ldexp(mesh.vertices[mesh.heads[sides]] - mesh.vertices[mesh.tails[sides]], -exponent)
-    lengths = np.linalg.norm(ways, axis=1) * np.ldexp(result.uv_scale, exponent)
+    exponent = unit_exponent(mesh.vertices)
+    sides_in_space = np.ldexp(mesh.vertices[mesh.heads[sides]] - mesh.vertices[mesh.tails[sides]], -exponent)
+    lengths = np.linalg.norm(sides_in_space, axis=1) * np.ldexp(result.uv_scale, exponent)
     off = np.abs(np.abs(sides_between(result.corner_uv).ravel()[sides]) - lengths)
     beyond = off > EXACT * lengths + ROUNDINGS * unit
     if beyond.any():

@@ -14,7 +14,8 @@ from ..atlas.arrange import whole_turns
 from ..atlas.pack import pack_charts
 from ..atlas.touch import part_touching
 from ..errors import EmptyMeshError, OptionError
-from ..mesh import TriangleMesh, label_components
+from ..geometry.charts import label_charts
+from ..mesh import TriangleMesh
 
 if TYPE_CHECKING:
     from .flattening import Flattening
@@ -102,5 +103,4 @@ def _checked(results: object) -> list[Flattening]:
 def _charts(result: Flattening) -> IntArray:
     """Return (m,) the chart of each triangle: what hangs together in the plane."""
     flat = TriangleMesh(result.uv, result.uv_faces)
-    faces = flat.edge_faces[~flat.is_boundary_edge]
-    return label_components(len(result.uv_faces), faces[:, 0], faces[:, 1])[1]
+    return label_charts(flat, ~flat.is_boundary_edge)[1]

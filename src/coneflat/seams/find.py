@@ -1,6 +1,6 @@
 """Seams of a connected mesh.
 
-Every boundary loop is a place that seams are tied to anywhere, as if it were contracted to a point. Loops and cones
+Seams may end anywhere on a boundary loop, as if it were contracted to a point. Loops and cones
 are connected by a tree; where there are handles, the shortest loops around them are cut as well. That opens the mesh
 to a disk. Then seams are exchanged for shorter and straighter ones.
 """
@@ -18,7 +18,7 @@ from ..mesh import TriangleMesh
 from ..text import plural
 from .improve import shorten
 from .key_paths import Fixed
-from .open_mesh import NOTHING, Circles, OpenMesh, Reach
+from .open_mesh import NOTHING, OpenMesh, Reach, Terminals
 from .straighten import BENDING, Straightener
 
 # Relative: on grids many paths are equally long, and rounding should not choose among them, lest the result
@@ -53,7 +53,7 @@ def find_seams(
         required: edges that are cut in any case; on the boundary they mean nothing.
         forbidden: edges that are not cut.
         bending: a seam that turns by a right angle at every vertex is taken for longer by this part of its length;
-            0 to 0.25. Of ways that are nearly equally short the straighter are preferred.
+            0 to 0.25. Of paths that are nearly equally short the straighter are preferred.
 
     Raises:
         SeamError: every set of seams needs forbidden edges; or edges are both required and forbidden.
@@ -110,11 +110,11 @@ def _open(work: OpenMesh, fixed: Fixed, base: int) -> None:
     points = np.flatnonzero(fixed.cones)
     if not len(points) and not work.cut.any():
         points = np.array([base])
-    connect_circles(work, work.label_circles(points))
+    connect_terminals(work, work.label_terminals(points))
     # A point that is still alone had nothing to be connected to.
-    circles = work.label_circles(points)
-    if handle_count(work, circles):
-        open_handles(work, circles)
+    terminals = work.label_terminals(points)
+    if handle_count(work, terminals):
+        open_handles(work, terminals)
 
 
 def _as_slit(mesh: TriangleMesh, costs: FloatArray, seams: BoolArray) -> BoolArray:
@@ -127,39 +127,39 @@ def _as_slit(mesh: TriangleMesh, costs: FloatArray, seams: BoolArray) -> BoolArr
     return longer
 
 
-def connect_circles(work: OpenMesh, circles: Circles) -> None:
-    """Cut along trees that connect the circles of each piece, at most twice as long as the shortest.
+def connect_terminals(work: OpenMesh, terminals: Terminals) -> None:
+    """Cut along trees that connect the terminals of each piece, at most twice as long as the shortest.
 
     K. Mehlhorn, "A faster approximation algorithm for the Steiner problem in graphs", 1988: one search from all
-    circles at once, then a minimum spanning tree over the cheapest bridges between their regions.
+    terminals at once, then a minimum spanning tree over the cheapest bridges between their regions.
     """
-    reach = work.search(circles, circles.around, np.zeros(len(circles.around)))
+    reach = work.search(terminals, terminals.around, np.zeros(len(terminals.around)))
     bridges = _bridges(work)
-    one, two = (_regions(work, circles, reach, side) for side in (bridges, work.twin[bridges]))
+    one, two = (_regions(work, terminals, reach, side) for side in (bridges, work.twin[bridges]))
     between = one != two
     bridges = bridges[between]
-    regions = MultiGraph(circles.count, one[between], two[between], _costs_over(work, reach, bridges))
+    regions = MultiGraph(terminals.count, one[between], two[between], _costs_over(work, reach, bridges))
     _cut_over(work, bridges[regions.minimum_spanning_tree()], reach)
-    work.forget(circles, reach)
+    work.forget(terminals, reach)
 
 
-def handle_count(work: OpenMesh, circles: Circles) -> int:
-    """Return the number of handles of an open mesh; `circles` has one of each piece."""
+def handle_count(work: OpenMesh, terminals: Terminals) -> int:
+    """Return the number of handles of an open mesh; `terminals` has one of each piece."""
     on_border = np.zeros(len(work.height), dtype=bool)
-    on_border[work.tail[circles.around]] = True
-    vertices = len(on_border) - int(on_border.sum()) + circles.count
+    on_border[work.tail[terminals.around]] = True
+    vertices = len(on_border) - int(on_border.sum()) + terminals.count
     # A border curve is one vertex of a closed surface.
-    return (2 * circles.count - vertices + len(_bridges(work)) - len(work.mesh.faces)) // 2
+    return (2 * terminals.count - vertices + len(_bridges(work)) - len(work.mesh.faces)) // 2
 
 
-def open_handles(work: OpenMesh, circles: Circles) -> None:
-    """Cut the loops around handles that are shortest with the ways from there to the one circle of each piece.
+def open_handles(work: OpenMesh, terminals: Terminals) -> None:
+    """Cut the loops around handles that are shortest with the paths from there to the one terminal of each piece.
 
-    These ways to all vertices are a spanning tree; one of the faces over the edges that are not in it leaves
+    These paths to all vertices are a spanning tree; one of the faces over the edges that are not in it leaves
     2 * genus edges (tree-cotree, D. Eppstein 2003), and takes those first that would close the longest loops
     (J. Erickson and K. Whittlesey 2005).
     """
-    reach = work.search(circles, circles.around, np.zeros(len(circles.around)))
+    reach = work.search(terminals, terminals.around, np.zeros(len(terminals.around)))
     in_tree = np.zeros(len(work.tail), dtype=bool)
     before = work.slots[reach.before[reach.vertices]]
     in_tree[before] = in_tree[work.twin[before]] = True
@@ -170,7 +170,7 @@ def open_handles(work: OpenMesh, circles: Circles) -> None:
     is_left = np.ones(len(bridges), dtype=bool)
     is_left[dual.minimum_spanning_tree()] = False
     _cut_over(work, bridges[is_left], reach)
-    work.forget(circles, reach)
+    work.forget(terminals, reach)
 
 
 def _bridges(work: OpenMesh) -> IntArray:
@@ -179,14 +179,14 @@ def _bridges(work: OpenMesh) -> IntArray:
     return halfedges[~work.cut[halfedges]]
 
 
-def _regions(work: OpenMesh, circles: Circles, reach: Reach, halfedges: IntArray) -> IntArray:
-    """Return the circle that is nearest to the vertex that each half-edge leaves."""
-    circle = circles.number[halfedges]
-    return np.where(circle < 0, reach.origin[work.tail[halfedges]], circle)
+def _regions(work: OpenMesh, terminals: Terminals, reach: Reach, halfedges: IntArray) -> IntArray:
+    """Return the terminal that is nearest to the vertex that each half-edge leaves."""
+    terminal = terminals.number[halfedges]
+    return np.where(terminal < 0, reach.origin[work.tail[halfedges]], terminal)
 
 
 def _costs_over(work: OpenMesh, reach: Reach, halfedges: IntArray) -> FloatArray:
-    """Return the cost of the way over each half-edge from circle to circle."""
+    """Return the cost of the path over each half-edge from terminal to terminal."""
     distance = np.maximum(reach.distance, 0.0)
     ends = work.tail[halfedges], work.tail[work.twin[halfedges]]
     costs: FloatArray = work.cost[halfedges] + distance[ends[0]] + distance[ends[1]]
@@ -194,6 +194,6 @@ def _costs_over(work: OpenMesh, reach: Reach, halfedges: IntArray) -> FloatArray
 
 
 def _cut_over(work: OpenMesh, bridges: IntArray, reach: Reach) -> None:
-    """Cut the ways over bridges."""
-    ways = [work.way_over(reach, side) for h in bridges.tolist() for side in (h, int(work.twin[h]))]
-    work.cut_along(np.array([h for way in ways for h in way], dtype=np.int64))
+    """Cut the paths over bridges."""
+    paths = [work.path_over(reach, side) for h in bridges.tolist() for side in (h, int(work.twin[h]))]
+    work.cut_along(np.array([h for path in paths for h in path], dtype=np.int64))

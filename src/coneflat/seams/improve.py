@@ -1,8 +1,8 @@
-"""Shorter seams by local search: take some of them away, and tie together again what falls apart.
+"""Shorter seams by local search: take some of them away, and connect again what falls apart.
 
 E. Uchoa and R. Werneck, "Fast local search for the Steiner problem in graphs", 2012, exchange key paths and key
 vertices of trees. Here paths that meet are exchanged together for the best tree there is in their place, and on
-surfaces with handles, too: taking a path out of a loop leaves two borders, one on each side, to be tied together.
+surfaces with handles, too: taking a path out of a loop leaves two borders, one on each side, to be connected.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ def shorten(work: OpenMesh, fixed: Fixed, enough: int) -> None:
 
     Args:
         work: open, every piece of it a disk.
-        fixed: what the seams hold on to.
+        fixed: where seams may end.
         enough: the effort after which to stop.
     """
     work.measure_heights()
     rested: set[bytes] = set()
-    # Pairs first, as they are worth most; again and again, until nothing is gained. Then others.
+    # Pairs first, as they gain most; again and again, until nothing is gained. Then others.
     waiting = [*WINDOWS]
     while waiting and work.effort < enough:
         seams = find_key_paths(work, fixed)
@@ -92,13 +92,13 @@ def _exchange(seams: KeyPaths, gone: frozenset[int]) -> tuple[IntArray | None, b
 
 @dataclass(frozen=True, eq=False)
 class _Branch:
-    """Shortest trees that tie some circles to a place.
+    """Shortest trees that connect some terminals with a place.
 
     Attributes:
-        splits: the pairs of sets of circles to which a tree may fall apart at the place.
+        splits: the pairs of sets of terminals to which a tree may fall apart at the place.
         reach: where the place is off the border.
-        value: (count of circles,) what a tree costs where the place is a circle.
-        merged: (count of circles,) the same for trees that fall apart at the circle.
+        value: (count of terminals,) what a tree costs where the place is a terminal.
+        merged: (count of terminals,) the same for trees that fall apart at the terminal.
     """
 
     splits: list[tuple[int, int]]
@@ -108,14 +108,14 @@ class _Branch:
 
 
 class Reconnection:
-    """The shortest tree that ties circles together and costs less than a limit.
+    """The shortest tree that connects terminals and costs less than a limit.
 
-    S. Dreyfus and R. Wagner, "The Steiner problem in graphs", 1971. A set of circles is a binary number; the last of
-    the circles is in none: it is what the tree of all others is led to.
+    S. Dreyfus and R. Wagner, "The Steiner problem in graphs", 1971. A set of terminals is a binary number; the last of
+    the terminals is in none: it is what the tree of all others is led to.
     """
 
     def __init__(self, work: OpenMesh, parts: Parts, limit: float) -> None:
-        self.work, self.circles, self.ends, self.limit = work, parts.circles, parts.ends, limit
+        self.work, self.terminals, self.ends, self.limit = work, parts.terminals, parts.ends, limit
         # No seam is shorter if replaced alone, or nearly so. So these are apart at least as far as their arms are long.
         self.apart = np.maximum(parts.arms[:, None], parts.arms)
         self.branches: dict[int, _Branch] = {}
@@ -126,15 +126,15 @@ class Reconnection:
         for some in range(1, all_others + 1):
             self.branches[some] = self._branch(some, some == all_others)
         found = self.branches[all_others].value[self.ends[-1]] < self.limit
-        tree = np.unique(self._to_circle(all_others, self.ends[-1])) if found else None
+        tree = np.unique(self._to_terminal(all_others, self.ends[-1])) if found else None
         for branch in self.branches.values():
-            self.work.forget(self.circles, branch.reach)
+            self.work.forget(self.terminals, branch.reach)
         return tree
 
     def _branch(self, some: int, is_last: bool) -> _Branch:
-        """Return the shortest trees that tie some circles to every place."""
+        """Return the shortest trees that connect some terminals with every place."""
         splits = [(part, some ^ part) for part in range(1, some) if part & ~some == 0 and part < some ^ part]
-        merged = np.full(self.circles.count, np.inf)
+        merged = np.full(self.terminals.count, np.inf)
         if not splits:
             merged[self.ends[some.bit_length() - 1]] = 0.0
         inner, costs = [NOTHING], [NO_COSTS]
@@ -146,12 +146,12 @@ class Reconnection:
             inner.append(both)
             costs.append(first.reach.distance[both] + second.reach.distance[both])
         begin = [end for end in self.ends[:-1] if merged[end] < self.limit]
-        seeds = [self.circles.leaving(end) for end in begin]
+        seeds = [self.terminals.leaving(end) for end in begin]
         target, limit, farthest = -1, *self._bounds(some)
         if is_last:
             target, limit, farthest = self.ends[-1], min(self.limit, merged[self.ends[-1]]), np.inf
         reach = self.work.search(
-            self.circles,
+            self.terminals,
             np.concatenate([NOTHING, *seeds]),
             np.repeat(merged[begin], [len(one) for one in seeds]),
             np.concatenate(inner),
@@ -163,9 +163,9 @@ class Reconnection:
         return _Branch(splits, reach, np.minimum(merged, reach.arrival), merged)
 
     def _bounds(self, some: int) -> tuple[float, float]:
-        """Return limits of the distance and height, and of the distance: what the other circles leave of the whole.
+        """Return limits of the distance and height, and of the distance: what the other terminals leave of the whole.
 
-        A tree costs at least half of a way around it. One around a vertex and the others is made up of ways between
+        A tree costs at least half of a path around it. One around a vertex and the others is made up of paths between
         some of these and two more, neither of which costs less than the height.
         """
         others = [i for i in range(len(self.ends)) if not some >> i & 1]
@@ -176,24 +176,26 @@ class Reconnection:
             self.limit - max([around, *between]),
         )
 
-    def _to_circle(self, some: int, circle: int) -> list[int]:
-        """Return the half-edges of the tree that ties some circles to another, or one of them."""
+    def _to_terminal(self, some: int, terminal: int) -> list[int]:
+        """Return the half-edges of the tree that connects some terminals with another, or one of them."""
         branch = self.branches[some]
-        if branch.reach.arrival[circle] < branch.merged[circle]:
-            return self._along(some, int(branch.reach.last[circle]))
-        return self._at_circle(some, circle)
+        if branch.reach.arrival[terminal] < branch.merged[terminal]:
+            return self._along(some, int(branch.reach.last[terminal]))
+        return self._at_terminal(some, terminal)
 
-    def _at_circle(self, some: int, circle: int) -> list[int]:
-        """Return the half-edges of the tree of some circles that falls apart at a circle."""
+    def _at_terminal(self, some: int, terminal: int) -> list[int]:
+        """Return the half-edges of the tree of some terminals that falls apart at a terminal."""
         splits = self.branches[some].splits
         if not splits:
             return []
-        costs = [self.branches[one].value[circle] + self.branches[two].value[circle] for one, two in splits]
+        costs = [
+            self.branches[one].value[terminal] + self.branches[two].value[terminal] for one, two in splits
+        ]
         one, two = splits[int(np.argmin(costs))]
-        return self._to_circle(one, circle) + self._to_circle(two, circle)
+        return self._to_terminal(one, terminal) + self._to_terminal(two, terminal)
 
     def _to_vertex(self, some: int, vertex: int) -> list[int]:
-        """Return the half-edges of the tree that ties some circles to a vertex off the border."""
+        """Return the half-edges of the tree that connects some terminals with a vertex off the border."""
         branch = self.branches[some]
         slot = int(branch.reach.before[vertex])
         if slot >= 0:
@@ -204,8 +206,8 @@ class Reconnection:
         return self._to_vertex(first, vertex) + self._to_vertex(second, vertex)
 
     def _along(self, some: int, slot: int) -> list[int]:
-        """Return the half-edges of a way that was found from some circles, and of the tree at which it begins."""
-        way, vertex = self.work.way(self.branches[some].reach, slot)
+        """Return the half-edges of a path that was found from some terminals, and of the tree at which it begins."""
+        path, vertex = self.work.path(self.branches[some].reach, slot)
         if vertex >= 0:
-            return way + self._to_vertex(some, vertex)
-        return way + self._at_circle(some, int(self.circles.number[way[-1]]))
+            return path + self._to_vertex(some, vertex)
+        return path + self._at_terminal(some, int(self.terminals.number[path[-1]]))

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
-from .open_mesh import NOTHING, Circles, OpenMesh
+from .open_mesh import NOTHING, OpenMesh, Terminals
 
 
 @dataclass(frozen=True, eq=False)
 class Fixed:
-    """What seams have to hold on to.
+    """Where seams may end.
 
     Attributes:
         sides: (3m,) half-edges of the border that is there without them: boundaries, and edges that must be cut.
@@ -51,12 +51,12 @@ class Parts:
     """What falls apart when paths are taken away.
 
     Attributes:
-        circles: of the border that is left.
-        ends: those that the paths had tied together, the longest last.
+        terminals: of the border that is left.
+        ends: those that the paths had connected, the longest last.
         arms: (len(ends),) the cost of the path to each, 0 where several meet.
     """
 
-    circles: Circles
+    terminals: Terminals
     ends: list[int]
     arms: FloatArray
 
@@ -67,7 +67,7 @@ class KeyPaths:
 
     Attributes:
         work: the mesh that they open.
-        fixed: what they hold on to.
+        fixed: where they may end.
         paths: the key paths.
         at: the paths that end at each vertex; loops twice.
         curves: for each border curve the paths along it, in order; most are there twice, with both sides.
@@ -119,35 +119,36 @@ class KeyPaths:
         }
 
     def take_away(self, gone: frozenset[int]) -> Parts | None:
-        """Glue paths, and return what is to be tied together again; None if that is not just a matter of ties."""
+        """Glue paths, and return what is to be connected again; None if that does not open it to disks."""
         work = self.work
         work.glue(self.halfedges(gone))
         ends = {vertex for p in gone for vertex in self.paths[p].ends}
         cones = sorted(vertex for vertex in ends if self.fixed.cones[vertex])
-        circles = work.label_circles(np.array(cones, dtype=np.int64))
+        terminals = work.label_terminals(np.array(cones, dtype=np.int64))
         arms: dict[int, float] = {}
         inner = set()
         for p in gone:
             path = self.paths[p]
             for h, vertex in zip((path.halfedges[0], work.twin[path.halfedges[-1]]), path.ends, strict=True):
-                circle = int(circles.number[h])
-                if circle < 0:
+                terminal = int(terminals.number[h])
+                if terminal < 0:
                     inner.add(vertex)
                 else:
-                    arms[circle] = 0.0 if circle in arms else path.cost
-        # Euler's formula: what is not a disk now has a handle if there are fewer circles, and ties do not open it.
+                    arms[terminal] = 0.0 if terminal in arms else path.cost
+        # Euler's formula: what is not a disk now has a handle if there are fewer terminals; to connect these does not
+        # open it.
         if len(arms) < 2 or len(arms) != 1 + len(gone) - len(inner):
             return None
-        order = sorted(arms, key=lambda circle: (len(circles.leaving(circle)), circle))
-        return Parts(circles, order, np.array([arms[circle] for circle in order]))
+        order = sorted(arms, key=lambda terminal: (len(terminals.leaving(terminal)), terminal))
+        return Parts(terminals, order, np.array([arms[terminal] for terminal in order]))
 
 
 def find_key_paths(work: OpenMesh, fixed: Fixed) -> KeyPaths:
     """Return the seams of an open mesh as a graph."""
-    circles = work.label_circles(NOTHING)
-    on_border = work.cut[circles.around]
-    sides = circles.around[on_border]
-    bounds = np.concatenate([[0], np.cumsum(on_border)])[circles.starts].tolist()
+    terminals = work.label_terminals(NOTHING)
+    on_border = work.cut[terminals.around]
+    sides = terminals.around[on_border]
+    bounds = np.concatenate([[0], np.cumsum(on_border)])[terminals.starts].tolist()
     tails = work.tail[sides]
     degree = np.bincount(tails[~fixed.sides[sides]], minlength=len(work.height))
     is_key = (degree[tails] != 2) | fixed.cones[tails] | fixed.vertices[tails]

@@ -1,4 +1,4 @@
-"""A mesh that is being cut open: its border, and the cheapest ways between parts of it."""
+"""A mesh that is being cut open: its border, and the cheapest paths between parts of it."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ ON_BORDER = -1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Circles:
-    """The border curves of an open mesh, and single points: what seams are to tie together.
+class Terminals:
+    """What seams are to connect, as in the Steiner tree problem: border curves of an open mesh, and single points.
 
     Attributes:
         count: how many there are.
-        number: (3m,) the circle that each half-edge leaves, -1 off the border.
-        around: the half-edges that leave a circle, one circle after the other, in order.
+        number: (3m,) the terminal that each half-edge leaves, -1 off the border.
+        around: the half-edges that leave a terminal, one terminal after the other, in order.
         starts: (count + 1,) where each begins in `around`.
     """
 
@@ -32,9 +32,9 @@ class Circles:
     around: IntArray
     starts: IntArray
 
-    def leaving(self, circle: int) -> IntArray:
-        """Return the half-edges that leave a circle, those of the border among them."""
-        return self.around[self.starts[circle] : self.starts[circle + 1]]
+    def leaving(self, terminal: int) -> IntArray:
+        """Return the half-edges that leave a terminal, those of the border among them."""
+        return self.around[self.starts[terminal] : self.starts[terminal + 1]]
 
 
 @dataclass(eq=False)
@@ -42,13 +42,13 @@ class Reach:
     """What a search found; its arrays are used again.
 
     Attributes:
-        distance: (n,) what the way to each vertex costs, infinite where the search did not get, -1 on the border.
+        distance: (n,) what the path to each vertex costs, infinite where the search did not get, -1 on the border.
         before: (n,) the slot by which each was reached, -1 where the search began.
-        origin: (n,) the circle it was reached from, -1 if from a vertex off the border.
+        origin: (n,) the terminal it was reached from, -1 if from a vertex off the border.
         reached: (n,) the vertices reached come first.
         count: how many were.
-        arrival: (count of circles,) what the way to each circle costs.
-        last: (count of circles,) the last slot of that way, -1 if there is none.
+        arrival: (count of terminals,) what the path to each terminal costs.
+        last: (count of terminals,) the last slot of that path, -1 if there is none.
     """
 
     distance: FloatArray
@@ -76,7 +76,7 @@ class OpenMesh:
         tail: (3m,) the vertex that each half-edge leaves.
         cost: (3m,) what each half-edge costs as part of a seam.
         cut: (3m,) True for half-edges of the border.
-        height: (n,) lower bounds of what the way from each vertex to the border costs.
+        height: (n,) lower bounds of what the path from each vertex to the border costs.
         slots: the half-edge of each slot.
         effort: what has been done so far, in vertices reached by searches; four half-edges of a border count as one.
     """
@@ -103,25 +103,25 @@ class OpenMesh:
         self.heap = np.empty(2 * count + n), np.empty(2 * count + n, dtype=np.int64)
         self._spare: list[Reach] = []
 
-    def label_circles(self, points: IntArray) -> Circles:
+    def label_terminals(self, points: IntArray) -> Terminals:
         """Return the curves of the border, and the points that are not on it; those returned before are void."""
-        from .shortest_paths import label_circles
+        from .shortest_paths import label_terminals
 
         self._number[self._labelled] = -1
         sides = np.flatnonzero(self.cut)
         starts = np.empty(len(sides) + len(points) + 1, dtype=np.int64)
         labels = self._number, self._around, starts
-        count = label_circles(self.twin, self._leaving, self.cut, sides, points, *labels)
+        count = label_terminals(self.twin, self._leaving, self.cut, sides, points, *labels)
         self._labelled = self._around[: starts[count]]
         self.effort += len(self._labelled) // 4
         across = self.twin[self._labelled]
         glued = across >= 0
         self._enters[self._slot_of[across[glued]]] = self._number[self._labelled[glued]]
-        return Circles(count, self._number, self._labelled, starts[: count + 1])
+        return Terminals(count, self._number, self._labelled, starts[: count + 1])
 
     def search(
         self,
-        circles: Circles,
+        terminals: Terminals,
         seeds: IntArray,
         seed_costs: FloatArray,
         inner: IntArray = NOTHING,
@@ -131,12 +131,21 @@ class OpenMesh:
         limit: float = np.inf,
         farthest: float = np.inf,
     ) -> Reach:
-        """Search along half-edges that leave circles, and from vertices off the border; see the kernel."""
+        """Search along half-edges that leave terminals, and from vertices off the border; see the kernel."""
         reach = self._spare.pop() if self._spare else self._new_reach()
-        reach.arrival, reach.last = np.full(circles.count, np.inf), np.full(circles.count, -1, dtype=np.int64)
-        reach.distance[self.tail[circles.around]] = ON_BORDER
+        reach.arrival, reach.last = (
+            np.full(terminals.count, np.inf),
+            np.full(terminals.count, -1, dtype=np.int64),
+        )
+        reach.distance[self.tail[terminals.around]] = ON_BORDER
         free = ~self.cut[seeds]
-        begin = self._slot_of[seeds[free]], seed_costs[free], circles.number[seeds[free]], inner, inner_costs
+        begin = (
+            self._slot_of[seeds[free]],
+            seed_costs[free],
+            terminals.number[seeds[free]],
+            inner,
+            inner_costs,
+        )
         self._run(begin, self.height, (target, limit, farthest), reach)
         self.effort += reach.count
         return reach
@@ -182,30 +191,30 @@ class OpenMesh:
             items,
         )
 
-    def forget(self, circles: Circles, reach: Reach) -> None:
+    def forget(self, terminals: Terminals, reach: Reach) -> None:
         """Take back the arrays of a search that is no longer needed."""
         reach.distance[reach.vertices] = np.inf
-        reach.distance[self.tail[circles.around]] = np.inf
+        reach.distance[self.tail[terminals.around]] = np.inf
         self._spare.append(reach)
 
-    def way_over(self, reach: Reach, halfedge: int) -> list[int]:
-        """Return the half-edges of a way found, from the one over which it goes last back to the circle."""
-        return self.way(reach, int(self._slot_of[halfedge]))[0]
+    def path_over(self, reach: Reach, halfedge: int) -> list[int]:
+        """Return the half-edges of a path found, from the one over which it goes last back to the terminal."""
+        return self.path(reach, int(self._slot_of[halfedge]))[0]
 
-    def way(self, reach: Reach, slot: int) -> tuple[list[int], int]:
-        """Return the half-edges of a way found, from its last slot back, and the vertex it begins at.
+    def path(self, reach: Reach, slot: int) -> tuple[list[int], int]:
+        """Return the half-edges of a path found, from its last slot back, and the vertex it begins at.
 
-        The vertex is -1 if the way begins at a circle.
+        The vertex is -1 if the path begins at a terminal.
         """
-        way, v = [], -1
+        path, v = [], -1
         while slot >= 0:
             h = int(self.slots[slot])
-            way.append(h)
+            path.append(h)
             v = int(self.tail[h])
             if reach.distance[v] == ON_BORDER:
-                return way, -1
+                return path, -1
             slot = int(reach.before[v])
-        return way, v
+        return path, v
 
     def cut_along(self, halfedges: IntArray) -> None:
         """Cut edges, given by either half."""

@@ -1,8 +1,8 @@
-"""Shortest ways on the edges of a mesh that is cut open, compiled.
+"""Shortest paths on the edges of a mesh that is cut open, compiled.
 
 Nothing is glued to the triangle of a border half-edge: `cut` is True there. At a vertex on the border the half-edges
-that leave it lie in sectors between those of the border; all sectors along one border curve are one place, its circle.
-A way ends where it meets the border, so the circles of the half-edges there are all one has to know, and no cut mesh
+that leave it lie in sectors between those of the border; all sectors along one border curve are one terminal.
+A path ends where it meets the border, so the terminals of the half-edges there are all one has to know, and no cut mesh
 is made.
 """
 
@@ -15,50 +15,34 @@ from ..compiled import compiled
 
 
 @compiled
-def label_circles(
+def label_terminals(
     twin: IntArray,
     leaving: IntArray,
     cut: BoolArray,
     sides: IntArray,
     points: IntArray,
-    circle: IntArray,
+    terminal: IntArray,
     around: IntArray,
     starts: IntArray,
 ) -> int:
     """Number the border curves through given half-edges, then the points on none of them; return how many there are.
 
-    leaving: (n,) a half-edge that leaves each vertex. circle: (3m,) -1; gets the number at each half-edge that leaves a
-    curve or point. around: these half-edges in order; starts: where each circle begins there.
+    leaving: (n,) a half-edge that leaves each vertex. terminal: (3m,) -1; gets the number at each half-edge that leaves
+    a curve or point. around: these half-edges in order; starts: where each terminal begins there.
     """
     count = 0
     n = 0
     starts[0] = 0
-    for side in sides:
-        if circle[side] >= 0:
+    for k in range(len(sides) + len(points)):
+        h = sides[k] if k < len(sides) else leaving[points[k - len(sides)]]
+        if terminal[h] >= 0:
             continue
-        h = side
-        while circle[h] < 0:
-            circle[h] = count
+        while terminal[h] < 0:
+            terminal[h] = count
             around[n] = h
             n += 1
-            h = h - h % 3 + (h + 1) % 3
-            while not cut[h]:
-                circle[h] = count
-                around[n] = h
-                n += 1
+            if not cut[h]:
                 h = twin[h]
-                h = h - h % 3 + (h + 1) % 3
-        count += 1
-        starts[count] = n
-    for v in points:
-        h = leaving[v]
-        if circle[h] >= 0:
-            continue
-        while circle[h] < 0:
-            circle[h] = count
-            around[n] = h
-            n += 1
-            h = twin[h]
             h = h - h % 3 + (h + 1) % 3
         count += 1
         starts[count] = n
@@ -127,17 +111,17 @@ def search(
     keys: FloatArray,
     items: IntArray,
 ) -> int:
-    """Search the ways off the border in the order of distance plus height; return how many vertices were reached.
+    """Search the paths off the border in the order of distance plus height; return how many vertices were reached.
 
     Slots are half-edges sorted by tail: those of vertex v are starts[v] to starts[v + 1]; heads, costs: where they lead
-    and what for; enters: the circle that each enters, if any. The search begins along the slots `seeds`, and at the
-    vertices `inner` off the border, at the costs given; origins are names for where. It ends at the circle `target`,
+    and what for; enters: the terminal that each enters, if any. The search begins along the slots `seeds`, and at the
+    vertices `inner` off the border, at the costs given; origins are names for where. It ends at the terminal `target`,
     and leaves out where distance plus height is the limit and more, or distance the `farthest`. Heights are lower
     bounds of what is still to come; along an edge they fall by no more than its cost.
 
     distance: (n,) infinite off the border, and -1 on it; gets those of the vertices reached, which are listed in
     `reached`. before: (n,) the slot by which each was reached, -1 where the search began; origin: (n,) from where, -1
-    for `inner`. arrival: infinite; gets the cost of the way to each circle. last: its last slot.
+    for `inner`. arrival: infinite; gets the cost of the path to each terminal. last: its last slot.
     """
     size = 0
     count = 0

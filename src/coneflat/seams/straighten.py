@@ -1,4 +1,4 @@
-"""Straighter seams: of ways that are almost equally short, those that turn less."""
+"""Straighter seams: of paths that are almost equally short, those that turn less."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .key_paths import Fixed, KeyPaths, Parts, find_key_paths
 from .open_mesh import OpenMesh
 from .shortest_paths import drop_first, push
 
-# What a zigzag that turns back by a right angle at every vertex adds to the length of a seam, so many times: a way
+# What a zigzag that turns back by a right angle at every vertex adds to the length of a seam, so many times: a path
 # without turns is preferred if it is longer by no more.
 BENDING = 0.05
 
 
 class Straightener:
-    """The search for ways that turn little, with its arrays.
+    """The search for paths that turn little, with its arrays.
 
     Args:
         work: open, every piece of it a disk.
@@ -45,44 +45,47 @@ class Straightener:
         """Return the half-edges that are now cut in the place of a path."""
         path, gone = seams.paths[p], seams.with_loose_ends([p])
         parts = seams.take_away(gone) if len(gone) == 1 else None
-        found = self._way(parts, path.cost * (1 + 2 * self.bending)) if parts is not None else path.halfedges
+        found = (
+            self._straightest(parts, path.cost * (1 + 2 * self.bending))
+            if parts is not None
+            else path.halfedges
+        )
         found = found if len(found) else path.halfedges
         self.work.cut_along(found)
         return found
 
-    def _way(self, parts: Parts, limit: float) -> IntArray:
-        """Return the half-edges of the best way between two circles; none if that is not found within the limit."""
-
-        work, circles = self.work, parts.circles
+    def _straightest(self, parts: Parts, limit: float) -> IntArray:
+        """Return the half-edges of the best path between two terminals; none if that is not found within the limit."""
+        work, terminals = self.work, parts.terminals
         near, far = parts.ends
-        seeds = circles.leaving(near)
-        rest = work.search(circles, seeds, np.zeros(len(seeds)), limit=limit)
-        seeds = circles.leaving(far)
+        seeds = terminals.leaving(near)
+        rest = work.search(terminals, seeds, np.zeros(len(seeds)), limit=limit)
+        seeds = terminals.leaving(far)
         last, count = straightest(
             *(
                 work.mesh.vertices,
                 work.twin,
                 work.tail,
                 work.cost,
-                circles.number,
+                terminals.number,
                 seeds[~work.cut[seeds]],
                 near,
             ),
             *(rest.distance, self.bending, self.value, self.before, self.reached, self.spokes, self.angles),
             *work.heap,
         )
-        work.forget(circles, rest)
+        work.forget(terminals, rest)
         self.value[self.reached[:count]] = np.inf
-        way = []
+        path = []
         while last >= 0:
-            way.append(last)
+            path.append(last)
             last = int(self.before[last])
-        return np.array(way, dtype=np.int64)
+        return np.array(path, dtype=np.int64)
 
 
 @compiled
 def angle_between(vertices: FloatArray, apex: int, one: int, two: int) -> float:
-    """Return the angle at a vertex between the ways to two others, radians."""
+    """Return the angle at a vertex between the edges to two others, radians."""
     dot = 0.0
     first = 0.0
     second = 0.0
@@ -122,7 +125,7 @@ def straightest(
     twin: IntArray,
     tail: IntArray,
     cost: FloatArray,
-    circle: IntArray,
+    terminal: IntArray,
     seeds: IntArray,
     target: int,
     rest: FloatArray,
@@ -135,10 +138,10 @@ def straightest(
     keys: FloatArray,
     items: IntArray,
 ) -> tuple[int, int]:
-    """Find the cheapest way from half-edges that leave a circle to another circle, when turning costs.
+    """Find the cheapest path from half-edges that leave a terminal to another terminal, when turning costs.
 
     A turn by an angle t, of a whole turn that is brought to 2 pi, costs bending * (1 - cos t) times the mean of the
-    two edges. rest: (n,) the cost of the way from each vertex to the target without turning; infinite where not to go.
+    two edges. rest: (n,) the cost of the path from each vertex to the target without turning; infinite where not to go.
     value: (3m,) infinite; gets the cost up to the end of each half-edge reached. before: (3m,) the one it was reached
     from, -1 where the search began; reached: these half-edges. Returns the last half-edge, or -1, and how many were
     reached.
@@ -147,7 +150,7 @@ def straightest(
     count = 0
     for h in seeds:
         u = tail[twin[h]]
-        ahead = 0.0 if circle[twin[h]] == target else rest[u]
+        ahead = 0.0 if terminal[twin[h]] == target else rest[u]
         if 0 <= ahead < math.inf:
             value[h] = cost[h]
             before[h] = -1
@@ -158,7 +161,7 @@ def straightest(
         key, h = keys[0], items[0]
         size = drop_first(keys, items, size)
         back = twin[h]
-        if circle[back] == target:
+        if terminal[back] == target:
             return h, count
         if key > value[h] + rest[tail[back]]:
             continue
@@ -166,7 +169,7 @@ def straightest(
         for i in range(1, around):
             k = spokes[i]
             u = tail[twin[k]]
-            ahead = 0.0 if circle[twin[k]] == target else rest[u]
+            ahead = 0.0 if terminal[twin[k]] == target else rest[u]
             turn = 1.0 + math.cos(2 * math.pi * angles[i] / angles[around])
             e = value[h] + cost[k] + bending * turn * (cost[h] + cost[k]) / 2
             if 0 <= ahead < math.inf and e < value[k]:

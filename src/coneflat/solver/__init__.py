@@ -1,10 +1,10 @@
-"""Sparse symmetric positive definite systems: one interface, a file per back end.
+"""Sparse symmetric positive definite systems behind one small interface, and Newton's method for convex functions.
 
 The ladder, best first: MKL PARDISO (pypardiso) for large systems, CHOLMOD without supernodes (cholespy), SuperLU
 (SciPy), and conjugate gradients with multigrid (pyamg) for what fits no factorization.
 """
 
 from .back_ends import HermitianFactor, available, factorize, solving
-from .types import Factor, NotPositiveDefinite
+from .factors import Factor, NotPositiveDefinite
 
 __all__ = ["Factor", "HermitianFactor", "NotPositiveDefinite", "available", "factorize", "solving"]

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bmat, csc_matrix, csr_matrix
 
 from ..errors import OptionError
-from .superlu import SuperLUFactor
-from .types import EmptyFactor, Factor, NotPositiveDefinite
+from .factors import CholespyFactor, EmptyFactor, Factor, MultigridSolver, NotPositiveDefinite, SuperLUFactor
 
 # The modules that the back ends need; those that are no dependencies, with what installs them.
 MODULES = {
@@ -114,12 +113,8 @@ def _open(name: str, matrix: csc_matrix) -> Factor:
 
         return PardisoFactor(matrix)
     if name == "cholespy":
-        from .cholespy import CholespyFactor
-
         return CholespyFactor(matrix)
     if name == "amg":
-        from .multigrid import MultigridSolver
-
         return MultigridSolver(matrix)
     return SuperLUFactor(matrix)
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
 from .._arrays import FloatArray
-from .types import NotPositiveDefinite
+from .factors import NotPositiveDefinite
 
 AnyArray: TypeAlias = NDArray[Any]
 
@@ -40,7 +40,7 @@ OUT_OF_MEMORY, ZERO_PIVOT = -2, -4
 class PardisoFactor:
     """A sparse Cholesky factorization whose ordering serves other matrices of the same size."""
 
-    worth = 30
+    break_even = 30
 
     def __init__(self, matrix: csc_matrix, kind: int = POSITIVE_DEFINITE) -> None:
         n, self._kind = matrix.shape[0], kind

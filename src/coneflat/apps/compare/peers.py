@@ -14,9 +14,10 @@ import numpy as np
 from ..._arrays import FloatArray, IntArray
 from ...errors import MetricError
 from ...geometry import double_areas, edge_lengths
+from ...geometry.charts import uv_seams
 from ...geometry.planar import signed_double_areas
 from ...mesh import TriangleMesh
-from ...quality.distortion import measure, seams_of
+from ...quality.distortion import measure
 from ...result.flattening import Flattening
 
 
@@ -75,7 +76,7 @@ def with_uv(base: Flattening, corner_uv: FloatArray) -> Flattening:
         curvatures=base.curvatures[:0],
         log_scale=np.full(len(base.vertices), np.nan),
         curvature_residual=np.full(len(base.vertices), np.nan),
-        seams=mesh.edges[seams_of(mesh, unit)],
+        seams=mesh.edges[uv_seams(mesh, unit)],
         packing_efficiency=_covered(unit),
         distortion=measure(mesh, unit),
         notes=(),

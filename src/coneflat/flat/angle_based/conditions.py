@@ -181,7 +181,7 @@ def least_change(
 
     The conditions on triangles involve three angles each, so they are eliminated with these: what is left is one
     system in the multipliers of vertices, two for each inner one (the reduction of ABF++, Sheffer et al. 2005).
-    Its matrix is made as a sum of squares, two of them for the two ways in which a triangle's angles can change.
+    Its matrix is made as a sum of squares, two of them for the two directions in which a triangle's angles can change.
 
     Args:
         slopes, off: (k, 3m) and (k,) the conditions.
@@ -196,20 +196,22 @@ def least_change(
     two = np.stack([np.zeros(len(i)), np.ones(len(i)), -np.ones(len(i))], axis=1) / np.sqrt(j + k)[:, None]
     rows = np.tile(np.arange(len(stiffness)), 2)
     columns = np.repeat(np.arange(2 * len(i)), 3)
-    ways = csr_matrix((np.concatenate([one, two], axis=None), (rows, columns)), (len(stiffness), 2 * len(i)))
-    half = csr_matrix(slopes @ ways)
+    directions = csr_matrix(
+        (np.concatenate([one, two], axis=None), (rows, columns)), (len(stiffness), 2 * len(i))
+    )
+    half = csr_matrix(slopes @ directions)
     matrix = csc_matrix(half @ half.T)
     matrix.sort_indices()
     if before is not None and np.array_equal(before.matrix.indices, matrix.indices):
         # The very same arrays tell the solver that the pattern is the same.
         matrix = csc_matrix((matrix.data, before.matrix.indices, before.matrix.indptr), shape=matrix.shape)
     factor = factorize(matrix, None if before is None else before.factor)
-    pulled = ways.T @ pull
+    pulled = directions.T @ pull
     right = off + slopes @ given - half @ pulled
     forces = factor.solve(right)
     # Once more, for what rounding has left.
     forces += factor.solve(right - half @ (half.T @ forces))
-    return AngleStep(given - ways @ (pulled + half.T @ forces), forces, matrix, factor)
+    return AngleStep(given - directions @ (pulled + half.T @ forces), forces, matrix, factor)
 
 
 def _in_pairs(i: FloatArray, j: FloatArray, k: FloatArray) -> FloatArray:

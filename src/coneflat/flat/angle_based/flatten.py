@@ -145,7 +145,8 @@ def nearest_angles(conditions: AngleConditions, wanted: FloatArray) -> FoundAngl
     the multipliers of vertices. Products of sines are taken by their logs here: that makes the second derivative of
     the Lagrangian diagonal with nothing neglected, and convergence quadratic where it stays positive.
 
-    A step that would take angles more than half way to 0 or pi is shortened to that, and their weights grow.
+    A step that would take angles more than half way to 0 or pi is shortened to that, and their weights grow. The
+    Lagrangian has a saddle point and no minimum, so that a line search as in `solver.newton` would have no measure.
 
     Args:
         conditions: to be fulfilled.

@@ -10,7 +10,7 @@ from scipy.sparse import csc_matrix, csr_matrix, identity
 from ..._arrays import BoolArray, FloatArray, IntArray
 from ...geometry.intrinsic import IntrinsicTriangulation
 from ...solver import factorize
-from .descent import descend
+from ...solver.newton import Limits, Point, minimise
 
 # Angles may shrink to this part of what they were, or to this many radians where that is less; but never below the
 # last, radians.
@@ -23,6 +23,9 @@ ONE_CIRCLE = 1e-6
 TOLERANCE = 1e-10
 # Rounds in which circles are made one, and Newton steps in each.
 ROUNDS, MAX_STEPS = 4, 40
+# When to stop: rounding of a sum of some angles, radians; halvings after which a step is taken for rounding; and part
+# of the gradient that a step must change, as where there is no solution the function falls without an end.
+LIMITS = Limits(TOLERANCE, MAX_STEPS, goal=1e-12, halvings=40, least_change=1e-6)
 # Damping of a step, relative to its residual, where rank is wanting.
 DAMPING, LARGEST_DAMPING, LEAST_DAMPING = 1e-5, 1e-6, 1e-13
 
@@ -66,7 +69,7 @@ def coherent_angles(
     Notes:
         Without the sums, each edge has a problem of its own, to project two angles to a triangle. The sums
         are equations, whose multipliers minimise a convex function that has what they are off by for its gradient;
-        its second derivative jumps where bounds begin or cease to hold, which Newton's method does not mind.
+        its second derivative jumps where bounds begin or cease to hold; Newton's method converges all the same.
         Where none holds, the first step is the least squares solution.
     """
     count = len(angles)
@@ -92,15 +95,14 @@ def coherent_angles(
         right,
         bool(is_summed.all()),
     )
-    found = descend(problem, np.zeros(len(right)), TOLERANCE, MAX_STEPS)
-    steps = found.steps
+    found, steps = minimise(problem, problem.evaluate(np.zeros(len(right))), LIMITS)
     for _ in range(ROUNDS):
         near = problem.nearly_one_circle(found.place)
         if found.largest > TOLERANCE or not near.any():
             break
         problem.is_inside = problem.is_inside | near
-        found = descend(problem, found.place, TOLERANCE, MAX_STEPS)
-        steps += found.steps
+        found, more = minimise(problem, problem.evaluate(found.place), LIMITS)
+        steps += more
     is_inside = problem.is_inside | problem.nearly_one_circle(found.place)
     return CoherentAngles(problem.project(found.place)[0], is_inside, found.largest, steps)
 
@@ -138,14 +140,14 @@ class _Dual:
         near &= np.pi - (angles + angles[self.twin]) < ONE_CIRCLE
         return near
 
-    def downhill(self, place: FloatArray) -> FloatArray:
-        """Return by how much each sum falls short."""
-        short: FloatArray = self.right - self.equations @ self.project(place)[0]
-        return short
+    def evaluate(self, place: FloatArray) -> Point:
+        """Return by how much each sum falls short, which is minus the gradient."""
+        return Point(place, self.right - self.equations @ self.project(place)[0])
 
-    def newton_step(self, place: FloatArray, residual: FloatArray) -> FloatArray:
-        """Return the step, damped as much as the residual is large."""
-        _, own, across = self.project(place)
+    def direction(self, here: Point, exactly: bool) -> tuple[FloatArray, bool]:
+        """Return the step, damped as much as the residual is large; there is none more exact."""
+        residual = here.residual
+        _, own, across = self.project(here.place)
         slots = np.flatnonzero(across)
         every = np.arange(len(own))
         derivative = csr_matrix(
@@ -162,4 +164,4 @@ class _Dual:
         matrix.sort_indices()
         step = np.zeros_like(residual)
         step[:used] = factorize(matrix).solve(residual[:used])
-        return step
+        return step, True

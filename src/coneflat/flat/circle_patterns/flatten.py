@@ -17,13 +17,13 @@ from ...geometry.intrinsic import IntrinsicTriangulation, intrinsic_triangulatio
 from ...geometry.operators import vertex_areas
 from ...mesh import TriangleMesh, label_components
 from ...solver import Factor, factorize
+from ...solver.newton import Limits, Point, minimise
 from ...text import plural
 from ..base import failure_notes, off_by
 from ..exact.flatten import ExactFlatMetric, at_own_area
 from ..exact.hessian import Int32Array
 from ..exact.metric import ExactMetric, checked_target
 from .coherent_angles import CoherentAngles, coherent_angles
-from .descent import descend
 from .proper import make_proper
 
 # Largest curvature error of a metric that has converged, radians.
@@ -134,8 +134,9 @@ RADII_TOLERANCE, MAX_STEPS = 1e-10, 50
 SETTLED, MOST_STEPS, PART = 1e-5, 60, 0.9
 # Halvings of such a step at most, while it goes beyond the top.
 HALVINGS = 30
-# Largest change of a log radius in one step.
-LARGEST_STEP = 5.0
+# When to stop: rounding of a sum of some angles, radians; halvings after which a step is taken for rounding; largest
+# change of a log radius in one step; and part of the gradient that a step must change.
+LIMITS = Limits(RADII_TOLERANCE, MAX_STEPS, goal=1e-12, halvings=40, largest_step=5.0, least_change=1e-6)
 # By how much log radii may differ: squares of lengths, whose logs lie half as far from 0 each way, are to be finite.
 LARGEST_SPREAD = 600.0
 
@@ -175,7 +176,7 @@ def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
     problem.base, steps = widest_pattern(problem)
     # Where circles meet at a small angle, the last bit of a log radius turns theirs by a thousand times more than
     # what is to be reached. As a small change of what was found, log radii have bits enough.
-    found = descend(problem, np.zeros_like(problem.base), RADII_TOLERANCE, MAX_STEPS)
+    found, more = minimise(problem, problem.evaluate(np.zeros_like(problem.base)), LIMITS)
     log_radius = (problem.base + found.place)[problem.circle]
     spread = float(np.ptp(log_radius))
     if not spread < LARGEST_SPREAD:
@@ -188,7 +189,7 @@ def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
     lengths = 2 * np.exp(np.repeat(log_radius, 3)) * np.sin(half)
     upper = np.flatnonzero(twin > np.arange(len(half)))
     lengths[twin[upper]] = lengths[upper]
-    return CirclePattern(log_radius, lengths, found.largest, steps + found.steps)
+    return CirclePattern(log_radius, lengths, found.largest, steps + more)
 
 
 @dataclass(eq=False)
@@ -269,17 +270,16 @@ class RadiiProblem:
         around: FloatArray = np.bincount(self.circle, excess).astype(np.float64)
         return around - around.mean()  # 0 but for rounding
 
-    def downhill(self, place: FloatArray) -> FloatArray:
-        """Return by how much the half angles around each centre exceed pi."""
-        return self.excess(self.half_angles(place))
+    def evaluate(self, place: FloatArray) -> Point:
+        """Return by how much the half angles around each centre exceed pi, which is minus the gradient."""
+        return Point(place, self.excess(self.half_angles(place)))
 
-    def newton_step(self, place: FloatArray, residual: FloatArray) -> FloatArray:
-        """Return the Newton step."""
-        half_theta, gaps = self.sides[3], self._gaps(place)
+    def direction(self, here: Point, exactly: bool) -> tuple[FloatArray, bool]:
+        """Return the Newton step, which is exact."""
+        half_theta, gaps = self.sides[3], self._gaps(here.place)
         with np.errstate(over="ignore"):
             slope = np.sin(2 * half_theta) / (4 * (np.sinh(gaps / 2) ** 2 + np.sin(half_theta) ** 2))
-        step = self.solve(slope, residual)
-        return step * min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), 1e-300))
+        return self.solve(slope, here.residual), True
 
     def solve(self, weight: FloatArray, residual: FloatArray) -> FloatArray:
         """Return the solution for weights of the sides, mean-free; on the way, the first radius is held."""

@@ -26,7 +26,7 @@ def make_proper(triangulation: IntrinsicTriangulation, wanted: IntArray) -> IntA
     Returns:
         The half-edges flipped, in order.
     """
-    from ...geometry.flips import euclidean_diagonal, relink
+    from ...geometry.delaunay import euclidean_diagonal, relink
 
     flipped: list[int] = []
     while True:

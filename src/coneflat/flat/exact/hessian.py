@@ -40,7 +40,6 @@ class HessianPattern:
             cots: (3m,) cotangent of the angle opposite each half-edge.
             held: (n,) True for vertices that are no unknowns.
         """
-
         values = np.empty(len(self._rows))
         fill_values(
             self._tail, self._twin, cots, held, self._starts, self._rows, self._entry, self._diagonal, values

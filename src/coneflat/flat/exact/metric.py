@@ -11,7 +11,7 @@ from ...errors import CurvatureError
 from ...geometry.intrinsic import IntrinsicTriangulation, double, intrinsic_triangulation
 from ...geometry.triangles import double_areas
 from ...mesh import TriangleMesh
-from .newton import ConformalProblem, State, minimize
+from .newton import ConformalProblem, State, find_scale
 from .preconditioner import Inverse
 
 # How far, in radians, prescribed curvatures may miss Gauss-Bonnet; decimals typed by hand are good to more.
@@ -115,10 +115,10 @@ def exact_metric(
         log_scale = plain
     flat_turn = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
     copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
-    doubled, steps = False, 0
+    doubled = False
 
-    def solved_from(first: FloatArray) -> tuple[ConformalProblem, State, IntArray, int]:
-        """Return the problem, its best state, the vertices it is about, and how many flips made it Delaunay."""
+    def solved_from(first: FloatArray) -> tuple[ConformalProblem, State, IntArray, int, int]:
+        """Return the problem, its best state, the vertices it is about, how many flips made it Delaunay, and steps."""
         triangulation, original = intrinsic_triangulation(mesh, lengths), np.arange(n)
         if doubled:
             triangulation, original = double(triangulation)
@@ -132,25 +132,25 @@ def exact_metric(
         else:
             problem = kind(triangulation, flat_turn, target, fixed, pinned, preconditioner)
         euclidean = problem.prepare(delaunay)
-        return problem, minimize(problem, first[original], tolerance, max_steps), original, euclidean
+        state, steps = find_scale(problem, first[original], tolerance, max_steps)
+        return problem, state, original, euclidean, steps
 
-    problem, state, original, euclidean = solved_from(log_scale)
-    steps += problem.steps
+    problem, state, original, euclidean, steps = solved_from(log_scale)
     if not _is_solved(state, tolerance) and mesh.is_boundary_vertex.any():
         doubled = True
-        problem, state, original, euclidean = solved_from(log_scale)
-        steps += problem.steps
+        problem, state, original, euclidean, more = solved_from(log_scale)
+        steps += more
     if not _is_solved(state, tolerance) and (log_scale != plain).any():
         # A first guess may lie so far off, on a field of spikes say, that nothing is left of the triangles there. The
         # input's own scale is finite.
         again = solved_from(plain)
-        steps += again[0].steps
+        steps += again[-1]
         if again[1].largest < state.largest:
-            problem, state, original, euclidean = again
+            problem, state, original, euclidean, _ = again
     if doubled:
         state.curvature[:n] /= copies
     if pinned.any():
-        state.log_scale = _keep_area(mesh, lengths, problem, state.log_scale, original)
+        state.place = _keep_area(mesh, lengths, problem, state.place, original)
     return _finish(problem, state, n, euclidean, steps, tolerance, doubled)
 
 
@@ -199,11 +199,11 @@ def _finish(
 ) -> ExactMetric:
     """Put the metric on the triangulation and collect the report."""
     triangulation = problem.triangulation
-    triangulation.length = problem.flat_lengths(state.log_scale)
+    triangulation.length = problem.flat_lengths(state.place)
     residual = np.abs(state.residual[:n])
     records = problem.records
     return ExactMetric(
-        log_scale=state.log_scale[:n],
+        log_scale=state.place[:n],
         curvature=state.curvature[:n],
         triangulation=triangulation,
         flips=np.concatenate(records) if records else np.empty(0, dtype=np.int64),

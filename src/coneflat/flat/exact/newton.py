@@ -11,11 +11,11 @@ from scipy.sparse import csc_matrix
 
 from ..._arrays import BoolArray, FloatArray, IntArray
 from ...compiled import compiled
-from ...errors import MetricError
 from ...geometry.delaunay import make_delaunay
 from ...geometry.intrinsic import IntrinsicTriangulation
 from ...mesh import NEXT
 from ...solver import Factor, factorize
+from ...solver.newton import Limits, Point, minimise
 from .hessian import HessianPattern
 from .preconditioner import HeldInverse, Inverse, conjugate_gradients, corrected
 
@@ -27,8 +27,6 @@ LARGEST_STEP = 5.0
 COARSEST = 0.05
 # Log scales that differ by less than this have nearly the same Hessian.
 NEARLY = 0.05
-# A step of this share of phi is lost in the sum: triangles are too thin for the tolerance.
-ROUNDING = 2.0**-52
 # Halvings of a step after which it is taken for rounding: the change is then below 1e-9 of the first trial.
 HALVINGS = 30
 # The same where the surface can be doubled instead of creeping along triangles that are about to break.
@@ -36,20 +34,19 @@ HALVINGS_BOUNDED = 6
 
 
 @dataclass(eq=False)
-class State:
-    """Curvature at a log scale, on the triangulation that is Delaunay for it."""
+class State(Point):
+    """Curvature at a log scale, on the triangulation that is Delaunay for it.
 
-    log_scale: FloatArray
-    curvature: FloatArray
-    cots: FloatArray
-    broken: int
-    residual: FloatArray
+    Attributes:
+        curvature: (n,) radians; the residual is what it misses.
+        cots: (3m,) cotangents opposite the half-edges.
+        broken: triangles that break the triangle inequality. On a bounded surface, whose boundary cannot be flipped,
+            the theory does not hold, and no state with such triangles is admissible.
+    """
 
-    @property
-    def largest(self) -> float:
-        """The largest residual, radians; infinite where the scale is beyond double precision."""
-        largest = float(np.abs(self.residual).max(initial=0.0))
-        return largest if np.isfinite(largest) else np.inf
+    curvature: FloatArray = field(default_factory=lambda: np.empty(0))
+    cots: FloatArray = field(default_factory=lambda: np.empty(0))
+    broken: int = 0
 
 
 def centred(log_scale: FloatArray) -> FloatArray:
@@ -74,7 +71,6 @@ class ConformalProblem:
         pinned: (n,) True for one vertex of each component without fixed ones.
         records: half-edges flipped so far.
         preconditioner: solves for the Laplacian of a metric that is similar, zero at fixed vertices; may be none.
-        steps: Newton steps so far.
         last: the state evaluated last, the one the triangulation belongs to.
     """
 
@@ -85,7 +81,6 @@ class ConformalProblem:
     pinned: BoolArray
     preconditioner: Inverse | None = None
     records: list[IntArray] = field(default_factory=list)
-    steps: int = 0
     last: State | None = None
     _pattern: HessianPattern | None = None
     _factor: Factor | None = None
@@ -112,7 +107,6 @@ class ConformalProblem:
 
     def sum_angles(self, log_scale: FloatArray, sums: FloatArray, cots: FloatArray) -> int:
         """Fill the (n,) angle sums and (3m,) weights of the scaled metric; return the number of broken triangles."""
-
         scale = np.exp(centred(log_scale) / 2)
         return sum_angles(self.triangulation.tail, self.triangulation.length, scale, sums, cots)
 
@@ -122,7 +116,6 @@ class ConformalProblem:
 
     def evaluate(self, log_scale: FloatArray) -> State:
         """Flip to Delaunay in the scaled metric and return the curvature there."""
-
         sums = np.empty(len(log_scale))
         cots = np.empty(len(self.triangulation.tail))
         broken = self.sum_angles(log_scale, sums, cots)
@@ -140,22 +133,28 @@ class ConformalProblem:
         if not self.fixed.any() and np.count_nonzero(self.pinned) == 1:
             # Gauss-Bonnet holds but for the rounding of 2 pi at every vertex, which no scale can take away.
             residual -= residual.mean()
-        self.last = State(log_scale, curvature, cots, broken, residual)
+        is_admissible = not (self.is_bounded and broken)
+        self.last = State(log_scale, residual, is_admissible, curvature, cots, broken)
         return self.last
 
-    def direction(self, state: State) -> tuple[FloatArray, bool]:
-        """Return the Newton direction of the state just evaluated, 0 at fixed vertices, and whether it is exact.
+    def direction(self, here: State, exactly: bool) -> tuple[FloatArray, bool]:
+        """Return the Newton direction of a state, 0 at fixed vertices, and whether it was factorized for.
+
+        exactly: factorize, whatever there is to solve with.
 
         Raises:
             MetricError: the Hessian is singular in double precision.
         """
+        # The Hessian needs the triangulation of its own metric.
+        state = here if here is self.last else self.evaluate(here.place)
+        if exactly:
+            self.preconditioner = None
         if self._pattern is None:
             self._pattern = HessianPattern(self.triangulation)
-        self.steps += 1
         if self.preconditioner is not None:
             accuracy = min(max(state.largest, GOAL / state.largest / 4), COARSEST)
             hessian = self._pattern.matrix(state.cots, self.fixed)
-            inverse = self._corrected(self.preconditioner, hessian, state.log_scale)
+            inverse = self._corrected(self.preconditioner, hessian, state.place)
             step = conjugate_gradients(hessian, state.residual, inverse, accuracy)
             if step is not None:
                 return np.where(self.fixed, 0.0, step), False
@@ -176,69 +175,19 @@ class ConformalProblem:
         return self._known[2]
 
 
-def minimize(problem: ConformalProblem, log_scale: FloatArray, tolerance: float, max_steps: int) -> State:
-    """Return the state with the least residual that Newton's method reaches.
+def find_scale(
+    problem: ConformalProblem, log_scale: FloatArray, tolerance: float, max_steps: int
+) -> tuple[State, int]:
+    """Return the state with the least residual that Newton's method reaches, and the number of steps.
 
-    The line search looks at the slope of the energy along the step, (K - target) . d, not at its values,
-    whose rounding hides what a step gains near the end. It halves the step while the slope is positive. The
-    energy being convex, a step with a slope below zero stops short of the minimum along the line, so the
-    energy has fallen, and by at least half of what was to be had when the step before it, twice as long,
-    went beyond. The slope is negative at length 0 and continuous: some length is accepted. A step beyond the
-    minimum is taken only if it halves the least residual so far, which can happen but finitely often. So the
-    search can neither stall nor cycle.
-
-    On a bounded surface the theory does not hold, since edges of the boundary are not flipped; there no
-    state with broken triangles is accepted, and the search ends early if it finds no other.
+    The search starts from a given log scale; on a bounded surface from none, where that breaks triangles.
     """
-    bounded = problem.is_bounded
-    state = best = problem.evaluate(log_scale)
-    if bounded and state.broken:
-        state = best = problem.evaluate(np.where(problem.fixed, log_scale, 0.0))
-    while best.largest > GOAL and not (bounded and state.broken) and problem.steps < max_steps:
-        if problem.last is not state:  # the Hessian needs the triangulation of its own metric
-            state = problem.evaluate(state.log_scale)
-        try:
-            step, is_exact = problem.direction(state)
-        except MetricError:  # singular in double precision: the best so far has to do
-            break
-        if best.largest > tolerance and np.abs(step).max() <= ROUNDING * np.abs(state.log_scale).max():
-            break
-        halvings = 0
-        if best.largest > tolerance:
-            halvings = HALVINGS_BOUNDED if bounded else HALVINGS
-        trial = search_line(problem, state, step, best.largest, halvings)
-        if trial is None:
-            if is_exact or best.largest <= tolerance:
-                break
-            problem.preconditioner = None
-            continue
-        gained = trial.largest <= best.largest / 2
-        state = trial
-        if state.largest < best.largest:
-            best = state
-        if best.largest <= tolerance and not gained:
-            break
-    return best if best is problem.last else problem.evaluate(best.log_scale)
-
-
-def search_line(
-    problem: ConformalProblem, state: State, step: FloatArray, least: float, halvings: int
-) -> State | None:
-    """Return the first trial accepted; None if there is none."""
-    reach = float(np.abs(step).max(initial=0.0))
-    if not np.isfinite(reach) or reach == 0.0:
-        return None
-    length = min(1.0, LARGEST_STEP / reach)
-    for _ in range(halvings + 1):
-        place = state.log_scale + length * step
-        if np.array_equal(place, state.log_scale):  # shorter than rounding
-            return None
-        trial = problem.evaluate(place)
-        slope = -float(trial.residual @ step)
-        if (slope <= 0 or trial.largest <= least / 2) and not (problem.is_bounded and trial.broken):
-            return trial
-        length /= 2
-    return None
+    start = problem.evaluate(log_scale)
+    if not start.is_admissible:
+        start = problem.evaluate(np.where(problem.fixed, log_scale, 0.0))
+    halvings = HALVINGS_BOUNDED if problem.is_bounded else HALVINGS
+    best, steps = minimise(problem, start, Limits(tolerance, max_steps, GOAL, halvings, LARGEST_STEP))
+    return best if best is problem.last else problem.evaluate(best.place), steps
 
 
 @compiled

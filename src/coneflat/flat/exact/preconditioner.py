@@ -1,4 +1,7 @@
-"""Conjugate gradients with the factorized Laplacian of a metric that is similar."""
+"""Conjugate gradients with the factorized Laplacian of a metric that is similar.
+
+A factorization serves on as the preconditioner of later steps while their iterations cost less than a new one.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +10,12 @@ from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import LinearOperator, cg
 
 from ..._arrays import BoolArray, FloatArray, IntArray
 from ...errors import MetricError
 from ...solver import Factor, factorize
 
-# A factorization serves on as the preconditioner of later steps while the iterations that these take, as the first few
-# foretell, cost less than a new one.
-FIRST_FEW = 4
 # Rows of the matrix are corrected for that have changed by more than this share of their diagonal, but so many of them
 # at most: those around cones and in coarse triangles. Conjugate gradients then take a quarter to a sixth of the
 # iterations, and the factorization of these rows takes a twentieth of that of all.
@@ -25,7 +26,7 @@ class Inverse(Protocol):
     """What applies the inverse of a Laplacian, or something close to it; see `coneflat.solver.Factor`."""
 
     @property
-    def worth(self) -> int:
+    def break_even(self) -> int:
         """How many solutions take as long as another factorization."""
         ...
 
@@ -48,9 +49,9 @@ class HeldInverse:
     held: BoolArray
 
     @property
-    def worth(self) -> int:
+    def break_even(self) -> int:
         """How many solutions take as long as another factorization."""
-        return self.factor.worth
+        return self.factor.break_even
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return (n,) the solution, 0 where it is held."""
@@ -77,9 +78,9 @@ class CorrectedInverse:
     factor: Factor
 
     @property
-    def worth(self) -> int:
+    def break_even(self) -> int:
         """How many solutions take as long as another factorization."""
-        return self.inverse.worth
+        return self.inverse.break_even
 
     @property
     def laplacian(self) -> csc_matrix:
@@ -118,27 +119,10 @@ def corrected(inverse: Inverse, matrix: csc_matrix, held: BoolArray) -> Inverse:
 def conjugate_gradients(
     matrix: csc_matrix, right: FloatArray, inverse: Inverse, accuracy: float
 ) -> FloatArray | None:
-    """Solve a semidefinite system whose right side is in its range; None if it is not one or takes too long.
+    """Return the solution of a semidefinite system whose right side is in its range; None if that takes too long.
 
-    accuracy: what the residual, in the norm of the inverse that preconditions it, comes down to, relatively.
+    accuracy: what the residual comes down to, relatively.
     """
-    solution, residual = np.zeros_like(right), right.copy()
-    step = towards = inverse.solve(residual)
-    size = first = float(residual @ towards)
-    for done in range(1, inverse.worth + 1):
-        if not 0 < size < np.inf:
-            return None
-        image = matrix @ step
-        bend = float(step @ image)
-        if not bend > 0:
-            return None
-        solution += size / bend * step
-        residual -= size / bend * image
-        towards = inverse.solve(residual)
-        size, before = float(residual @ towards), size
-        if abs(size) <= accuracy**2 * first:
-            return solution
-        if done == FIRST_FEW and not size <= accuracy ** (2 * FIRST_FEW / inverse.worth) * first:
-            return None
-        step = towards + size / before * step
-    return None
+    towards = LinearOperator(matrix.shape, matvec=inverse.solve, dtype=np.float64)
+    solution, failed = cg(matrix, right, rtol=accuracy, atol=0.0, maxiter=inverse.break_even, M=towards)
+    return None if failed or not np.isfinite(solution).all() else np.asarray(solution)
