@@ -6,7 +6,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from .normals import corner_normals
+from .normals import source_normals
 from .uv_split import split_at_seams
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def write_ply(result: Flattening, stream: IO[bytes]) -> None:
         result: what to write.
         stream: a binary file.
     """
-    mesh = split_at_seams(result, corner_normals(result))
+    mesh = split_at_seams(result, source_normals(result))
     doubles = {"x y z": mesh.vertices}
     if mesh.normals is not None:
         doubles["nx ny nz"] = mesh.normals

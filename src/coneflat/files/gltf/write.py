@@ -10,7 +10,8 @@ from typing import IO, TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from ...errors import MeshFileError
-from ..normals import corner_normals, vertex_normals
+from ...geometry.normals import vertex_normals
+from ..normals import shading_normals, source_normals
 from ..texture import Texture
 from ..uv_split import split_at_seams
 from .scene_write import MOST_BYTES, scene_with_uvs
@@ -72,10 +73,10 @@ def write_glb(
 
 def _one_mesh(result: Flattening, texture: Texture | None) -> tuple[dict[str, Any], list[bytes]]:
     """Return the JSON of a scene of one mesh, and its buffer in pieces."""
-    split = split_at_seams(result, corner_normals(result))
+    split = split_at_seams(result, source_normals(result))
     normals = split.normals
     if normals is None:
-        normals = vertex_normals(result.vertices, result.faces)[split.own]
+        normals = shading_normals(vertex_normals(result.vertices, result.faces))[split.own]
     arrays: list[NDArray[Any]] = [split.faces.reshape(-1).astype("<u4")]
     attributes = {
         "POSITION": split.vertices,

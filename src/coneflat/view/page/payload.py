@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...files.texture import Texture
+from ...geometry.normals import CREASE_COSINE
 from ...quality.checker import CELLS
 from ...result.from_uv import shown_rows
 from ..colours import as_plain, diverging, sequential
@@ -65,6 +66,7 @@ def payload_of(
         "uv_high": high.tolist(),
         "uv_side": content.uv_side,
         "squares": CELLS,
+        "crease_cosine": CREASE_COSINE,
         "scales": {key: as_plain(key, scale) for key, scale in content.scales.items()},
         "picture": None if picture is None else picture.kind,
         "show": show,
