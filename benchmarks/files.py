@@ -23,7 +23,7 @@ import numpy as np
 from common import best_time, cases, model, peak_memory, shapes
 
 from coneflat import flatten, read_mesh
-from coneflat.files.decimals import lines_of
+from coneflat.files.obj_write import lines_of
 
 #: By name: the input to read and the ending of the output to write, where there are such.
 FORMATS = {
@@ -130,10 +130,10 @@ def write_inputs(folder: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
     """Write a mesh in all formats that are read: doubles in text, but for STL, and single precision in binary."""
     import trimesh
 
-    points = b"".join(lines_of(b"", vertices, b"\n"))
+    points = b"".join(lines_of("", vertices, b"\n"))
     polygons = ("3 %d %d %d\n" * len(faces) % tuple(faces.ravel().tolist())).encode()
     with open(folder / "mesh.obj", "wb") as file:
-        file.writelines(lines_of(b"v", vertices, b"\n"))
+        file.writelines(lines_of("v", vertices, b"\n"))
         file.write(("f %d %d %d\n" * len(faces) % tuple((faces + 1).ravel().tolist())).encode())
     (folder / "mesh.off").write_bytes(b"OFF\n%d %d 0\n" % (len(vertices), len(faces)) + points + polygons)
     (folder / "text.ply").write_bytes(ply_header("ascii", "double", vertices, faces) + points + polygons)

@@ -278,3 +278,14 @@ def cut_disk(vertices, faces, cones=()):
 
 def lengths_of(mesh):
     return edge_lengths(mesh.vertices, mesh.faces)
+
+
+def write_obj(path, vertices, faces, uv=None):
+    """Write a mesh as OBJ, with a UV point for every vertex if there are any, and return the path."""
+    lines = ["v {!r} {!r} {!r}".format(*point) for point in np.asarray(vertices, float).tolist()]
+    lines += ["vt {!r} {!r}".format(*point) for point in ([] if uv is None else uv.tolist())]
+    corner = "{0}" if uv is None else "{0}/{0}"
+    lines += ["f " + " ".join(map(corner.format, face)) for face in (np.asarray(faces) + 1).tolist()]
+    path.parent.mkdir(exist_ok=True, parents=True)
+    path.write_text("\n".join(lines) + "\n")
+    return path

@@ -21,17 +21,10 @@ from coneflat.apps.batch.process import Child
 from coneflat.apps.cli.main import cli
 
 
-def write_obj(path, mesh):
-    vertices, faces = mesh
-    lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a} {b} {c}" for a, b, c in faces + 1]
-    path.parent.mkdir(exist_ok=True, parents=True)
-    path.write_text("\n".join(lines))
-
-
 @pytest.fixture
 def models(tmp_path):
-    write_obj(tmp_path / "models" / "ball.obj", shapes.sphere(2))
-    write_obj(tmp_path / "models" / "hill.obj", shapes.hill(8, 6))
+    shapes.write_obj(tmp_path / "models" / "ball.obj", *shapes.sphere(2))
+    shapes.write_obj(tmp_path / "models" / "hill.obj", *shapes.hill(8, 6))
     (tmp_path / "models" / "broken.obj").write_text("v 0 0 0\nf 1 2 3\n")
     (tmp_path / "models" / "notes.txt").write_text("no mesh")
     return tmp_path / "models"
@@ -68,14 +61,14 @@ def test_a_further_run_does_what_is_left(models, tmp_path):
     out = tmp_path / "out"
     invoke("batch", models, "--out", out)
     before = (out / "ball.obj").stat().st_mtime_ns
-    write_obj(models / "broken.obj", shapes.torus(12, 8))
+    shapes.write_obj(models / "broken.obj", *shapes.torus(12, 8))
     result = invoke("batch", models, "--out", out)
     assert result.exit_code == 0
     assert "3 of 3 meshes are flattened, 2 of them before" in result.output
     assert (out / "ball.obj").stat().st_mtime_ns == before
     # Other options, another mesh, a result that is gone: each is a reason to work again.
     assert "of them before" not in invoke("batch", models, "--out", out, "--distortion", 0.5).output
-    write_obj(models / "ball.obj", shapes.sphere(1))
+    shapes.write_obj(models / "ball.obj", *shapes.sphere(1))
     (out / "hill.obj").unlink()
     assert "1 of them before" in invoke("batch", models, "--out", out, "--distortion", 0.5).output
     assert "of them before" not in invoke("batch", models, "--out", out, "--distortion", 0.5, "--redo").output
@@ -160,7 +153,7 @@ def test_refusals(models, monkeypatch, arguments, message):
 def test_a_cluster_does_the_same_even_if_it_loses_a_worker(models, tmp_path, monkeypatch):
     distributed = pytest.importorskip("distributed")
     for i in range(6):
-        write_obj(models / f"ball{i}.obj", shapes.sphere(2, seed=i))
+        shapes.write_obj(models / f"ball{i}.obj", *shapes.sphere(2, seed=i))
     here, there = tmp_path / "here", tmp_path / "there"
     here.mkdir()
     there.mkdir()
@@ -356,7 +349,7 @@ def test_what_cannot_be_written_is_said_before_the_work(models, tmp_path):
 def test_every_result_has_a_name_of_its_own_in_the_folder(tmp_path):
     names = ["a/ball.obj", "a/ball.OBJ", "a/Ball.obj", "b/ball.obj", "ball.ply", "ball_ply.obj", "a_ball.obj"]
     for name in names:
-        write_obj(tmp_path / "models" / name, shapes.tetrahedron())
+        shapes.write_obj(tmp_path / "models" / name, *shapes.tetrahedron())
     jobs = find_jobs([str(tmp_path / "models" / "**")], tmp_path / "out", ".obj", {}, None)
     results = {job.output.lower() for job in jobs}
     assert len(results) == len({job.mesh for job in jobs})

@@ -33,16 +33,9 @@ def run(*arguments, cwd, **options):
     )
 
 
-def write_obj(path, vertices, faces):
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
-    path.write_text("\n".join(lines) + "\n")
-    return path
-
-
 @pytest.fixture
 def model(tmp_path):
-    return write_obj(tmp_path / "model.obj", *shapes.sphere(2))
+    return shapes.write_obj(tmp_path / "model.obj", *shapes.sphere(2))
 
 
 def test_flatten_writes_mesh_report_and_table(model, tmp_path):
@@ -188,7 +181,9 @@ def test_cones_named_twice():
 
 def test_nonmanifold_is_refused_and_repaired(tmp_path):
     vertices, faces = shapes.sphere(1)
-    write_obj(tmp_path / "fin.obj", np.r_[vertices, [[2, 2, 2]]], np.r_[faces, [[0, 12, len(vertices)]]])
+    shapes.write_obj(
+        tmp_path / "fin.obj", np.r_[vertices, [[2, 2, 2]]], np.r_[faces, [[0, 12, len(vertices)]]]
+    )
     done = run("flatten", "fin.obj", "--strict", cwd=tmp_path)
     assert done.returncode == 2
     assert "1 edge with more than two faces (vertex pairs 0-12); pass repair=True" in done.stderr
@@ -201,7 +196,7 @@ def test_nonmanifold_is_refused_and_repaired(tmp_path):
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other signals")
 @pytest.mark.parametrize("step", ["read", "cones", "metric", "pack", "write"])
 def test_interrupt_leaves_nothing_half_written(tmp_path, step):
-    write_obj(tmp_path / "big.obj", *shapes.sphere(6))
+    shapes.write_obj(tmp_path / "big.obj", *shapes.sphere(6))
     command = [sys.executable, "-m", "coneflat", "flatten", "-v", "big.obj", "-o", "out.obj"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
@@ -260,7 +255,7 @@ def test_textures(model, tmp_path):
 
 
 def test_marked_seams(tmp_path):
-    write_obj(tmp_path / "box.obj", *shapes.box(2))
+    shapes.write_obj(tmp_path / "box.obj", *shapes.box(2))
     done = run(
         "flatten", "box.obj", "-o", "six.obj", "--sharp-angle", "60deg", "--report", "r.json", cwd=tmp_path
     )

@@ -128,17 +128,9 @@ def test_models_are_known_by_their_names(tmp_path):
     assert MODELS["torso"].qc == {"linear-abf/free": 1.004, "linear": 1.005}
 
 
-def write_mesh(path, mesh):
-    vertices, faces = mesh
-    lines = [f"v {x} {y} {z}" for x, y, z in vertices.tolist()]
-    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
-    path.write_text("\n".join(lines))
-    return path
-
-
 def test_the_experiments_of_the_paper(tmp_path, ball):
-    write_mesh(tmp_path / "fandisk.obj", ball)
-    write_mesh(tmp_path / "another.obj", shapes.hill(12, 12))
+    shapes.write_obj(tmp_path / "fandisk.obj", *ball)
+    shapes.write_obj(tmp_path / "another.obj", *shapes.hill(12, 12))
     (tmp_path / "gargoyle.obj").write_text("v 0 0 0\n")
     found = reproduce([tmp_path])
     assert [model.name for model in found.models] == ["fandisk", "another"]
@@ -159,7 +151,7 @@ def test_the_experiments_of_the_paper(tmp_path, ball):
 
 def test_commands(tmp_path, ball):
     pytest.importorskip("matplotlib")
-    mesh = write_mesh(tmp_path / "ball.obj", ball)
+    mesh = shapes.write_obj(tmp_path / "ball.obj", *ball)
     run = CliRunner().invoke(
         cli,
         ["compare", str(mesh), "-o", str(tmp_path / "out"), "--methods", "exact,linear", "--no-peers"],
@@ -177,7 +169,7 @@ def test_commands(tmp_path, ball):
 
 
 def test_cones_of_the_paper_and_others(tmp_path, ball):
-    mesh = write_mesh(tmp_path / "ball.obj", ball)
+    mesh = shapes.write_obj(tmp_path / "ball.obj", *ball)
     run = CliRunner().invoke(cli, ["compare", str(mesh), "--paper", "--cone-count", "5"])
     assert run.exit_code == 2
     assert "--paper says which cones: leave out --cone-count" in run.output
@@ -200,7 +192,7 @@ def test_cones_of_the_paper_and_others(tmp_path, ball):
 def test_what_cannot_work_is_refused_before_the_work(words, message, tmp_path, ball, monkeypatch):
     pytest.importorskip("matplotlib")
     monkeypatch.chdir(tmp_path)
-    write_mesh(tmp_path / "ball.obj", ball)
+    shapes.write_obj(tmp_path / "ball.obj", *ball)
     for name in ("compare.md", "paper.md"):
         (tmp_path / "busy" / name).mkdir(parents=True)
 
@@ -221,7 +213,7 @@ def test_what_cannot_work_is_refused_before_the_work(words, message, tmp_path, b
 def test_nothing_that_came_out_is_an_error(tmp_path):
     pytest.importorskip("matplotlib")
     vertices, faces = shapes.sphere(3)
-    mesh = write_mesh(tmp_path / "squashed.obj", (vertices * [1, 1, 1e-3], faces))
+    mesh = shapes.write_obj(tmp_path / "squashed.obj", vertices * [1, 1, 1e-3], faces)
     words = ["compare", str(mesh), "--methods", "abf++", "--no-peers", "-o", str(tmp_path / "out")]
     with pytest.raises(errors.MetricError, match=r"no method came to a layout: abf\+\+: .* did not converge"):
         CliRunner().invoke(cli, words, catch_exceptions=False)
@@ -255,7 +247,7 @@ def test_cones_where_a_repair_split_a_vertex():
 
 def test_a_folder_that_cannot_be_made(tmp_path, ball):
     pytest.importorskip("matplotlib")
-    mesh = write_mesh(tmp_path / "ball.obj", ball)
+    mesh = shapes.write_obj(tmp_path / "ball.obj", *ball)
     with pytest.raises(errors.MeshFileError, match="cannot make the folder"):
         CliRunner().invoke(cli, ["compare", str(mesh), "-o", str(mesh)], catch_exceptions=False)
 
@@ -272,7 +264,7 @@ def test_every_list_of_methods_is_the_same():
 def test_names_of_files_are_kept(tmp_path, ball):
     from coneflat import read_mesh
 
-    source = read_mesh(write_mesh(tmp_path / "ball.obj", ball))
+    source = read_mesh(shapes.write_obj(tmp_path / "ball.obj", *ball))
     assert isinstance(source, MeshFile)
     assert compare_methods(source, methods=("exact",), peers=()).name.endswith("ball.obj")
 

@@ -53,12 +53,7 @@ def test_too_few_for_the_surface():
 @pytest.fixture
 def model(tmp_path):
     vertices, faces = shapes.sphere(3)
-    path = tmp_path / "ball.obj"
-    lines = [f"v {x} {y} {z * 1.5}" for x, y, z in vertices] + [
-        f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces
-    ]
-    path.write_text("\n".join(lines) + "\n")
-    return path
+    return shapes.write_obj(tmp_path / "ball.obj", vertices * [1, 1, 1.5], faces)
 
 
 def test_the_command_writes_cones_that_flatten_reads(model, tmp_path, monkeypatch):

@@ -147,10 +147,7 @@ class TestCommand:
     @pytest.fixture
     def run(self, tmp_path, monkeypatch, capsys):
         monkeypatch.chdir(tmp_path)
-        vertices, faces = shapes.sphere(2)
-        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-        lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
-        (tmp_path / "ball.obj").write_text("\n".join(lines))
+        shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(2))
 
         def call(*words):
             monkeypatch.setattr(sys, "argv", ["coneflat", "figure", *words])

@@ -27,16 +27,6 @@ def triangles(joined):
     return joined.mesh.vertices, joined.mesh.corners.reshape(-1, 3)
 
 
-def write_obj(path, vertices, faces, uv=None):
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, float).tolist()]
-    if uv is not None:
-        lines += [f"vt {u!r} {v!r}" for u, v in uv.tolist()]
-    corner = "{0}" if uv is None else "{0}/{0}"
-    lines += ["f " + " ".join(corner.format(v) for v in face) for face in (faces + 1).tolist()]
-    path.write_text("\n".join(lines) + "\n")
-    return path
-
-
 def soup(vertices, faces):
     """Return every triangle with vertices of its own."""
     return vertices[faces.ravel()], np.arange(faces.size).reshape(-1, 3)
@@ -135,7 +125,7 @@ class TestJoining:
         vertices, faces = shapes.sphere(2)
         piece = (vertices[faces].mean(axis=1)[:, :2] > 0) @ [1, 2]
         parts = [(vertices, faces[piece == k]) for k in range(4)]
-        write_obj(tmp_path / "pieces.obj", *shapes.join(*parts))
+        shapes.write_obj(tmp_path / "pieces.obj", *shapes.join(*parts))
         done = run("flatten", "pieces.obj", "-o", "a.obj", "--report", "a.json")
         assert done.exit_code == 0, done.output
         report = json.loads((tmp_path / "a.json").read_text())
@@ -150,7 +140,7 @@ class TestJoining:
         """Also where another one is used for them."""
         monkeypatch.chdir(tmp_path)
         vertices, faces = soup(*shapes.sphere(1))
-        path = write_obj(tmp_path / "soup.obj", vertices, faces)
+        path = shapes.write_obj(tmp_path / "soup.obj", vertices, faces)
         used = read_joined(path).used
         merged = np.flatnonzero(used != np.arange(len(used)))
         words = [word for v in merged[[5, 40, 80]] for word in ("--required-cones", v)]
@@ -191,7 +181,7 @@ class TestRepair:
         if command == "figure":
             pytest.importorskip("matplotlib")
         monkeypatch.chdir(tmp_path)
-        write_obj(tmp_path / "fin.obj", *fin())
+        shapes.write_obj(tmp_path / "fin.obj", *fin())
         done = run(command, "fin.obj", *more)
         assert done.exit_code == 0, done.output
         if command in ("flatten", "view"):
@@ -201,14 +191,14 @@ class TestRepair:
 
     def test_batch(self, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
-        write_obj(tmp_path / "fin.obj", *fin())
+        shapes.write_obj(tmp_path / "fin.obj", *fin())
         assert run("batch", "fin.obj", "--out", "a", "--jobs", "1").exit_code == 0
         assert "Separated" in (tmp_path / "a" / "summary.csv").read_text()
         assert run("batch", "fin.obj", "--out", "b", "--jobs", "1", "--strict").exit_code == 1
 
     def test_measure(self, tmp_path):
         vertices, faces = fin()
-        path = write_obj(tmp_path / "fin.obj", vertices, faces, uv=vertices[:, :2])
+        path = shapes.write_obj(tmp_path / "fin.obj", vertices, faces, uv=vertices[:, :2])
         done = run("measure", path)
         assert done.exit_code == 0
         assert "Separated the faces at 1 edge" in done.stdout
@@ -232,7 +222,7 @@ class TestOwnUVs:
     def square(self, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         vertices, faces = shapes.hill(6, 5)
-        return write_obj(tmp_path / "own.obj", vertices, faces, uv=0.5 * vertices[:, :2])
+        return shapes.write_obj(tmp_path / "own.obj", vertices, faces, uv=0.5 * vertices[:, :2])
 
     @pytest.mark.parametrize(("command", "ending"), [("view", "html"), ("figure", "png")])
     def test_they_are_shown_and_it_is_said(self, square, command, ending):
@@ -292,7 +282,7 @@ def test_what_is_joined_on_reading_is_written_whole(tmp_path, monkeypatch, endin
     monkeypatch.chdir(tmp_path)
     vertices, faces = soup(*shapes.sphere(1))
     if ending == "obj":
-        write_obj(tmp_path / "soup.obj", vertices, faces)
+        shapes.write_obj(tmp_path / "soup.obj", vertices, faces)
     else:
         rows = [" ".join(map(repr, row)) for row in vertices.tolist()]
         rows += [f"3 {a} {b} {c}" for a, b, c in faces.tolist()]

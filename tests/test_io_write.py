@@ -200,6 +200,33 @@ class TestSplitFormats:
         np.testing.assert_array_equal(rows["source"][triangles], result.faces + 10)
         np.testing.assert_array_equal(rows["normal"][triangles][:3], np.tile([0.0, 0, 1], (3, 3, 1)))
 
+    @pytest.mark.parametrize("ending", [".ply", ".obj"])
+    def test_ply_keeps_colours(self, tmp_path, ending):
+        vertices, faces = shapes.sphere(2)
+        shades = np.random.default_rng(4).integers(0, 256, (len(vertices), 3))
+        if ending == ".ply":
+            lines = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}"]
+            lines += [f"property double {axis}" for axis in "xyz"]
+            lines += [f"property uchar {name}" for name in ("red", "green", "blue")]
+            lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+            rows = [
+                " ".join(map(str, [*p, *c])) for p, c in zip(vertices.tolist(), shades.tolist(), strict=True)
+            ]
+            rows += [f"3 {a} {b} {c}" for a, b, c in faces]
+        else:
+            lines = []
+            rows = [f"v {x} {y} {z} {r / 255} {g / 255} {b / 255}"
+                    for (x, y, z), (r, g, b) in zip(vertices.tolist(), shades.tolist(), strict=True)]  # fmt: skip
+            rows += [f"f {a} {b} {c}" for a, b, c in faces + 1]
+        path = tmp_path / f"painted{ending}"
+        path.write_text("\n".join([*lines, *rows]) + "\n")
+        result = coneflat.flatten(read_mesh(path))
+        again = read_mesh(write_flattening(result, tmp_path / "out.ply"))
+        assert len(again.vertices) > len(vertices)
+        origin = again.properties["source_vertex"].astype(int)
+        for k, name in enumerate(("red", "green", "blue")):
+            np.testing.assert_array_equal(255 * again.properties[name], shades[origin, k])
+
     def test_glb_by_the_specification(self, bar, tmp_path):
         result = cut_bar(bar)
         uv = np.random.default_rng(1).random((9, 2))

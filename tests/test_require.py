@@ -19,10 +19,8 @@ from coneflat.result.requirements import REPORTED, Requirement, breaches, parse_
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    for name, (vertices, faces) in (("ball", shapes.sphere(1)), ("hill", shapes.hill(6, 5))):
-        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-        lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
-        (tmp_path / f"{name}.obj").write_text("\n".join(lines))
+    shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(1))
+    shapes.write_obj(tmp_path / "hill.obj", *shapes.hill(6, 5))
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -28,10 +28,7 @@ LINE = r" +\d+\.\d s +(\d+)%  \w+.*"
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    vertices, faces = shapes.sphere(2)
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
-    (tmp_path / "model.obj").write_text("\n".join(lines))
+    shapes.write_obj(tmp_path / "model.obj", *shapes.sphere(2))
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -8,12 +8,13 @@ import shapes
 from shapes import tube
 
 from coneflat.errors import OptionError
+from coneflat.geometry.normals import corner_normals
 from coneflat.quality.checker import DARK_CELL, LIGHT_CELL
 from coneflat.sample import sample_path
 from coneflat.view.figures.camera import eye_direction, fit_camera, view_aspect
 from coneflat.view.figures.projection import render_mesh
 from coneflat.view.figures.raster import Barycentrics, rasterise
-from coneflat.view.figures.shading import checkerboard, corner_normals
+from coneflat.view.figures.shading import checkerboard
 
 SQUARE = np.array([[0, 1, 2], [0, 2, 3]])
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
+from ..geometry.normals import face_normals, sums_at, unit_vectors, vertex_normals
 from ..input.mesh_file import MeshFile
 from ..input.polygons import polygon_of
 from ..input.weld import weld
@@ -39,14 +40,7 @@ def usable_normals(normals: FloatArray, corners: IntArray) -> IntArray | None:
     return known if np.any(known >= 0) else None
 
 
-def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (n, 3) unit normals, each the mean of its triangles' by area; (0, 0, 1) where there is none."""
-    return _unit(
-        _sums(np.repeat(_area_vectors(vertices, faces), 3, axis=0), faces.reshape(-1), len(vertices))
-    )
-
-
-def corner_normals(result: Flattening) -> CornerNormals | None:
+def source_normals(result: Flattening) -> CornerNormals | None:
     """Return the shading of the file that a result was read from; None where it says nothing of it.
 
     That is the file's normals, or what its smoothing groups make; corners without either have the mean normal of
@@ -68,8 +62,8 @@ def corner_normals(result: Flattening) -> CornerNormals | None:
         normals = np.concatenate([normals, vertex_normals(result.vertices, result.faces)])
     used, numbers = np.unique(corners, return_inverse=True)
     # Many files have a normal for every corner, most of them the same.
-    kept, merged = weld(_unit(normals[used]))
-    return CornerNormals(_unit(normals[used][kept]), merged[numbers.reshape(corners.shape)])
+    kept, merged = weld(shading_normals(normals[used]))
+    return CornerNormals(shading_normals(normals[used][kept]), merged[numbers.reshape(corners.shape)])
 
 
 def _smoothing_groups(source: MeshFile) -> IntArray | None:
@@ -99,25 +93,11 @@ def _smoothed(result: Flattening, source: MeshFile, groups: IntArray) -> tuple[F
     keys = np.where(group > 0, group * count + result.faces, -1 - polygon[:, None])
     _, corners = np.unique(keys, return_inverse=True)
     corners = corners.reshape(keys.shape)
-    areas = _area_vectors(result.vertices, result.faces)
-    return _sums(np.repeat(areas, 3, axis=0), corners.reshape(-1), int(corners.max()) + 1), corners
+    areas = face_normals(result.vertices, result.faces)[:, None]
+    return sums_at(corners, areas, int(corners.max()) + 1), corners
 
 
-def _area_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    a, b, c = (np.take(vertices, faces[:, k], axis=0) for k in range(3))
-    return np.asarray(np.cross(b - a, c - a))
-
-
-def _sums(values: FloatArray, places: IntArray, count: int) -> FloatArray:
-    """Return (count, 3) the sums of the values of each place."""
-    return np.stack([np.bincount(places, values[:, k], count) for k in range(3)], axis=1)
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    """Return vectors of length one; (0, 0, 1) for those without a direction."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        # Squares of the largest component's parts neither overflow nor vanish.
-        scaled = vectors / np.maximum(np.abs(vectors).max(axis=1, keepdims=True), np.finfo(float).tiny)
-        lengths = np.linalg.norm(scaled, axis=1, keepdims=True)
-    is_vector = np.isfinite(lengths) & (lengths > 0)
-    return np.where(is_vector, scaled / np.where(is_vector, lengths, 1), [0.0, 0.0, 1.0])
+def shading_normals(vectors: FloatArray) -> FloatArray:
+    """Return vectors of length one; (0, 0, 1) for those without a direction, as files need one."""
+    units = unit_vectors(vectors)
+    return np.where(units.any(axis=1, keepdims=True), units, [0.0, 0.0, 1.0])

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .._arrays import IntArray
-from ..compiled import compiled
-from .decimals import BLANK, lines_of, put_integer
+from .._arrays import FloatArray, IntArray
 from .obj import ObjText
 from .polygons import find_pieces
 
@@ -24,8 +22,8 @@ if TYPE_CHECKING:
 _MATERIALS = re.compile(rb"(?m)^([ \t]*mtllib[ \t]+)([^\r\n]*?)(?=[ \t]*\r?$)")
 
 
-#: Faces written at a time.
-_FACES = 1 << 15
+#: Lines written at a time: their numbers take some MB as Python has them.
+_LINES = 1 << 15
 
 
 def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
@@ -64,28 +62,36 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
         columns.append(text.normals[to_write.corners])
     newline, last = text.newline, len(offsets) - 1
     if source is None or source.obj is None:
-        stream.writelines(lines_of(b"v", vertices, newline))
+        stream.writelines(lines_of("v", vertices, newline))
     if normals is not None:
-        stream.writelines(lines_of(b"vn", normals, newline))
+        stream.writelines(lines_of("vn", normals, newline))
     before = sorted({0, last, *text.gaps})
     begins = np.searchsorted(to_write.polygons, before).tolist()
     starts = np.concatenate(([0], np.cumsum(to_write.sizes)))
     for place, begin, end in zip(before, begins, [*begins[1:], len(to_write.sizes)], strict=True):
         stream.write(_ended(text.gaps.get(place, b""), newline, place == last))
         if place == 0:
-            stream.writelines(lines_of(b"vt", result.uv, newline))
-        for first in range(begin, end, _FACES):
-            stop = min(first + _FACES, end)
+            stream.writelines(lines_of("vt", result.uv, newline))
+        for first in range(begin, end, _LINES):
+            stop = min(first + _LINES, end)
             rows = np.stack([column[starts[first] : starts[stop]] for column in columns], axis=1)
             stream.write(_face_lines(to_write.sizes[first:stop], rows, newline))
 
 
+def lines_of(begin: str, rows: FloatArray, newline: bytes) -> Iterator[bytes]:
+    """Yield a text with a line for each of (r, k) rows: the fewest digits from which the same numbers are read."""
+    line = begin + " %r" * rows.shape[1] + newline.decode()
+    for i in range(0, len(rows), _LINES):
+        block = rows[i : i + _LINES]
+        yield (line * len(block) % tuple(block.ravel().tolist())).encode()
+
+
 def _face_lines(sizes: IntArray, rows: IntArray, newline: bytes) -> bytes:
     """Return the lines of faces, with one row of numbers for each corner; a normal of 0 is none."""
-
-    letters = len(str(int(np.abs(rows).max(initial=0)))) + 2  # with a sign, and what stands before the number
-    out = np.empty(rows.size * letters + len(sizes) * (1 + len(newline)), np.uint8)
-    return out[: put_faces(sizes, rows, np.frombuffer(newline, np.uint8), out)].tobytes()
+    corner, end = " " + "/".join(["%d"] * rows.shape[1]), newline.decode()
+    lines = "".join(["f" + corner * size + end for size in sizes.tolist()])
+    text = (lines % tuple(rows.ravel().tolist())).encode()
+    return text.replace(b"/0 ", b" ").replace(b"/0" + newline, newline)
 
 
 def _ended(text: bytes, newline: bytes, is_last: bool) -> bytes:
@@ -122,34 +128,3 @@ def moved_path(name: bytes, here: str, there: str) -> bytes:
         # On another drive nothing but the full path leads there.
         relative = full
     return relative.replace(os.fsencode(os.sep), b"/")
-
-
-LETTER_F, SLASH = ord("f"), ord("/")
-
-
-@compiled
-def put_faces(sizes: IntArray, rows: IntArray, end: NDArray[np.uint8], out: NDArray[np.uint8]) -> int:
-    """Write a line for each face, and return the length of the text.
-
-    Args:
-        sizes: (p,) the number of corners of each face.
-        rows: (c, k) numbers of each corner, to stand between slashes; a 0 at the end is left out.
-        end: how a line ends.
-        out: where the text goes, large enough.
-    """
-    i, corner = 0, 0
-    for size in sizes:
-        out[i] = LETTER_F
-        i += 1
-        for _ in range(size):
-            out[i] = BLANK
-            i = put_integer(out, i + 1, rows[corner, 0])
-            for number in rows[corner, 1:]:
-                if number != 0:
-                    out[i] = SLASH
-                    i = put_integer(out, i + 1, number)
-            corner += 1
-        for code in end:
-            out[i] = code
-            i += 1
-    return i

@@ -1,10 +1,14 @@
-"""Reading PLY, text and binary, with its polygons."""
+"""Reading PLY, text and binary, with its polygons.
+
+An own reader, since polygons, all numbers of vertices and the UVs of corners are to survive, and what a header promises
+is not to be believed before it is found.
+"""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -38,8 +42,8 @@ _FACE_UV = "texcoord"
 @dataclass(frozen=True, eq=False)
 class _Property:
     name: str
-    kind: str  # numpy code of the value, or of a list's items
-    count: str | None = None  # numpy code of a list's length
+    kind: str  # numpy code of the value, or of a list's items; with the byte order once that is known
+    count: str | None = None  # numpy code of a list's length, likewise
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +51,17 @@ class _Element:
     name: str
     length: int
     properties: tuple[_Property, ...] = ()
+
+    @cached_property
+    def steps(self) -> list[tuple[int, struct.Struct | None]]:
+        """Of each property, the bytes of the value or of an item, and what reads a list's length."""
+        return [
+            (
+                np.dtype(p.kind).itemsize,
+                struct.Struct(p.count[0] + _STRUCT[p.count[1:]]) if p.count else None,
+            )
+            for p in self.properties
+        ]
 
 
 def parse_ply(path: Path, content: bytes) -> RawMesh:
@@ -60,11 +75,7 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
     if form == "ascii":
         # As an array of doubles the text is read by the same code as the binary forms; doubles hold every
         # index a file can have.
-        content, start, order = _text_values(path, content, start), 0, "<"
-        elements = [_as_doubles(element) for element in elements]
-    else:
-        order = "<" if form == "binary_little_endian" else ">"
-
+        content, start = _text_values(path, content, start), 0
     vertices: FloatArray | None = None
     properties: dict[str, FloatArray] = {}
     polygons: tuple[IntArray, IntArray] | None = None
@@ -72,8 +83,8 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
     for element in elements:
         wanted = _wanted(path, element)
         try:
-            columns, start = _decode(content, start, element, wanted, order)
-        except (_EndOfFile, IndexError, struct.error) as error:
+            columns, start = _decode(content, start, _stored(element, form), wanted)
+        except _EndOfFile as error:
             raise MeshFileError(
                 f"{path} ends before the {element.length} {element.name} elements its header promises"
             ) from error
@@ -191,20 +202,15 @@ class _EndOfFile(Exception):
     """The file is shorter than its header promises."""
 
 
-def _decode(
-    content: bytes, start: int, element: _Element, wanted: list[int], order: str
-) -> tuple[list[Column], int]:
+def _decode(content: bytes, start: int, element: _Element, wanted: list[int]) -> tuple[list[Column], int]:
     """Return the wanted columns of an element, a list as two (lengths, items), and where it ends."""
     lists = [i for i, p in enumerate(element.properties) if p.count]
-    lengths = dict.fromkeys(lists, 0)
-    if element.length and lists:
-        lengths = _first_lengths(content, start, element, order)
+    lengths = dict(
+        zip(lists, _row(content, start, element)[1] if element.length else [0] * len(lists), strict=True)
+    )
     fields: list[tuple[str, str] | tuple[str, str, int]] = []
     for i, p in enumerate(element.properties):
-        if p.count:
-            fields += [(f"n{i}", order + p.count), (f"p{i}", order + p.kind, lengths[i])]
-        else:
-            fields.append((f"p{i}", order + p.kind))
+        fields += [(f"n{i}", p.count), (f"p{i}", p.kind, lengths[i])] if p.count else [(f"p{i}", p.kind)]
     row = np.dtype(fields)
     stop = start + element.length * row.itemsize
     if stop <= len(content):
@@ -218,44 +224,23 @@ def _decode(
             return columns, stop
     if not lists or element.length > len(content):
         raise _EndOfFile
-    return _decode_ragged(content, start, element, wanted, order)
-
-
-def _first_lengths(content: bytes, start: int, element: _Element, order: str) -> dict[int, int]:
-    """Return the length of every list of an element's first row."""
-    lengths = {}
-    for i, p in enumerate(element.properties):
-        if p.count:
-            counter = struct.Struct(order + _STRUCT[p.count])
-            lengths[i] = _length(counter.unpack_from(content, start)[0])
-            start += counter.size + lengths[i] * np.dtype(p.kind).itemsize
-        else:
-            start += np.dtype(p.kind).itemsize
-        if start > len(content):
-            raise _EndOfFile
-    return lengths
-
-
-def _length(value: float) -> int:
-    if not 0 <= value < 2**31 or value != int(value):
-        raise ValueError(f"a list has the length {value}")
-    return int(value)
+    return _decode_ragged(content, start, element, wanted)
 
 
 def _decode_ragged(
-    content: bytes, start: int, element: _Element, wanted: list[int], order: str
+    content: bytes, start: int, element: _Element, wanted: list[int]
 ) -> tuple[list[Column], int]:
     """Return what `_decode` does, of an element whose lists differ in length."""
     codes = np.frombuffer(content, np.uint8)
+    starts = [start]
+    for _ in range(element.length):
+        starts.append(_row(content, starts[-1], element)[0])
 
     def read(places: IntArray, kind: str) -> Column:
         every = np.lib.stride_tricks.sliding_window_view(codes, np.dtype(kind).itemsize)
-        return every[places].reshape(-1).view(order + kind)
+        return every[places].reshape(-1).view(kind)
 
-    rows = np.fromiter(_row_starts(content, start, element, order), np.int64, element.length + 1)
-    if rows[-1] > len(content):
-        raise _EndOfFile
-    places: IntArray = rows[:-1]
+    places: IntArray = np.array(starts[:-1])
     columns: dict[int, list[Column]] = {}
     for i, p in enumerate(element.properties):
         size = np.dtype(p.kind).itemsize
@@ -268,37 +253,29 @@ def _decode_ragged(
             items = read(np.repeat(places, lengths) + within * size, p.kind)
             columns[i] = [lengths, items] if p.count else [items]
         places = places + lengths * size
-    return [column for i in wanted for column in columns[i]], int(rows[-1])
+    return [column for i in wanted for column in columns[i]], starts[-1]
 
 
-def _row_starts(content: bytes, start: int, element: _Element, order: str) -> Iterator[int]:
-    """Yield where each row of an element begins, and where the last ends."""
-    lists: list[tuple[int, Callable[[int], int], int, int]] = []
-    before = 0  # bytes since the last list
-    for p in element.properties:
-        size = np.dtype(p.kind).itemsize
-        if p.count:
-            lists.append(
-                (before, _length_reader(content, order + _STRUCT[p.count]), np.dtype(p.count).itemsize, size)
-            )
-            before = 0
-        else:
-            before += size
-    for _ in range(element.length):
-        yield start
-        for skipped, length, width, size in lists:
-            start += skipped
-            start += width + size * length(start)
-        start += before
-    yield start
+def _row(content: bytes, start: int, element: _Element) -> tuple[int, list[int]]:
+    """Return where a row of an element ends, and how long its lists are.
 
-
-def _length_reader(content: bytes, form: str) -> Callable[[int], int]:
-    """Return what reads the length of a list at a place."""
-    if form[-1] == "B":  # as in most files, and sooner had
-        return content.__getitem__
-    unpack = struct.Struct(form).unpack_from
-    return lambda place: _length(unpack(content, place)[0])
+    Raises:
+        _EndOfFile: the content ends before.
+    """
+    lengths = []
+    for size, count in element.steps:
+        if count is not None:
+            if start + count.size > len(content):
+                raise _EndOfFile
+            (length,) = count.unpack_from(content, start)
+            if not 0 <= length < 2**31 or length != int(length):
+                raise ValueError(f"a list has the length {length}")
+            lengths.append(int(length))
+            size = count.size + size * lengths[-1]
+        start += size
+    if start > len(content):
+        raise _EndOfFile
+    return start, lengths
 
 
 def _text_values(path: Path, content: bytes, start: int) -> bytes:
@@ -309,12 +286,15 @@ def _text_values(path: Path, content: bytes, start: int) -> bytes:
     return numbers.done().astype("<f8", copy=False).tobytes()
 
 
-def _as_doubles(element: _Element) -> _Element:
-    """Return an element with all properties as `_text_values` gives them."""
-    return replace(
-        element,
-        properties=tuple(_Property(p.name, "f8", "f8" if p.count else None) for p in element.properties),
-    )
+def _stored(element: _Element, form: str) -> _Element:
+    """Return an element with its properties' types as they are stored, those of a text as `_text_values` gives them."""
+    order = ">" if form == "binary_big_endian" else "<"
+
+    def kind(code: str) -> str:
+        return "<f8" if form == "ascii" else order + code
+
+    stored = [_Property(p.name, kind(p.kind), p.count and kind(p.count)) for p in element.properties]
+    return replace(element, properties=tuple(stored))
 
 
 def _whole(path: Path, corners: Column) -> IntArray:

@@ -5,8 +5,11 @@ from __future__ import annotations
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .normals import corner_normals
+from .._arrays import IntArray
+from ..input.mesh_file import COLOURS
+from .normals import source_normals
 from .uv_split import split_at_seams
 
 if TYPE_CHECKING:
@@ -19,22 +22,25 @@ def write_ply(result: Flattening, stream: IO[bytes]) -> None:
     """Write a result as binary little-endian PLY, coordinates as doubles.
 
     Every vertex has its UV as `s` and `t`, and as `source_vertex` the vertex of the input that it came from;
-    where the mesh was cut there are several of the same. If the input has normals, so have they. Vertices without
-    a face are left out.
+    where the mesh was cut there are several of the same. If the input has normals or colours, so have they. Vertices
+    without a face are left out.
 
     Args:
         result: what to write.
         stream: a binary file.
     """
-    mesh = split_at_seams(result, corner_normals(result))
+    mesh = split_at_seams(result, source_normals(result))
     doubles = {"x y z": mesh.vertices}
     if mesh.normals is not None:
         doubles["nx ny nz"] = mesh.normals
     doubles["s t"] = mesh.uv
     names = " ".join(doubles).split()
-    vertices = np.empty(len(mesh.vertices), [("doubles", "<f8", len(names)), ("source_vertex", "<i4")])
+    colours = _colours(result, mesh.origin)
+    kind = [("doubles", "<f8", len(names)), ("source_vertex", "<i4"), ("colours", "u1", colours.shape[1])]
+    vertices = np.empty(len(mesh.vertices), kind)
     vertices["doubles"] = np.concatenate(list(doubles.values()), axis=1)
     vertices["source_vertex"] = mesh.origin
+    vertices["colours"] = colours
     faces = np.empty(len(mesh.faces), _FACE)
     faces["count"] = 3
     faces["corners"] = mesh.faces
@@ -45,6 +51,7 @@ def write_ply(result: Flattening, stream: IO[bytes]) -> None:
         f"element vertex {len(vertices)}",
         *(f"property double {name}" for name in names),
         "property int source_vertex",
+        *(f"property uchar {name}" for name in COLOURS[: colours.shape[1]]),
         f"element face {len(faces)}",
         "property list uchar int vertex_indices",
         "end_header",
@@ -52,3 +59,12 @@ def write_ply(result: Flattening, stream: IO[bytes]) -> None:
     stream.write(("\n".join(header) + "\n").encode("ascii"))
     stream.write(vertices.data)
     stream.write(faces.data)
+
+
+def _colours(result: Flattening, origin: IntArray) -> NDArray[np.uint8]:
+    """Return (k, 3) the colours that the file gives vertices of the input, 0 to 255; (k, 0) if it gives none."""
+    source = result.source
+    if source is None or result.face_corners is None or not source.has_colours:
+        return np.empty((len(origin), 0), np.uint8)
+    shades = np.stack([source.properties[name][origin] for name in COLOURS], axis=1)
+    return np.round(255 * np.clip(np.nan_to_num(shades), 0, 1)).astype(np.uint8)

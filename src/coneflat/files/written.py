@@ -11,7 +11,6 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..atlas.touch import snap_apart
 from ..errors import MeshFileError
-from ..input.mesh_file import COLOURS
 from ..input.polygons import polygon_of
 from ..result.promises import DOUBLE, SINGLE, remeasured
 from ..text import plural
@@ -139,6 +138,6 @@ def left_out(result: Flattening, ending: str) -> tuple[str, ...]:
             )
     if source.obj is not None and ending != ".obj" and any(map(_MATERIAL.search, source.obj.gaps.values())):
         notes.append(f"Groups and materials of the file are not kept in {ending}: .obj keeps them.")
-    if all(colour in source.properties for colour in COLOURS) and (source.obj is None or ending != ".obj"):
-        notes.append(f"Vertex colours of the file are not kept in {ending}.")
+    if source.has_colours and ending != ".ply" and (source.obj is None or ending != ".obj"):
+        notes.append(f"Vertex colours of the file are not kept in {ending}: .ply keeps them.")
     return tuple(notes)

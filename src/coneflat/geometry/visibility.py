@@ -6,6 +6,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray, dots
 from ..errors import OptionError
+from .normals import vertex_normals
 from .ties import own_axes
 
 # Directions to look from, evenly spread, and pixels along the side of each picture.
@@ -34,7 +35,7 @@ def visible_share(vertices: FloatArray, faces: IntArray, up: FloatArray | None =
     centred = vertices - vertices.mean(axis=0)
     size = float(np.sqrt(dots(centred, centred).max()))
     points = centred * ((PIXELS / 2 - 1) / size if size > 0 else 1.0)
-    normals = _vertex_normals(vertices, faces)
+    normals = vertex_normals(vertices, faces)
     seen, whole = np.zeros((2, 2, len(vertices)))
     for direction in _directions() @ axes:
         facing = normals @ direction
@@ -86,13 +87,3 @@ def _upright(axes: FloatArray, up: FloatArray) -> FloatArray:
     first = flat[np.argmax(np.linalg.norm(flat, axis=1) > 0.5)]
     first = first / np.linalg.norm(first)
     return np.stack([first, np.cross(up, first), up])
-
-
-def _vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (n, 3) unit normals, those of the faces around by area; 0 where they cancel."""
-    one, two = vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]
-    across = np.cross(one, two)
-    sums = np.zeros((len(vertices), 3))
-    for i in range(3):
-        sums[:, i] = np.bincount(faces.ravel(), np.repeat(across[:, i], 3), minlength=len(vertices))
-    return sums / np.maximum(np.sqrt(dots(sums, sums)), np.finfo(float).tiny)[:, None]

@@ -54,3 +54,8 @@ class MeshFile:
     normals: FloatArray | None = None
     normal: IntArray | None = None
     scene: GltfScene | None = None
+
+    @property
+    def has_colours(self) -> bool:
+        """Whether every vertex has a colour."""
+        return all(name in self.properties for name in COLOURS)

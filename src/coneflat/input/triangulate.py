@@ -1,14 +1,19 @@
-"""Triangulating polygons."""
+"""Triangulating polygons.
+
+Quads and convex polygons are split here, all at once; ears of the others are clipped by mapbox_earcut, one polygon at
+a time.
+"""
 
 from __future__ import annotations
 
-from collections import deque
-
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, dots
 from ..errors import DegenerateFaceError, FaceIndexError
-from .polygons import first_bad_corner, polygon_of
+from ..geometry.delaunay import intrinsic_delaunay
+from ..geometry.triangles import edge_lengths
+from ..mesh import TriangleMesh
+from .polygons import fan_corners, first_bad_corner, polygon_of
 
 #: Part of a quad's area below which one of its halves counts as empty or turned over: far above the
 #: rounding of a collinear corner (about 1e-16), far below any triangle worth having.
@@ -19,12 +24,17 @@ _EMPTY_HALF = 1e-9
 _EQUAL_DIAGONALS = 1e-9
 
 
+#: Part of a polygon's area below which a triangle in it counts as empty: above the rounding of collinear
+#: corners, below any triangle worth having.
+_EMPTY_TRIANGLE = 1e-9
+
+
 def triangulate(vertices: FloatArray, corners: IntArray, offsets: IntArray) -> tuple[IntArray, IntArray]:
     """Return triangles that cover polygons, k - 2 for each polygon of k corners, oriented as it is.
 
     A quad is split along the diagonal that leaves both halves facing the way the quad does; if both
-    diagonals do, along the shorter. Larger polygons become fans where they are convex and go through ear
-    clipping where they are not. Coordinates may be NaN: the result is valid in its indices then.
+    diagonals do, along the shorter. Larger polygons become fans where they are convex; of others ears are clipped,
+    and diagonals flipped until they are Delaunay. Coordinates may be NaN: the result is valid in its indices then.
 
     Args:
         vertices: (n, 3) positions.
@@ -63,7 +73,7 @@ def triangulate(vertices: FloatArray, corners: IntArray, offsets: IntArray) -> t
     for size in np.unique(sizes[sizes > 4]).tolist():
         polygons = np.flatnonzero(sizes == size)
         own = offsets[polygons, None] + np.arange(size)
-        local = triangulate_ngons(vertices[corners[own]])
+        local = _ngons(vertices[corners[own]])
         rows = first_triangle[polygons, None] + np.arange(size - 2)
         face_corners[rows] = offsets[polygons, None, None] + local
     return corners[face_corners], face_corners
@@ -104,15 +114,15 @@ def _splits_at_first_corner(vertices: FloatArray, quads: IntArray) -> BoolArray:
     p0, p1, p2, p3 = (vertices[quads[:, k]] for k in range(4))
     with np.errstate(invalid="ignore", over="ignore"):
         normal = np.cross(p2 - p0, p3 - p1)
-        least = _EMPTY_HALF * _dot(normal, normal)
-        valid_02 = (_dot(np.cross(p1 - p0, p2 - p0), normal) > least) & (
-            _dot(np.cross(p2 - p0, p3 - p0), normal) > least
+        least = _EMPTY_HALF * dots(normal, normal)
+        valid_02 = (dots(np.cross(p1 - p0, p2 - p0), normal) > least) & (
+            dots(np.cross(p2 - p0, p3 - p0), normal) > least
         )
-        valid_13 = (_dot(np.cross(p1 - p0, p3 - p0), normal) > least) & (
-            _dot(np.cross(p2 - p1, p3 - p1), normal) > least
+        valid_13 = (dots(np.cross(p1 - p0, p3 - p0), normal) > least) & (
+            dots(np.cross(p2 - p1, p3 - p1), normal) > least
         )
-        length_02 = _dot(p2 - p0, p2 - p0)
-        length_13 = _dot(p3 - p1, p3 - p1)
+        length_02 = dots(p2 - p0, p2 - p0)
+        length_13 = dots(p3 - p1, p3 - p1)
         choice = length_02 < length_13
         tied = np.abs(length_02 - length_13) <= _EQUAL_DIAGONALS * (length_02 + length_13)
     if tied.any():
@@ -124,40 +134,31 @@ def _splits_at_first_corner(vertices: FloatArray, quads: IntArray) -> BoolArray:
     return np.where(valid_02 == valid_13, choice, valid_02)
 
 
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray(np.einsum("ij,ij->i", a, b))
+def _ngons(points: FloatArray) -> IntArray:
+    """Return (q, k - 2, 3) triangles of q polygons of k > 4 corners.
 
+    They are positions 0 to k - 1 of corners, in each triangle ascending, so that it is oriented as its polygon is.
 
-#: Part of a polygon's area below which a triangle in it counts as empty: above the rounding of collinear
-#: corners, below any triangle worth having.
-_EMPTY_TRIANGLE = 1e-9
-
-#: Corners that a fan is tried from: all of any usual polygon, and so few that no polygon takes long.
-_APEXES = 256
-
-#: Diagonals of a polygon looked at before the shapes reached so far are taken: seconds.
-_MOST_TRIALS = 200_000
-
-
-def triangulate_ngons(points: FloatArray) -> IntArray:
-    """Return triangles of q polygons of the same number of corners k.
-
-    Args:
-        points: (q, k, 3) their corners; k > 3.
-
-    Returns:
-        (q, k - 2, 3) corner positions 0 to k - 1, in each triangle ascending, so that it is oriented as its
-        polygon is.
+    points: (q, k, 3) the corners.
     """
     size = points.shape[1]
-    fan = np.stack([np.zeros(size - 2, np.int64), np.arange(1, size - 1), np.arange(2, size)], axis=1)
-    triangles = np.tile(fan, (len(points), 1, 1))
+    triangles = np.tile(fan_corners(np.array([0, size])), (len(points), 1, 1))
+    clipped: list[int] = []
+    planes, ears = [], []
     with np.errstate(invalid="ignore", over="ignore"):
         normals = _newell_normals(points)
         for i in np.flatnonzero(~_is_convex(points, normals)).tolist():
             plane = _in_plane(points[i], normals[i])
-            if plane is not None:
-                triangles[i] = _concave(plane)
+            faces = None if plane is None else _clipped(plane)
+            if plane is not None and faces is not None:
+                ears.append(faces + size * len(clipped))
+                planes.append(plane)
+                clipped.append(i)
+    if clipped:
+        # Ear clipping is content with triangles between three corners on a line.
+        mesh = TriangleMesh(np.concatenate(planes), np.concatenate(ears))
+        delaunay, _ = intrinsic_delaunay(mesh, edge_lengths(mesh.vertices, mesh.faces))
+        triangles[clipped] = np.sort(delaunay.faces.reshape(-1, size - 2, 3) % size, axis=2)
     return triangles
 
 
@@ -189,76 +190,15 @@ def _in_plane(points: FloatArray, normal: FloatArray) -> FloatArray | None:
     return np.stack([local @ across, local @ np.cross(up, across)], axis=1)
 
 
-def _concave(plane: FloatArray) -> IntArray:
-    """Return (k - 2, 3) triangles of a polygon in the plane that may be concave."""
+def _clipped(plane: FloatArray) -> IntArray | None:
+    """Return (k - 2, 3) triangles of a polygon in the plane; None where they do not reach all its corners.
+
+    Neighbours still have these corners. It happens where a polygon touches or crosses itself.
+    """
     from mapbox_earcut import triangulate_float64
 
     size = len(plane)
-    fan, smallest = _best_fan(plane)
-    if smallest > 0:
-        return fan
     ears = np.asarray(triangulate_float64(np.ascontiguousarray(plane), np.array([size], dtype=np.uint32)))
-    # Where a polygon touches or crosses itself, earcut may leave corners out, which neighbours still have.
-    if len(ears) == 3 * (size - 2) and len(np.unique(ears)) == size:
-        return _flipped(plane, np.sort(ears.reshape(-1, 3).astype(np.int64), axis=1))
-    return fan
-
-
-def _flipped(plane: FloatArray, triangles: IntArray) -> IntArray:
-    """Return triangles of better shape, by flipping diagonals while the worse of the two triangles gains.
-
-    Ear clipping is content with triangles between three corners on a line.
-    """
-    points = [complex(x, y) for x, y in plane.tolist()]
-    faces = [tuple(face) for face in triangles.tolist()]
-    # Of each directed side, the triangle and the corner opposite.
-    across = {(face[k], face[k - 2]): (t, face[k - 1]) for t, face in enumerate(faces) for k in range(3)}
-
-    def shape(*face: int) -> float:
-        a, b, c = (points[i] for i in face)
-        sides = abs(b - a) ** 2 + abs(c - b) ** 2 + abs(a - c) ** 2
-        return ((b - a).conjugate() * (c - a)).imag / sides if sides else 0.0
-
-    # Every flip raises the sorted list of shapes, so this ends; most diagonals are flipped once, if at all.
-    waiting = deque((a, b) for a, b in across if a < b and (b, a) in across)
-    for _ in range(_MOST_TRIALS):
-        if not waiting:
-            break
-        a, b = waiting.popleft()
-        if (a, b) not in across or (b, a) not in across:
-            continue
-        (t, c), (s, d) = across[a, b], across[b, a]
-        gain = min(shape(d, b, c), shape(a, d, c)) - min(shape(a, b, c), shape(b, a, d))
-        if gain > _EMPTY_TRIANGLE:
-            del across[a, b], across[b, a]
-            for number, face in ((t, (d, b, c)), (s, (a, d, c))):
-                faces[number] = face
-                across |= {(face[k], face[k - 2]): (number, face[k - 1]) for k in range(3)}
-            waiting += [
-                (min(side), max(side)) for side in ((a, d), (d, b), (b, c), (c, a)) if side[::-1] in across
-            ]
-    return np.sort(np.array(faces, dtype=np.int64), axis=1)
-
-
-def _best_fan(plane: FloatArray) -> tuple[IntArray, float]:
-    """Return the fan whose smallest triangle is largest, and that triangle's part of the polygon's area.
-
-    Of very large polygons, some of the corners are tried.
-
-    The part is 0 where triangles are empty or turned over, or the fan is not one turn around its centre.
-    """
-    size = len(plane)
-    best = (-np.inf, 0)
-    for apex in range(0, size, -(-size // _APEXES)):
-        local = np.roll(plane, -apex, axis=0)[1:] - plane[apex]
-        areas = local[:-1, 0] * local[1:, 1] - local[:-1, 1] * local[1:, 0]
-        best = max(best, (float(areas.min()), -apex))
-    apex = -best[1]
-    rim = np.roll(np.arange(size), -apex)
-    local = plane[rim[1:]] - plane[apex]
-    areas = local[:-1, 0] * local[1:, 1] - local[:-1, 1] * local[1:, 0]
-    angles = np.arctan2(areas, np.einsum("ij,ij->i", local[:-1], local[1:]))
-    fan = np.stack([np.full(size - 2, apex), rim[1:-1], rim[2:]], axis=1)
-    total = areas.sum()
-    sound = areas.min() > _EMPTY_TRIANGLE * total and angles.sum() < 2 * np.pi
-    return np.sort(fan, axis=1), float(areas.min() / total) if sound else 0.0
+    if len(ears) != 3 * (size - 2) or len(np.unique(ears)) < size:
+        return None
+    return np.sort(ears.reshape(-1, 3).astype(np.int64), axis=1)

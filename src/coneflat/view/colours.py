@@ -1,7 +1,8 @@
-"""Colour tables for people with any colour vision: equal steps in value look like equal steps in colour.
+"""The page's colour tables and scales, for people with any colour vision.
 
-Colours are interpolated between a few anchors in CIE L*a*b* (D65), where distances are about those that are seen.
-The anchors' lightness runs one way (sequential) or symmetrically (diverging), so that the tables hold without hue.
+The page does without matplotlib, which is an extra, and without the vivid ends of its tables, which light and shade
+would spoil. Equal steps in value are about equal steps of CIE L*a*b* here; lightness runs one way (sequential), or the
+same way from the middle to both ends (diverging), so that the tables hold without hue.
 """
 
 from __future__ import annotations
@@ -10,69 +11,30 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from .._arrays import FloatArray
 from .quantity import ColorScale, Quantity
 
 STEPS = 256
 
-# (L*, chroma, hue in degrees), from low values to high.
-SEQUENTIAL_ANCHORS = (
-    (94, 20, 100),
-    (82, 38, 130),
-    (65, 33, 180),
-    (46, 30, 245),
-    (29, 40, 296),
-    (13, 30, 312),
+#: From light to dark, and from blue over near white to red: hexadecimal colours at equal steps.
+SEQUENTIAL = (
+    "f6eec8 dee6b5 c5dea3 add595 95ca97 7cbf9a 5fb49c 48a89d 3f9a9c "
+    "348d9b 26809b 1b7398 2b6491 345689 394882 3a3974 34285a 2c1841"
 )
-LOW_ANCHORS = ((31, 40, 280), (50, 34, 262), (73, 22, 250), (95, 1, 100))
-HIGH_ANCHORS = ((95, 1, 100), (74, 40, 60), (54, 58, 46), (33, 46, 40))
-
-_WHITE = np.array([0.95047, 1.0, 1.08883])
-_FROM_XYZ = np.array(
-    [
-        [3.2404542, -1.5371385, -0.4985314],
-        [-0.9692660, 1.8760108, 0.0415560],
-        [0.0556434, -0.2040259, 1.0572252],
-    ]
+DIVERGING = (
+    "124987 255f99 3476ab 538dbc 72a4cb 90bcda b2cde1 d2dfe8 f1f1ef "
+    "f3ddce f2c8ac efb48b e89c6e db7f54 ce613b aa492d 873220"
 )
 
 
-def sequential() -> NDArray[np.uint8]:
-    """Return (256, 3) colours from light to dark."""
-    return lab_to_srgb(_even_steps(SEQUENTIAL_ANCHORS, STEPS))
-
-
-def diverging() -> NDArray[np.uint8]:
-    """Return (256, 3) colours from blue over near white to red."""
-    halves = (_even_steps(anchors, STEPS // 2) for anchors in (LOW_ANCHORS, HIGH_ANCHORS))
-    return lab_to_srgb(np.concatenate(list(halves)))
-
-
-def _even_steps(anchors: ArrayLike, count: int) -> FloatArray:
-    """Return (count, 3) colours at equal distances along the line through the anchors."""
-    lab = _lab(anchors)
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(lab, axis=0), axis=1))])
-    place = np.linspace(0.0, along[-1], count)
-    return np.stack([np.interp(place, along, lab[:, k]) for k in range(3)], axis=1)
-
-
-def _lab(anchors: ArrayLike) -> FloatArray:
-    """Return (k, 3) L*, a*, b* of (k, 3) lightness, chroma and hue in degrees."""
-    light, chroma, hue = np.asarray(anchors, dtype=np.float64).T
-    angle = np.radians(hue)
-    return np.stack([light, chroma * np.cos(angle), chroma * np.sin(angle)], axis=1)
-
-
-def lab_to_srgb(lab: FloatArray) -> NDArray[np.uint8]:
-    """Return (k, 3) sRGB colours, 0 to 255, of (k, 3) L*, a*, b*; what no screen shows is clipped."""
-    y = (lab[:, 0] + 16) / 116
-    f = np.stack([y + lab[:, 1] / 500, y, y - lab[:, 2] / 200], axis=1)
-    xyz = np.where(f > 6 / 29, f**3, 3 * (6 / 29) ** 2 * (f - 4 / 29)) * _WHITE
-    linear = np.clip(xyz @ _FROM_XYZ.T, 0, 1)
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.round(255 * encoded).astype(np.uint8)
+def color_table(colors: str) -> NDArray[np.uint8]:
+    """Return (256, 3) colours between some that are given."""
+    known = np.array([list(bytes.fromhex(color)) for color in colors.split()])
+    place = np.linspace(0, len(known) - 1, STEPS)
+    table = np.stack([np.interp(place, np.arange(len(known)), column) for column in known.T], axis=1)
+    return np.round(table).astype(np.uint8)
 
 
 TITLES = {

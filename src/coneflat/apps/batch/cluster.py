@@ -8,7 +8,7 @@ from typing import Any
 
 from ...errors import OptionError
 from .jobs import Job
-from .process import Child
+from .process import Child, failed
 
 # Workers that may be lost under one mesh before it counts as failed: it may be the mesh that kills them.
 LOSSES = 3
@@ -50,7 +50,10 @@ def rows_of_cluster(
             for future in as_completed(futures, loop=client.loop):
                 job = futures[future]
                 lost = future.exception()
-                yield job, future.result() if lost is None else _lost(job, lost)
+                if lost is None:
+                    yield job, future.result()
+                else:
+                    yield job, failed(job, f"the cluster gave up: {type(lost).__name__}: {lost}")
         finally:
             client.cancel(list(futures))
 
@@ -70,8 +73,3 @@ def _require_scheduler(address: str) -> None:
             comm.abort()
 
     asyncio.run(asyncio.wait_for(knock(), PATIENCE))
-
-
-def _lost(job: Job, error: BaseException) -> dict[str, Any]:
-    message = f"the cluster gave up: {type(error).__name__}: {error}"
-    return {"mesh": job.mesh, "output": job.output, "status": "failed", "error": message, "seconds": None}

@@ -1,4 +1,8 @@
-"""A child process that flattens one mesh after the other, with a time limit for each."""
+"""A batch in processes on this machine, each of which flattens one mesh after the other, with a time limit for each.
+
+Python has the threads that wait for them. The processes are ours, since those of its pools cannot be ended one by one,
+take the whole pool down when they die, and run the caller's script once more.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,10 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
+from queue import SimpleQueue
 from typing import Any
 
 from ...files.atomic import remove_unfinished
@@ -21,6 +28,43 @@ ONE_THREAD = dict.fromkeys(
 )
 
 COMMAND = [sys.executable, "-m", "coneflat.apps.batch.child"]
+# Seconds between attempts to end processes: one may just be starting.
+PAUSE = 0.05
+
+
+def rows_of_processes(
+    jobs: Sequence[Job], processes: int, limit: float | None
+) -> Iterator[tuple[Job, dict[str, Any]]]:
+    """Yield jobs with their rows as they are done."""
+    children = [Child() for _ in range(processes)]
+    idle: SimpleQueue[Child] = SimpleQueue()
+    for child in children:
+        idle.put(child)
+
+    def work(job: Job) -> dict[str, Any]:
+        child = idle.get()
+        try:
+            return child.flatten(job, limit)
+        except Exception as error:  # One mesh has failed, not the batch.
+            child.end()
+            return failed(job, f"internal error: {type(error).__name__}: {error}")
+        finally:
+            idle.put(child)
+
+    with ThreadPoolExecutor(processes) as pool:
+        futures = {pool.submit(work, job): job for job in jobs}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        finally:
+            # Also when the one who asks has had enough, or was interrupted.
+            pool.shutdown(wait=False, cancel_futures=True)
+            while any(future.running() for future in futures):
+                for child in children:
+                    child.kill()
+                time.sleep(PAUSE)
+            for child in children:
+                child.end()
 
 
 def failed(job: Job, error: str, seconds: float | None = None) -> dict[str, Any]:

@@ -101,7 +101,7 @@ def _rows(
         from .cluster import rows_of_cluster
 
         return rows_of_cluster(jobs, dask, limit)
-    from .local import rows_of_processes
+    from .process import rows_of_processes
 
     return rows_of_processes(jobs, min(processes or _cores(), max(len(jobs), 1)), limit)
 

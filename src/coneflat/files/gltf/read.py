@@ -177,9 +177,7 @@ class _Rows:
         if not self._rows:
             return None, None
         rows = np.concatenate(self._rows)
-        padded = np.zeros((len(rows), 3))
-        padded[:, : self._columns] = rows
-        kept, number = weld(padded)
+        kept, number = weld(rows)
         return rows[kept], np.append(number, -1)[np.concatenate(self._corners)]
 
 

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._arrays import BoolArray, FloatArray, IntArray
+from ...geometry.normals import corner_normals
 from ...quality.checker import DARK_CELL, LIGHT_CELL
 from .camera import Camera, Eye, fit_camera
 from .raster import Barycentrics, Coverage, rasterise
-from .shading import INNER_SIDE_DIM, checkerboard, corner_normals, downsample, lambert, uv_footprint
+from .shading import INNER_SIDE_DIM, checkerboard, downsample, lambert, uv_footprint
 
 SUPERSAMPLING = 2
 """Samples per pixel along each axis; two give smooth outlines at print resolution."""

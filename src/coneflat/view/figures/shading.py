@@ -4,33 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..._arrays import BoolArray, FloatArray, IntArray, dots
-from ...geometry import corner_angles, edge_lengths
-from ...mesh import TriangleMesh, corner_fans
-
-CREASE_COSINE = 0.6
-"""About 53 degrees: edges at which the surface bends more look sharp."""
+from ..._arrays import BoolArray, FloatArray
+from ...geometry.normals import unit_vectors
 
 KEY_LIGHT = (-0.45, 0.65, 0.62)
 """Towards the main light in camera axes (right, up, near): over the left shoulder, as in drawings."""
 
 INNER_SIDE_DIM = 0.62
 """Brightness of the inner side of an open surface, so that it cannot be taken for the outer."""
-
-
-def corner_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the (m, 3, 3) unit normal at every triangle corner: the mean, by angle, of the faces around it
-    that are joined to it across edges which are not creases."""
-    p, q, r = vertices[faces[:, 0]], vertices[faces[:, 1]], vertices[faces[:, 2]]
-    flat = _unit(np.cross(q - p, r - p))
-    pairs = TriangleMesh(vertices, faces).edge_halfedges
-    pairs = pairs[pairs[:, 1] >= 0]
-    one, two = flat[pairs[:, 0] // 3], flat[pairs[:, 1] // 3]
-    smooth = pairs[dots(one, two) > CREASE_COSINE]
-    count, fan = corner_fans(faces, smooth[:, 0], smooth[:, 1])
-    weights = flat[:, None, :] * corner_angles(edge_lengths(vertices, faces))[:, :, None]
-    sums = [np.bincount(fan.ravel(), weights[..., k].ravel(), count) for k in range(3)]
-    return _unit(np.stack(sums, axis=1))[fan]
 
 
 def lambert(normals: FloatArray, axes: FloatArray) -> FloatArray:
@@ -40,8 +21,8 @@ def lambert(normals: FloatArray, axes: FloatArray) -> FloatArray:
         normals: (k, 3) normals towards the eye, of any length, model axes.
         axes: (3, 3) the camera's axes.
     """
-    seen = _unit(normals) @ axes.T
-    key = np.maximum(seen @ _unit(np.array(KEY_LIGHT)), 0.0)
+    seen = unit_vectors(normals) @ axes.T
+    key = np.maximum(seen @ unit_vectors(np.array([KEY_LIGHT]))[0], 0.0)
     # At an outline the interpolated normal may point away from the eye though its face does not.
     return np.asarray(0.47 + 0.42 * key + 0.12 * np.maximum(seen[:, 2], 0.0) + 0.06 * seen[:, 1])
 
@@ -98,8 +79,3 @@ def downsample(image: FloatArray, covered: BoolArray, factor: int) -> FloatArray
 
 def _triangle_wave(x: FloatArray) -> FloatArray:
     return np.asarray(1.0 - np.abs(np.mod(x, 2.0) - 1.0))
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(vectors / np.where(length > 0.0, length, 1.0))

@@ -1,7 +1,5 @@
 // Arrays with an entry for each corner of each triangle, as the graphics card takes them.
 
-const CREASE_COSINE = 0.77; // About 40 degrees: where faces bend by more, the edge between them is sharp.
-
 function cornerPlaces(model) {
   const {places, point_vertex, faces} = model.arrays;
   const out = new Float32Array(3 * faces.length);
@@ -51,7 +49,7 @@ function cornersAtVertices(model) {
 /** Return packed unit normals (10 bits a coordinate): the mean of the faces around that bend off by no crease. */
 function cornerNormals(model, places) {
   const {point_vertex, faces} = model.arrays;
-  const normals = faceNormals(places);
+  const normals = faceNormals(places), crease = model.head.crease_cosine;
   const {start, list} = cornersAtVertices(model);
   const lengths = new Float32Array(faces.length / 3);
   for (let f = 0; f < lengths.length; f++) lengths[f] = Math.hypot(normals[3 * f], normals[3 * f + 1], normals[3 * f + 2]);
@@ -63,7 +61,7 @@ function cornerNormals(model, places) {
     for (let k = start[v]; k < start[v + 1]; k++) {
       const f = (list[k] / 3) | 0;
       const a = normals[3 * f], b = normals[3 * f + 1], d = normals[3 * f + 2];
-      if (x * a + y * b + z * d < CREASE_COSINE * lengths[own] * lengths[f]) continue;
+      if (x * a + y * b + z * d < crease * lengths[own] * lengths[f]) continue;
       sx += a;
       sy += b;
       sz += d;

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...files.texture import Texture
+from ...geometry.normals import CREASE_COSINE
 from ...quality.checker import CELLS
 from ...result.from_uv import shown_rows
-from ..colours import as_plain, diverging, sequential
+from ..colours import DIVERGING, SEQUENTIAL, as_plain, color_table
 from ..figures.camera import fit_camera
 from ..figures.demo import title
 from ..figures.uv_layout import CHART_COLORS
@@ -65,6 +66,7 @@ def payload_of(
         "uv_high": high.tolist(),
         "uv_side": content.uv_side,
         "squares": CELLS,
+        "crease_cosine": CREASE_COSINE,
         "scales": {key: as_plain(key, scale) for key, scale in content.scales.items()},
         "picture": None if picture is None else picture.kind,
         "show": show,
@@ -87,8 +89,8 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
         "curvature": content.curvature.astype(np.float32),
         "flat": content.flat_curvature.astype(np.float32),
         "cones": content.cones.astype(np.uint32),
-        "sequential": sequential(),
-        "diverging": diverging(),
+        "sequential": color_table(SEQUENTIAL),
+        "diverging": color_table(DIVERGING),
         "tints": np.array([list(bytes.fromhex(colour[1:])) for colour in CHART_COLORS], dtype=np.uint8),
     }
     if not np.array_equal(content.vertex_numbers, np.arange(len(content.places))):
