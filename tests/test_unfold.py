@@ -75,9 +75,8 @@ class TestUnfold:
     @pytest.mark.parametrize("name", SURFACES)
     def test_every_triangle_keeps_its_shape(self, name):
         _, cut_mesh, flat, _ = flat_surface(*SURFACES[name])
-        cut = halfedge_twins(cut_mesh.mesh) < 0
         corners = cut_mesh.mesh.faces
-        sides = side_vectors(unfold(flat, corners, cut), corners)
+        sides = side_vectors(unfold(flat, corners), corners)
         shape = flat.sides.reshape(-1, 3)
         turn = sides[:, 0] / shape[:, 0]
         np.testing.assert_allclose(np.abs(turn), 1, rtol=1e-10)
@@ -87,7 +86,7 @@ class TestUnfold:
     def test_both_sides_of_a_seam_are_equal(self, name):
         _, cut_mesh, flat, _ = flat_surface(*SURFACES[name])
         cut = halfedge_twins(cut_mesh.mesh) < 0
-        uv = unfold(flat, cut_mesh.mesh.faces, cut)
+        uv = unfold(flat, cut_mesh.mesh.faces)
         assert seam_mismatch(flat, cut, uv, cut_mesh.mesh.faces) < 1e-12
 
     @pytest.mark.parametrize("rounds", [3, 5])
@@ -95,7 +94,7 @@ class TestUnfold:
         _, cut_mesh, flat, _ = flat_surface(shapes.sphere(rounds), 8)
         corners = cut_mesh.mesh.faces
         cut = halfedge_twins(cut_mesh.mesh) < 0
-        uv = unfold(flat, corners, cut)
+        uv = unfold(flat, corners)
         assert seam_mismatch(flat, cut, uv, corners) < 1e-12
         lengths, wanted = np.abs(side_vectors(uv, corners)).ravel(), np.abs(flat.sides)
         np.testing.assert_allclose(lengths, wanted, rtol=1e-11)
@@ -103,13 +102,13 @@ class TestUnfold:
     def test_a_plane_figure_stays_what_it_is(self):
         points, faces = shapes.grid(9, 7)
         _, flat = planar(points[:, :2], faces)
-        uv = unfold(flat, faces, flat.twin < 0)
+        uv = unfold(flat, faces)
         np.testing.assert_allclose(uv - uv[0], points[:, :2] - points[0, :2], atol=1e-14)
 
     def test_charts_are_laid_out_one_by_one(self):
         points, faces = shapes.join(shapes.grid(4, 3), shapes.grid(3, 5))
         _, flat = planar(points[:, :2], faces)
-        uv = unfold(flat, faces, flat.twin < 0)
+        uv = unfold(flat, faces)
         count = 5 * 4
         for part in (slice(0, count), slice(count, None)):
             given = points[part, :2]
@@ -120,7 +119,7 @@ class TestUnfold:
         points[12] += [0.6, 0.1, 0]  # an inner vertex, across its neighbours
         _, flat = planar(points[:, :2], faces)
         assert flat.is_inverted.any()
-        uv = unfold(flat, faces, flat.twin < 0)
+        uv = unfold(flat, faces)
         np.testing.assert_allclose(uv - uv[0], points[:, :2] - points[0, :2], atol=1e-14)
 
 
@@ -136,7 +135,7 @@ class TestUntangle:
         assert not border[result.moved].any()
         assert len(result.moved) < 20
         assert 0 < result.largest_move < 3
-        uv = unfold(result.flat, faces, flat.twin < 0)
+        uv = unfold(result.flat, faces)
         assert (heights(side_vectors(uv, faces)) > DEGENERATE).all()
         still = np.setdiff1d(np.arange(len(points)), result.moved)
         offset = uv[still] - points[still, :2]
@@ -183,7 +182,7 @@ class TestUntangle:
         )
         cut = halfedge_twins(cut_mesh.mesh) < 0
         corners = cut_mesh.mesh.faces
-        uv = unfold(result.flat, corners, cut)
+        uv = unfold(result.flat, corners)
         assert (heights(side_vectors(uv, corners)) > DEGENERATE).all()
         assert seam_mismatch(result.flat, cut, uv, corners) < 1e-12
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray, as_faces
 from ..compiled import compiled
+from ..errors import ArrayShapeError
 from ..geometry.straight import FlatTriangles
+from ..mesh import end_corners
 
 # Iterations that spread the gaps; each costs as much as half a breadth-first search.
 SWEEPS = 10
@@ -15,13 +18,17 @@ SWEEPS = 10
 NO_LENGTH = 1e-12
 
 
-def unfold(flat: FlatTriangles, corners: IntArray, cut: BoolArray) -> FloatArray:
-    """Return (u, 2) the places in the plane of the vertices of a flat mesh, cut into charts, in linear time.
+def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
+    """Return (u, 2) the places in the plane of the points of a flat mesh, cut into charts, in linear time.
 
     Args:
-        flat: the triangles; no vertex off the cut has curvature.
-        corners: (m, 3) vertices of the cut mesh.
-        cut: (3m,) True for half-edges along which the mesh is cut.
+        flat: the m triangles, in any unit: `ExactMetric.straight` has those of an exact metric, `flat_triangles` those
+            of other lengths. No vertex off the cut may have curvature, or there are gaps, which are spread.
+        corners: (m, 3) the points at the triangles' corners, from 0: `cut_open(mesh, seams).mesh.faces`, say. The mesh
+            is cut along the sides whose ends have other points on the other side.
+
+    Raises:
+        ArrayShapeError, FaceIndexError: `corners` does not fit the triangles.
 
     Notes:
         Every vertex has one place, and every chart is placed by itself, its first triangle at the origin.
@@ -44,9 +51,15 @@ def unfold(flat: FlatTriangles, corners: IntArray, cut: BoolArray) -> FloatArray
         | border first, 100 steps | 1e-13, 8e-13 | 8e-13, 2e-11 | 1e-11, 2e-10 |
     """
 
-    corner = np.ascontiguousarray(corners, dtype=np.int64).ravel()
-    cut = cut | (flat.twin < 0)
-    m, count = len(corners), int(corner.max()) + 1
+    faces = as_faces(corners, 3 * len(flat.twin))
+    if faces.size != len(flat.twin):
+        raise ArrayShapeError(
+            f"corners must have the shape {(len(flat.twin) // 3, 3)}, a point for each corner of the flat triangles, "
+            f"not {faces.shape}"
+        )
+    corner = faces.ravel()
+    cut = _is_cut(flat.twin, corner)
+    m, count = len(faces), int(corner.max()) + 1
     frame, points = np.ones(m, dtype=np.complex128), np.zeros(count, dtype=np.complex128)
     placed, reached = np.zeros(count, dtype=np.bool_), np.zeros(m, dtype=np.bool_)
     queue = np.empty(m, dtype=np.int64)
@@ -59,11 +72,11 @@ def unfold(flat: FlatTriangles, corners: IntArray, cut: BoolArray) -> FloatArray
         tails = corner[_next(border)]
         points[tails] = closed_chain(frames * flat.sides[border])
         placed[tails] = pinned[tails] = True
-        faces, first = np.unique(border // 3, return_index=True)
-        frame[faces] = frames[first]
-        reached[faces] = True
-        queue[: len(faces)] = faces
-        spread(*arrays, len(faces), reached, frame, placed, points)
+        along, first = np.unique(border // 3, return_index=True)
+        frame[along] = frames[first]
+        reached[along] = True
+        queue[: len(along)] = along
+        spread(*arrays, len(along), reached, frame, placed, points)
     while not reached.all():  # charts without a border
         seed = int(reached.argmin())
         reached[seed] = placed[corner[3 * seed]] = pinned[corner[3 * seed]] = True
@@ -71,6 +84,14 @@ def unfold(flat: FlatTriangles, corners: IntArray, cut: BoolArray) -> FloatArray
         spread(*arrays, 1, reached, frame, placed, points)
     _close_gaps(flat.sides, corner, frame, points, pinned)
     return np.stack([points.real, points.imag], axis=1)
+
+
+def _is_cut(twin: IntArray, corner: IntArray) -> BoolArray:
+    """Return (3m,) True for half-edges on the boundary, or with other points at their ends than their twins have."""
+    start, end = end_corners(np.arange(len(twin)))
+    differ = (corner[start] != corner[end[twin]]) | (corner[end] != corner[start[twin]])
+    is_cut: BoolArray = differ | (twin < 0)
+    return is_cut
 
 
 def _next(halfedges: IntArray) -> IntArray:
