@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapes
 
-from coneflat import TriangleMesh, cut_open, find_seams
+from coneflat import TriangleMesh, cut_open, errors, find_seams, flat_triangles
 from coneflat.flat.exact.metric import exact_metric
 from coneflat.geometry import edge_lengths
 from coneflat.geometry.intrinsic import halfedge_twins
@@ -42,6 +42,36 @@ def planar(points, faces):
 def side_vectors(uv, corners):
     points = (uv[:, 0] + 1j * uv[:, 1])[corners]
     return points[:, [2, 0, 1]] - points[:, [1, 2, 0]]
+
+
+def test_a_flat_torus_unfolds_to_its_parallelogram():
+    """A metric of one's own: every side 1, so six triangles of 60 degrees at each vertex and no curvature at all."""
+    mesh = TriangleMesh(*shapes.grid(5, 4, wrap=(True, True)))
+    flat = flat_triangles(mesh, np.ones(mesh.faces.shape))
+    seams = find_seams(mesh, np.empty(0, dtype=np.int64), np.ones(len(mesh.edges)))
+    disk = cut_open(mesh, seams).mesh
+    points = unfold(flat, disk.faces)
+    np.testing.assert_allclose(np.abs(side_vectors(points, disk.faces)), 1, rtol=1e-12)
+    assert len(points) == len(disk.vertices)
+    hull = points - points.mean(axis=0)
+    assert np.abs(hull).max() < 6
+    one, two = (points[disk.faces[:, k]] - points[disk.faces[:, 0]] for k in (1, 2))
+    areas = (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
+    np.testing.assert_allclose(areas, np.sqrt(3) / 4, rtol=1e-12)
+
+
+def test_corners_that_do_not_fit():
+    mesh = TriangleMesh(*shapes.grid(3, 3))
+    flat = flat_triangles(mesh, edge_lengths(mesh.vertices, mesh.faces))
+    with pytest.raises(errors.ArrayShapeError, match=r"shape \(18, 3\), .* not \(17, 3\)"):
+        unfold(flat, mesh.faces[1:])
+    with pytest.raises(errors.FaceIndexError, match=r"outside 0\.\.53"):
+        unfold(flat, mesh.faces + 60)
+    spread = unfold(flat, 2 * mesh.faces)
+    np.testing.assert_array_equal(spread[::2], unfold(flat, mesh.faces))
+    np.testing.assert_array_equal(spread[1::2], 0)
+    with pytest.raises(errors.ArrayShapeError, match=r"lengths must have the shape \(18, 3\)"):
+        flat_triangles(mesh, np.ones((18, 2)))
 
 
 def turns(mesh):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import FloatArray, IntArray, as_floats
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..text import shown
 from .charts import Charts, read_charts
@@ -120,7 +120,7 @@ def _densities(charts: Charts, areas: ArrayLike) -> FloatArray:
 
     Lines and points, and charts of no area on the surface, are scaled as the others are together.
     """
-    surface = np.asarray(areas, dtype=np.float64)
+    surface = as_floats("areas", areas)
     if surface.shape != charts.chart.shape:
         raise ArrayShapeError(
             f"areas have shape {surface.shape}, not {charts.chart.shape}: one for each triangle"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, as_floats
 from ..errors import ArrayShapeError, LengthError, NonFiniteError
 from ..mesh import TriangleMesh
 from ..text import list_some, plural
@@ -79,17 +79,12 @@ def check_lengths(
 
 def as_lengths(lengths: ArrayLike, count: int) -> FloatArray:
     """Return (m, 3) an array of numbers for m triangles; raises ArrayShapeError if it is none."""
-    try:
-        array = np.asarray(lengths)
-        if array.dtype.kind not in "fiu":
-            raise TypeError(f"their type is {array.dtype}")
-    except (TypeError, ValueError) as error:
-        raise ArrayShapeError(f"lengths must be an (m, 3) array of numbers: {error}") from error
+    array = as_floats("lengths", lengths)
     if array.shape != (count, 3):
         raise ArrayShapeError(
             f"lengths must have the shape {(count, 3)}, a number for each side of each triangle, not {array.shape}"
         )
-    return np.ascontiguousarray(array, dtype=np.float64)
+    return array
 
 
 def _refuse_numbers(values: FloatArray, faces: IntArray, flat: bool) -> None:

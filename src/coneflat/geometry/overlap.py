@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import FloatArray, IntArray, as_faces, require_finite
+from .._arrays import FloatArray, IntArray, as_faces, as_floats, require_finite
 from ..errors import ArrayShapeError, OptionError
 from .coverage import covered_twice
 
@@ -73,10 +73,7 @@ def find_overlaps(
 
 def _corners(points: ArrayLike, triangles: ArrayLike | None) -> FloatArray:
     """Return (m, 3, 2) the corners, if all is as it should be."""
-    try:
-        places = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ArrayShapeError(f"points must be an array of numbers: {error}") from error
+    places = as_floats("points", points)
     shape = "(n, 2)" if triangles is not None else "(m, 3, 2)"
     if places.shape[1:] != ((2,) if triangles is not None else (3, 2)):
         raise ArrayShapeError(f"points must have the shape {shape}, not {places.shape}")

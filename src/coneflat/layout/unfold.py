@@ -25,7 +25,7 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
         flat: the m triangles, in any unit: `ExactMetric.straight` has those of an exact metric, `flat_triangles` those
             of other lengths. No vertex off the cut may have curvature, or there are gaps, which are spread.
         corners: (m, 3) the points at the triangles' corners, from 0: `cut_open(mesh, seams).mesh.faces`, say. The mesh
-            is cut along the sides whose ends have other points on the other side.
+            is cut along the sides whose ends have other points on the other side. Points of no triangle are at 0.
 
     Raises:
         ArrayShapeError, FaceIndexError: `corners` does not fit the triangles.
@@ -51,7 +51,7 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
         | border first, 100 steps | 1e-13, 8e-13 | 8e-13, 2e-11 | 1e-11, 2e-10 |
     """
 
-    faces = as_faces(corners, 3 * len(flat.twin))
+    faces = as_faces(corners, len(flat.twin))
     if faces.size != len(flat.twin):
         raise ArrayShapeError(
             f"corners must have the shape {(len(flat.twin) // 3, 3)}, a point for each corner of the flat triangles, "
@@ -132,7 +132,7 @@ def _close_gaps(
     ends = corner.reshape(-1, 3)
     diagonal = np.bincount(ends[:, [1, 2, 0]].ravel(), weight, len(points))
     diagonal += np.bincount(ends[:, [2, 0, 1]].ravel(), weight, len(points))
-    damping = np.where(pinned, 0.0, 1 / diagonal)
+    damping = np.divide(1.0, diagonal, out=np.zeros(len(points)), where=~pinned & (diagonal > 0))
     residual, pull = np.empty_like(points), np.empty_like(points)
     gap_forces(corner, sides, weight, frame, points, residual)
     shift = np.zeros_like(points)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import BoolArray, FloatArray, IntArray
+from ..._arrays import BoolArray, FloatArray, IntArray, as_floats
 from ...errors import ArrayShapeError, CurvatureError, NonFiniteError
 from ...geometry.intrinsic import IntrinsicTriangulation, double, intrinsic_triangulation
 from ...geometry.lengths import check_lengths
@@ -171,10 +171,7 @@ def exact_metric(
 
 def _per_vertex(name: str, values: ArrayLike, count: int) -> FloatArray:
     """Return (n,) values, or one number for all; raises ArrayShapeError if they are none."""
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ArrayShapeError(f"{name} must be an array of a number for each vertex: {error}") from error
+    array = as_floats(name, values)
     if array.shape not in ((), (count,)):
         raise ArrayShapeError(
             f"{name} must have the shape {(count,)}, a number for each vertex, not {array.shape}"
