@@ -80,6 +80,10 @@ def pack_charts(
         ArrayShapeError, NonFiniteError: arrays do not fit, or are not finite.
         OptionError: charts are not numbered from 0 without gaps, one is mirrored, an option makes no sense, or so
             much padding leaves no room for charts.
+
+    Notes:
+        The shapes of charts, not boxes around them, are placed on a grid, each where its top is lowest; orders and
+        angles are changed at random, always the same way, and kept where that helps. Finer grids then close the gaps.
     """
     charts = read_charts(corner_uv, chart_of_triangle)
     margin = padding if margin is None else margin
