@@ -50,10 +50,10 @@ def find_overlaps(
         OptionError: the limit is below 1.
 
     Notes:
-        Signs are those of J. R. Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric
-        predicates", 1997. Interiors are open: triangles that touch in points or along sides, in whole or in part, do not overlap,
+        Interiors are open: triangles that touch in points or along sides, in whole or in part, do not overlap,
         and whatever has inner points in common does, however thin. No tolerance is involved, and all signs are
-        exact for the coordinates as they are given (those below 2^-420 of the largest count as 0). So two sides
+        exact for the coordinates as they are given (J. R. Shewchuk, "Adaptive precision floating-point arithmetic and
+        fast robust geometric predicates", 1997; those below 2^-420 of the largest count as 0). So two sides
         of a seam that should coincide, but are an ulp apart the wrong way, do overlap; `area` then is what
         rounding makes of it, about 1e-16 of the layout's extent times the length of the seam.
 
