@@ -9,7 +9,6 @@ from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray, as_faces
 from ..compiled import compiled
 from ..errors import ArrayShapeError
 from ..geometry.straight import FlatTriangles
-from ..mesh import end_corners
 
 # Iterations that spread the gaps; each costs as much as half a breadth-first search.
 SWEEPS = 10
@@ -58,7 +57,7 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
             f"not {faces.shape}"
         )
     corner = faces.ravel()
-    cut = _is_cut(flat.twin, corner)
+    cut = find_cut(flat.twin, corner)
     m, count = len(faces), int(corner.max()) + 1
     frame, points = np.ones(m, dtype=np.complex128), np.zeros(count, dtype=np.complex128)
     placed, reached = np.zeros(count, dtype=np.bool_), np.zeros(m, dtype=np.bool_)
@@ -84,14 +83,6 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
         spread(*arrays, 1, reached, frame, placed, points)
     _close_gaps(flat.sides, corner, frame, points, pinned)
     return np.stack([points.real, points.imag], axis=1)
-
-
-def _is_cut(twin: IntArray, corner: IntArray) -> BoolArray:
-    """Return (3m,) True for half-edges on the boundary, or with other points at their ends than their twins have."""
-    start, end = end_corners(np.arange(len(twin)))
-    differ = (corner[start] != corner[end[twin]]) | (corner[end] != corner[start[twin]])
-    is_cut: BoolArray = differ | (twin < 0)
-    return is_cut
 
 
 def _next(halfedges: IntArray) -> IntArray:
@@ -149,6 +140,19 @@ def _close_gaps(
         product, before = np.vdot(residual, damped).real, product
         direction = damped + product / before * direction
     points += shift
+
+
+@compiled
+def find_cut(twin: IntArray, corner: IntArray) -> BoolArray:
+    """Return (3m,) True for half-edges on the boundary, or with other points at their ends than their twins have."""
+    cut = np.ones(len(twin), np.bool_)
+    for h in range(len(twin)):
+        t = twin[h]
+        if t >= 0:
+            start, end = h - h % 3 + (h + 1) % 3, h - h % 3 + (h + 2) % 3
+            other_start, other_end = t - t % 3 + (t + 1) % 3, t - t % 3 + (t + 2) % 3
+            cut[h] = corner[start] != corner[other_end] or corner[end] != corner[other_start]
+    return cut
 
 
 @compiled
