@@ -53,7 +53,7 @@ def models(names: list[str], largest: int) -> list[tuple[str, TriangleMesh]]:
             continue
         source = read_mesh(path)
         try:
-            mesh = check_mesh(source.vertices, source.corners.reshape(-1, 3)).mesh
+            mesh = check_mesh(source.vertices, source.triangles).mesh
         except (ConeflatError, ValueError):
             continue
         if len(mesh.faces) <= largest:

@@ -26,7 +26,7 @@ def meshes(names: list[str], largest: int) -> Iterator[tuple[str, TriangleMesh]]
     for name in names:
         for path in sorted(MODELS.glob(f"{name}.*")):
             model = read_mesh(path)
-            sources.append((name, (model.vertices, model.corners.reshape(-1, 3))))
+            sources.append((name, (model.vertices, model.triangles)))
     for name, (vertices, faces) in sources:
         while len(faces) <= largest:
             yield name, check_mesh(vertices, faces).mesh
@@ -49,7 +49,7 @@ def model(name: str, rounds: int) -> tuple[np.ndarray, np.ndarray]:
         vertices, faces = shapes.sphere(5)
     else:
         source = read_mesh(next(iter(sorted(MODELS.glob(f"{name}.*")))))
-        vertices, faces = source.vertices, source.corners.reshape(-1, 3)
+        vertices, faces = source.vertices, source.triangles
     for _ in range(rounds):
         vertices, faces = shapes.subdivide(vertices, faces)
     return vertices, faces

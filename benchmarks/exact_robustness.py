@@ -189,7 +189,7 @@ def layout(row: Row, mesh: TriangleMesh, metric: ExactMetric, cones: np.ndarray)
     cut = np.zeros(mesh.faces.size, dtype=bool)
     cut[sides[sides[:, 1] < 0, 0]] = True
     corners = cut_mesh.mesh.faces
-    uv = unfold(untangled.flat, corners, cut)
+    uv = unfold(untangled.flat, corners)
     row.seconds += time.perf_counter() - began
     points = (uv[:, 0] + 1j * uv[:, 1])[corners]
     steps = points[:, [2, 0, 1]] - points[:, [1, 2, 0]]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapes
 
-from coneflat import TriangleMesh, flatten, measure
+from coneflat import TriangleMesh, edge_lengths, errors, flatten, measure
 
 VERTICES, FACES = shapes.grid(6, 4)
 MESH = TriangleMesh(VERTICES, FACES)
@@ -58,6 +58,29 @@ def test_seams_are_where_uvs_differ():
     assert d.charts == 2
     assert d.seam_length == pytest.approx(1)
     assert d.seam_mismatch == d.seam_mismatch_max == pytest.approx(0.5 / 0.75)
+
+
+@pytest.mark.parametrize("other", [VERTICES, VERTICES @ [[2, 0, 1], [0, 0.5, 0], [0, 0, 1]]])
+def test_a_metric_given_by_its_lengths(other):
+    """It is measured as the surface that has these lengths, wherever the vertices are."""
+    uv = FLAT.copy()
+    right = VERTICES[FACES].mean(axis=1)[:, 0] > 0.5
+    uv[right] = uv[right] * 0.5 + [3, 0]
+    lengths = edge_lengths(other, FACES)
+    found, expected = measure(MESH, uv, lengths=lengths), measure(TriangleMesh(other, FACES), uv)
+    for name in (
+        "qc",
+        "log_area_scale",
+        "qc_mean",
+        "area_std",
+        "seam_length",
+        "seam_mismatch",
+        "flipped",
+        "charts",
+    ):
+        assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-12, abs=1e-12)
+    with pytest.raises(errors.LengthError, match="not positive: 2"):
+        measure(MESH, uv, lengths=np.where(np.arange(len(FACES))[:, None] == 2, -1, lengths))
 
 
 def test_agrees_with_an_independent_implementation(shared):

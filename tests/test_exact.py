@@ -52,6 +52,30 @@ def curvature_of(metric, is_boundary_vertex):
 
 
 class TestConvergence:
+    def test_one_number_for_all_vertices(self):
+        """The metric of constant curvature on a sphere, and a flat torus."""
+        ball, ring = TriangleMesh(*shapes.sphere(2)), TriangleMesh(*shapes.torus())
+        even = exact_metric(ball, lengths_of(ball), 4 * np.pi / len(ball.vertices))
+        np.testing.assert_allclose(even.curvature, 4 * np.pi / len(ball.vertices), atol=1e-12)
+        assert np.abs(exact_metric(ring, lengths_of(ring), 0.0).curvature).max() < 1e-11
+
+    def test_its_own_triangles_have_its_curvature(self):
+        """Sums of their angles, up to full turns: some may be turned over."""
+        mesh = TriangleMesh(*shapes.hill(16, 12))
+        target = np.zeros(len(mesh.vertices))
+        border = np.flatnonzero(mesh.is_boundary_vertex)
+        target[border] = 2 * np.pi / len(border)
+        target[border[::2]] += 0.6
+        target[border[1::2]] -= 0.6
+        metric = exact_metric(mesh, lengths_of(mesh), target)
+        flat = metric.straight()
+        assert len(flat.sides) == mesh.faces.size
+        sides = flat.sides.reshape(-1, 3)
+        angles = np.angle(-sides[:, [1, 2, 0]] / sides[:, [2, 0, 1]])
+        around = np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
+        turned = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - around - target
+        np.testing.assert_allclose(np.exp(1j * turned), 1, atol=1e-9)
+
     @pytest.mark.parametrize("seed", range(12))
     def test_random_cones_on_a_sphere(self, seed):
         """Cone angles between 0.1 pi and 8 pi, in the manner of Campen et al. 2021."""
@@ -171,7 +195,7 @@ class TestTwoRoutes:
         assert metric.doubled
         assert metric.converged
         np.testing.assert_allclose(metric.curvature, target, atol=1e-10)
-        flat = straight_triangles(metric.triangulation, metric.flips, len(mesh.faces))
+        flat = metric.straight()
         inner = flat.twin >= 0
         np.testing.assert_allclose(np.abs(flat.sides[inner]), np.abs(flat.sides[flat.twin[inner]]), rtol=1e-9)
         np.testing.assert_array_equal(flat.twin, intrinsic_triangulation(mesh, lengths_of(mesh)).twin)
@@ -261,10 +285,44 @@ class TestRefusal:
         with pytest.raises(errors.CurvatureError, match=r"4 pi, but the input sums to 3 pi"):
             exact_metric(mesh, lengths_of(mesh), cones_on(mesh, [np.pi, np.pi, np.pi]))
 
-    def test_a_curvature_that_is_no_number(self):
+    @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+    def test_a_curvature_that_is_no_number(self, value):
         mesh = TriangleMesh(*shapes.sphere(2))
-        with pytest.raises(errors.CurvatureError):
-            exact_metric(mesh, lengths_of(mesh), cones_on(mesh, [np.nan, np.pi]))
+        with pytest.raises(errors.CurvatureError, match="NaN or infinite at 1 vertex: "):
+            exact_metric(mesh, lengths_of(mesh), cones_on(mesh, [value, np.pi]))
+
+    @pytest.mark.parametrize(
+        ("change", "kind", "message"),
+        [
+            (
+                {"target": np.zeros(7)},
+                errors.ArrayShapeError,
+                r"target must have the shape \(162,\), .* not \(7,\)",
+            ),
+            ({"target": "flat"}, errors.ArrayShapeError, "target must be an array of numbers"),
+            ({"fixed": np.ones(3, dtype=bool)}, errors.ArrayShapeError, "fixed must have the shape"),
+            ({"start": np.zeros((162, 1))}, errors.ArrayShapeError, "start must have the shape"),
+            ({"fixed_log_scale": [1.0, 2.0]}, errors.ArrayShapeError, "fixed_log_scale must have the shape"),
+            (
+                {"fixed": np.arange(162) < 2, "fixed_log_scale": np.nan},
+                errors.NonFiniteError,
+                "fixed_log_scale is NaN or infinite at 2 vertices: 0, 1",
+            ),
+            ({"lengths": np.ones((320, 2))}, errors.ArrayShapeError, "lengths must have the shape"),
+            ({"lengths": np.tile([1.0, 1, 2.5], (320, 1))}, errors.LengthError, "different lengths"),
+            ({"mesh": shapes.sphere(2)}, errors.ArrayShapeError, "must be a TriangleMesh, .* not a tuple"),
+        ],
+    )
+    def test_arrays_that_do_not_fit(self, change, kind, message):
+        mesh = TriangleMesh(*shapes.sphere(2))
+        arguments = {
+            "mesh": mesh,
+            "lengths": lengths_of(mesh),
+            "target": np.full(162, 4 * np.pi / 162),
+        } | change
+        with pytest.raises(kind, match=message) as caught:
+            exact_metric(**arguments)
+        assert "\n" not in str(caught.value)
 
     def test_too_few_steps_are_reported(self):
         mesh = TriangleMesh(*shapes.sphere(3))

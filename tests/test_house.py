@@ -20,6 +20,7 @@ DOORS = {
     ("result.mapped", "files.npz"),  # likewise
     ("result.flattening", "files"),  # Flattening.save
     ("result.flattening", "files.written"),  # Flattening.as_written
+    ("result.flattening", "files.packages"),  # Flattening.to_trimesh, .to_pyvista, .to_meshio
     ("result.flattening", "view.page.webpage"),  # Flattening.view
 }
 

@@ -342,3 +342,24 @@ def test_bad_input_is_refused(points, triangles, kind, message):
 def test_bad_limit_is_refused():
     with pytest.raises(errors.OptionError, match="1 or more, not 0"):
         find_overlaps(np.zeros((1, 3, 2)), limit=0)
+
+
+@pytest.mark.parametrize(
+    ("pairs", "triangles", "kind", "message"),
+    [
+        ([0, 1], [[0, 1, 2]] * 2, errors.ArrayShapeError, r"shape \(k, 2\), not \(2,\)"),
+        ([["a", "b"]], [[0, 1, 2]] * 2, errors.ArrayShapeError, "pairs must be an array of numbers"),
+        (
+            [[0, 2]],
+            [[0, 1, 2]] * 2,
+            errors.FaceIndexError,
+            r"1 pair with an index outside 0\.\.1: 0; pair 0 is \(0, 2\)",
+        ),
+        ([[1, 0]], [[0, 1, 2]] * 2, errors.OptionError, "sorted"),
+        ([[0, 2], [0, 1]], [[0, 1, 2]] * 3, errors.OptionError, "sorted"),
+        ([[0, 1]], [[0, 1]], errors.ArrayShapeError, r"faces must have the shape \(m, 3\)"),
+    ],
+)
+def test_bad_pairs_are_refused(pairs, triangles, kind, message):
+    with pytest.raises(kind, match=message):
+        overlap_regions(pairs, triangles)

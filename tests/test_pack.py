@@ -350,6 +350,14 @@ def test_bad_input():
         pack_charts(corners, chart, [1, 2, 3])
     with pytest.raises(NonFiniteError, match="1 areas"):
         pack_charts(corners, chart, np.where(np.arange(len(chart)) == 4, -1.0, 1.0))
+    for name, given in (
+        ("corner_uv", ("charts", chart)),
+        ("chart_of_triangle", (corners, [[0], [1, 2]])),
+        ("areas", (corners, chart, "large")),
+    ):
+        with pytest.raises(ArrayShapeError, match=f"{name} must be an array of numbers") as caught:
+            pack_charts(*given)
+        assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapes
 
-from coneflat import TriangleMesh, cut_open, find_seams
+from coneflat import TriangleMesh, cut_open, errors, find_seams, flat_triangles
 from coneflat.flat.exact.metric import exact_metric
 from coneflat.geometry import edge_lengths
 from coneflat.geometry.intrinsic import halfedge_twins
@@ -44,6 +44,36 @@ def side_vectors(uv, corners):
     return points[:, [2, 0, 1]] - points[:, [1, 2, 0]]
 
 
+def test_a_flat_torus_unfolds_to_its_parallelogram():
+    """A metric of one's own: every side 1, so six triangles of 60 degrees at each vertex and no curvature at all."""
+    mesh = TriangleMesh(*shapes.grid(5, 4, wrap=(True, True)))
+    flat = flat_triangles(mesh, np.ones(mesh.faces.shape))
+    seams = find_seams(mesh, np.empty(0, dtype=np.int64), np.ones(len(mesh.edges)))
+    disk = cut_open(mesh, seams).mesh
+    points = unfold(flat, disk.faces)
+    np.testing.assert_allclose(np.abs(side_vectors(points, disk.faces)), 1, rtol=1e-12)
+    assert len(points) == len(disk.vertices)
+    hull = points - points.mean(axis=0)
+    assert np.abs(hull).max() < 6
+    one, two = (points[disk.faces[:, k]] - points[disk.faces[:, 0]] for k in (1, 2))
+    areas = (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
+    np.testing.assert_allclose(areas, np.sqrt(3) / 4, rtol=1e-12)
+
+
+def test_corners_that_do_not_fit():
+    mesh = TriangleMesh(*shapes.grid(3, 3))
+    flat = flat_triangles(mesh, edge_lengths(mesh.vertices, mesh.faces))
+    with pytest.raises(errors.ArrayShapeError, match=r"shape \(18, 3\), .* not \(17, 3\)"):
+        unfold(flat, mesh.faces[1:])
+    with pytest.raises(errors.FaceIndexError, match=r"outside 0\.\.53"):
+        unfold(flat, mesh.faces + 60)
+    spread = unfold(flat, 2 * mesh.faces)
+    np.testing.assert_array_equal(spread[::2], unfold(flat, mesh.faces))
+    np.testing.assert_array_equal(spread[1::2], 0)
+    with pytest.raises(errors.ArrayShapeError, match=r"lengths must have the shape \(18, 3\)"):
+        flat_triangles(mesh, np.ones((18, 2)))
+
+
 def turns(mesh):
     """The angle around each vertex that turns by a full or a half turn: none has curvature."""
     return np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
@@ -75,9 +105,8 @@ class TestUnfold:
     @pytest.mark.parametrize("name", SURFACES)
     def test_every_triangle_keeps_its_shape(self, name):
         _, cut_mesh, flat, _ = flat_surface(*SURFACES[name])
-        cut = halfedge_twins(cut_mesh.mesh) < 0
         corners = cut_mesh.mesh.faces
-        sides = side_vectors(unfold(flat, corners, cut), corners)
+        sides = side_vectors(unfold(flat, corners), corners)
         shape = flat.sides.reshape(-1, 3)
         turn = sides[:, 0] / shape[:, 0]
         np.testing.assert_allclose(np.abs(turn), 1, rtol=1e-10)
@@ -87,7 +116,7 @@ class TestUnfold:
     def test_both_sides_of_a_seam_are_equal(self, name):
         _, cut_mesh, flat, _ = flat_surface(*SURFACES[name])
         cut = halfedge_twins(cut_mesh.mesh) < 0
-        uv = unfold(flat, cut_mesh.mesh.faces, cut)
+        uv = unfold(flat, cut_mesh.mesh.faces)
         assert seam_mismatch(flat, cut, uv, cut_mesh.mesh.faces) < 1e-12
 
     @pytest.mark.parametrize("rounds", [3, 5])
@@ -95,7 +124,7 @@ class TestUnfold:
         _, cut_mesh, flat, _ = flat_surface(shapes.sphere(rounds), 8)
         corners = cut_mesh.mesh.faces
         cut = halfedge_twins(cut_mesh.mesh) < 0
-        uv = unfold(flat, corners, cut)
+        uv = unfold(flat, corners)
         assert seam_mismatch(flat, cut, uv, corners) < 1e-12
         lengths, wanted = np.abs(side_vectors(uv, corners)).ravel(), np.abs(flat.sides)
         np.testing.assert_allclose(lengths, wanted, rtol=1e-11)
@@ -103,13 +132,13 @@ class TestUnfold:
     def test_a_plane_figure_stays_what_it_is(self):
         points, faces = shapes.grid(9, 7)
         _, flat = planar(points[:, :2], faces)
-        uv = unfold(flat, faces, flat.twin < 0)
+        uv = unfold(flat, faces)
         np.testing.assert_allclose(uv - uv[0], points[:, :2] - points[0, :2], atol=1e-14)
 
     def test_charts_are_laid_out_one_by_one(self):
         points, faces = shapes.join(shapes.grid(4, 3), shapes.grid(3, 5))
         _, flat = planar(points[:, :2], faces)
-        uv = unfold(flat, faces, flat.twin < 0)
+        uv = unfold(flat, faces)
         count = 5 * 4
         for part in (slice(0, count), slice(count, None)):
             given = points[part, :2]
@@ -120,7 +149,7 @@ class TestUnfold:
         points[12] += [0.6, 0.1, 0]  # an inner vertex, across its neighbours
         _, flat = planar(points[:, :2], faces)
         assert flat.is_inverted.any()
-        uv = unfold(flat, faces, flat.twin < 0)
+        uv = unfold(flat, faces)
         np.testing.assert_allclose(uv - uv[0], points[:, :2] - points[0, :2], atol=1e-14)
 
 
@@ -136,7 +165,7 @@ class TestUntangle:
         assert not border[result.moved].any()
         assert len(result.moved) < 20
         assert 0 < result.largest_move < 3
-        uv = unfold(result.flat, faces, flat.twin < 0)
+        uv = unfold(result.flat, faces)
         assert (heights(side_vectors(uv, faces)) > DEGENERATE).all()
         still = np.setdiff1d(np.arange(len(points)), result.moved)
         offset = uv[still] - points[still, :2]
@@ -183,7 +212,7 @@ class TestUntangle:
         )
         cut = halfedge_twins(cut_mesh.mesh) < 0
         corners = cut_mesh.mesh.faces
-        uv = unfold(result.flat, corners, cut)
+        uv = unfold(result.flat, corners)
         assert (heights(side_vectors(uv, corners)) > DEGENERATE).all()
         assert seam_mismatch(result.flat, cut, uv, corners) < 1e-12
 

@@ -52,6 +52,17 @@ _HOMES = {
     "least_squares_layout": "layout",
     "ConeflatError": "errors",
     "pack_together": "result.together",
+    "SeamData": "result.seam_data",
+    "exact_metric": "flat.exact.metric",
+    "ExactMetric": "flat.exact.metric",
+    "unfold": "layout.unfold",
+    "FlatTriangles": "geometry.straight",
+    "flat_triangles": "geometry.straight",
+    "find_overlaps": "geometry.overlap",
+    "Overlaps": "geometry.overlap",
+    "overlap_regions": "atlas",
+    "pack_charts": "atlas",
+    "Packed": "atlas",
     "make_figure": "view",
     "save_figure": "view",
     "draw_layout": "view",
@@ -69,10 +80,15 @@ __all__ = [
     "ConeflatError",
     "CutMesh",
     "Distortion",
+    "ExactMetric",
+    "FlatTriangles",
     "Flattening",
     "FoundCones",
     "MeshFile",
+    "Overlaps",
     "PAPER",
+    "Packed",
+    "SeamData",
     "TriangleMesh",
     "UVMeasures",
     "__version__",
@@ -94,8 +110,11 @@ __all__ = [
     "edge_costs",
     "edge_lengths",
     "errors",
+    "exact_metric",
     "find_cones",
+    "find_overlaps",
     "find_seams",
+    "flat_triangles",
     "flatten",
     "greedy_cones",
     "least_squares_layout",
@@ -103,33 +122,42 @@ __all__ = [
     "measure",
     "measure_uv",
     "mollify",
+    "overlap_regions",
+    "pack_charts",
     "pack_together",
     "read_flattening",
     "read_mesh",
     "sample_path",
     "save_figure",
     "scaled_lengths",
+    "unfold",
     "visible_share",
 ]
 
 if TYPE_CHECKING:
     from . import errors
+    from .atlas import Packed, overlap_regions, pack_charts
     from .cones import ConeSolution, cones_at, cones_with_curvature, greedy_cones
     from .curve import ConeCurve, FoundCones, cone_curve, find_cones
     from .errors import ConeflatError
     from .files import read_flattening, read_mesh
+    from .flat.exact.metric import ExactMetric, exact_metric
     from .flat.linear import scaled_lengths
     from .geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths, mollify
+    from .geometry.overlap import Overlaps, find_overlaps
+    from .geometry.straight import FlatTriangles, flat_triangles
     from .geometry.visibility import visible_share
     from .input.mesh_file import MeshFile
     from .input.validation import CheckedMesh, check_mesh
     from .layout import least_squares_layout
+    from .layout.unfold import unfold
     from .mesh import TriangleMesh
     from .options import PAPER
     from .pipeline import flatten
     from .quality.distortion import Distortion, measure
     from .result.flattening import Flattening
     from .result.measure_uv import UVMeasures, measure_uv
+    from .result.seam_data import SeamData
     from .result.together import pack_together
     from .sample import sample_path
     from .seams import CutMesh, cut_open, edge_costs, find_seams

@@ -66,3 +66,14 @@ def require_finite(points: FloatArray, triangles: IntArray) -> None:
                 f"{plural(len(bad), 'vertex', 'vertices')} of {len(points):,} with NaN or infinite coordinates: "
                 f"{list_some(bad)}; remove or mend them"
             )
+
+
+def as_floats(name: str, values: ArrayLike) -> FloatArray:
+    """Return an array of numbers; raises ArrayShapeError, with its name, if there is anything else in it."""
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind not in "bfiuO":
+            raise TypeError(f"their type is {array.dtype}")
+        return np.asarray(array, dtype=np.float64, order="C")
+    except (TypeError, ValueError) as error:
+        raise ArrayShapeError(f"{name} must be an array of numbers: {error}") from error

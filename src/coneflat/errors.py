@@ -42,6 +42,10 @@ class NonOrientableError(MeshError):
     """The faces cannot be oriented consistently (a Moebius strip, a Klein bottle)."""
 
 
+class LengthError(MeshError):
+    """Side lengths are no metric: they make no triangles, or differ between the two sides of an edge."""
+
+
 class MissingUVError(MeshError):
     """The mesh has no UV coordinates, or none that are finite."""
 

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, as_floats
 from ..compiled import compiled
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..mesh import NEXT
@@ -74,13 +74,17 @@ def read_charts(corner_uv: ArrayLike, chart_of_triangle: ArrayLike | None) -> Ch
     Raises:
         ArrayShapeError, NonFiniteError, OptionError: as in `pack_charts`.
     """
-    uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
+    uv = as_floats("corner_uv", corner_uv)
     if uv.ndim != 3 or uv.shape[1:] != (3, 2) or not len(uv):
         raise ArrayShapeError(f"corner_uv has shape {uv.shape}, not (triangles, 3, 2)")
     if not np.isfinite(uv).all():
         bad = np.flatnonzero(~np.isfinite(uv).all(axis=(1, 2)))
         raise NonFiniteError(f"{len(bad):,} triangles have no finite UVs, the first is {bad[0]}")
-    chart = np.zeros(len(uv), dtype=np.int64) if chart_of_triangle is None else np.asarray(chart_of_triangle)
+    if chart_of_triangle is None:
+        chart = np.zeros(len(uv), dtype=np.int64)
+    else:
+        as_floats("chart_of_triangle", chart_of_triangle)
+        chart = np.asarray(chart_of_triangle)
     if chart.shape != (len(uv),) or chart.dtype.kind not in "iu":
         raise ArrayShapeError(
             f"chart_of_triangle has shape {chart.shape} and type {chart.dtype}, not one whole number for each "

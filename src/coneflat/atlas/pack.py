@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import FloatArray, IntArray, as_floats
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..text import shown
 from .charts import Charts, Outlines, read_charts
@@ -79,6 +79,10 @@ def pack_charts(
         ArrayShapeError, NonFiniteError: arrays do not fit, or are not finite.
         OptionError: charts are not numbered from 0 without gaps, one is mirrored, an option makes no sense, or so
             much padding leaves no room for charts.
+
+    Notes:
+        The shapes of charts, not boxes around them, are placed on a grid, each where its top is lowest; orders and
+        angles are changed at random, always the same way, and kept where that helps. Finer grids then close the gaps.
     """
     charts = read_charts(corner_uv, chart_of_triangle)
     margin = padding if margin is None else margin
@@ -119,7 +123,7 @@ def _densities(charts: Charts, areas: ArrayLike) -> FloatArray:
 
     Lines and points, and charts of no area on the surface, are scaled as the others are together.
     """
-    surface = np.asarray(areas, dtype=np.float64)
+    surface = as_floats("areas", areas)
     if surface.shape != charts.chart.shape:
         raise ArrayShapeError(
             f"areas have shape {surface.shape}, not {charts.chart.shape}: one for each triangle"

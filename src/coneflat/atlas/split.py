@@ -7,11 +7,14 @@ two parts of the border that lie between them (planar duality): no flow has to b
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats
+from ..errors import ArrayShapeError, FaceIndexError, OptionError
 from ..geometry.charts import label_charts
 from ..geometry.graph import MultiGraph, trace_back
 from ..mesh import NEXT, TriangleMesh, corner_fans, label_components, sort_by_counting, sort_pairs
+from ..text import list_some, plural
 
 
 def split_overlaps(
@@ -208,8 +211,8 @@ def _cheapest_path(
     return edges[graph.edges_between(nodes, previous)]
 
 
-def overlap_regions(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray]:
-    """Return the number of regions where a layout overlaps itself, and the region of each pair.
+def overlap_regions(pairs: ArrayLike, triangles: ArrayLike) -> tuple[int, IntArray]:
+    """Return the number of regions where a layout overlaps itself, and (k,) the region of each pair.
 
     Two pairs are neighbours where they have a triangle in common, and their other triangles share a side: the
     overlap goes on across it. Where two layers have sides in common, it ends for this purpose.
@@ -217,9 +220,36 @@ def overlap_regions(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray
     Args:
         pairs: (k, 2) as in `Overlaps`: sorted, the smaller index first.
         triangles: (m, 3) the points at their corners, by which they share sides.
+
+    Raises:
+        MeshError: an array has the wrong shape, or an index is none of a triangle.
+        OptionError: the pairs are not sorted.
     """
-    source, place = _steps(pairs, triangles)
-    return label_components(len(pairs), source // 2, place // 2)
+    faces = as_faces(triangles, np.iinfo(np.int64).max)
+    ways = _checked_pairs(pairs, len(faces))
+    source, place = _steps(ways, faces)
+    return label_components(len(ways), source // 2, place // 2)
+
+
+def _checked_pairs(pairs: ArrayLike, count: int) -> IntArray:
+    """Return (k, 2) pairs of m triangles, if they are as `find_overlaps` has them."""
+    values = as_floats("pairs", pairs)
+    if values.ndim != 2 or values.shape[1] != 2:
+        raise ArrayShapeError(f"pairs must have the shape (k, 2), not {values.shape}")
+    bad = np.flatnonzero(~((values >= 0) & (values < count) & (values == np.floor(values))).all(axis=1))
+    if len(bad):
+        one, two = values[bad[0]]
+        raise FaceIndexError(
+            f"{plural(len(bad), 'pair')} with an index outside 0..{count - 1}: {list_some(bad)}; pair {bad[0]} is "
+            f"({one:g}, {two:g})"
+        )
+    known = values.astype(np.int64)
+    keys = known @ [count, 1]
+    if (known[:, 0] >= known[:, 1]).any() or (np.diff(keys) <= 0).any():
+        raise OptionError(
+            "pairs must be sorted, each once, the smaller index first, as find_overlaps returns them"
+        )
+    return known
 
 
 def overlap_layers(pairs: IntArray, triangles: IntArray) -> list[tuple[IntArray, IntArray]]:

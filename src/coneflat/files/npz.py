@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ..result.flattening import Flattening
 
 
-#: The arrays of a result.
+#: The arrays that make a result. The others of an archive, those of `SeamData`, follow from them.
 _NAMES = (
     "uv", "uv_faces", "vertices", "faces", "cones", "curvatures", "log_scale", "curvature_residual", "seams",
     "vertex_origin", "face_origin", "qc", "log_area_scale", "uv_scale", "report",
@@ -37,23 +37,21 @@ _MOST_UNPACKED = 30
 
 
 def write_npz(result: Flattening, stream: IO[bytes]) -> None:
-    """Write all arrays of a result and its report as JSON."""
+    """Write all arrays of a result, those of its cut, and its report as JSON."""
     origin = result.vertex_origin
     arrays: dict[str, Any] = {
         "vertices": result.vertices,
         "faces": result.faces,
         "uv": result.uv,
         "uv_faces": result.uv_faces,
-        "cones": result.cones,
+        **result.seam_data.as_arrays(),
         "curvatures": result.curvatures,
         "log_scale": result.log_scale,
         "prescribed": result.prescribed,
         "curvature_residual": result.curvature_residual,
-        "seams": result.seams,
         "vertex_origin": np.arange(len(result.vertices)) if origin is None else origin,
         "face_origin": np.arange(len(result.faces)) if result.face_origin is None else result.face_origin,
         "qc": result.distortion.qc,
-        "log_area_scale": result.distortion.log_area_scale,
         "uv_scale": np.float64(result.uv_scale),
         "report": np.array(json.dumps(result.report())),
     }

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import FloatArray, IntArray, as_faces, require_finite, unit_exponent
+from .._arrays import FloatArray, IntArray, as_faces, as_floats, require_finite, unit_exponent
 from ..compiled import compiled
 from ..errors import ArrayShapeError, OptionError
 from .coverage import covered_twice
@@ -58,7 +58,8 @@ def find_overlaps(
     Notes:
         Interiors are open: triangles that touch in points or along sides, in whole or in part, do not overlap,
         and whatever has inner points in common does, however thin. No tolerance is involved, and all signs are
-        exact for the coordinates as they are given (those below 2^-420 of the largest count as 0). So two sides
+        exact for the coordinates as they are given (J. R. Shewchuk, "Adaptive precision floating-point arithmetic and
+        fast robust geometric predicates", 1997; those below 2^-420 of the largest count as 0). So two sides
         of a seam that should coincide, but are an ulp apart the wrong way, do overlap; `area` then is what
         rounding makes of it, about 1e-16 of the layout's extent times the length of the seam.
 
@@ -79,10 +80,7 @@ def find_overlaps(
 
 def _corners(points: ArrayLike, triangles: ArrayLike | None) -> FloatArray:
     """Return (m, 3, 2) the corners, if all is as it should be."""
-    try:
-        places = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ArrayShapeError(f"points must be an array of numbers: {error}") from error
+    places = as_floats("points", points)
     shape = "(n, 2)" if triangles is not None else "(m, 3, 2)"
     if places.shape[1:] != ((2,) if triangles is not None else (3, 2)):
         raise ArrayShapeError(f"points must have the shape {shape}, not {places.shape}")

@@ -6,10 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..compiled import compiled
-from .intrinsic import IntrinsicTriangulation
+from ..mesh import TriangleMesh
+from .intrinsic import IntrinsicTriangulation, intrinsic_triangulation
+from .lengths import check_lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,21 @@ class FlatTriangles:
         sides = self.sides.reshape(-1, 3)
         inverted: BoolArray = (np.conj(sides[:, 0]) * sides[:, 1]).imag <= 0
         return inverted
+
+
+def flat_triangles(mesh: TriangleMesh, lengths: ArrayLike) -> FlatTriangles:
+    """Return a mesh's own triangles in the plane, each with given side lengths: a flat metric on the mesh as it is.
+
+    Args:
+        mesh: the mesh, such as `check_mesh(vertices, faces).mesh`.
+        lengths: (m, 3) side lengths, column i opposite corner i, in any unit.
+
+    Raises:
+        ArrayShapeError, NonFiniteError: the lengths do not fit the mesh, or are not finite.
+        LengthError: they make no triangles with area, or differ between the two sides of an edge.
+    """
+    triangulation = intrinsic_triangulation(mesh, check_lengths(mesh, lengths))
+    return straight_triangles(triangulation, np.empty(0, dtype=np.int64))
 
 
 def straight_triangles(

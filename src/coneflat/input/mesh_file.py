@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .._arrays import FloatArray, IntArray
+from .triangulate import triangulate
 
 if TYPE_CHECKING:
     from ..files.gltf.scene import GltfScene
@@ -59,3 +61,12 @@ class MeshFile:
     def has_colours(self) -> bool:
         """Whether every vertex has a colour."""
         return all(name in self.properties for name in COLOURS)
+
+    @cached_property
+    def triangles(self) -> IntArray:
+        """(m, 3) the polygons as triangles, which `flatten` takes in their place: quads and larger ones are split.
+
+        Raises:
+            DegenerateFaceError, FaceIndexError: a polygon has fewer than 3 corners, or a corner no vertex.
+        """
+        return triangulate(self.vertices, self.corners, self.offsets)[0]

@@ -6,9 +6,11 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import NonFiniteError
+from ..geometry.lengths import as_lengths, check_lengths
 from ..mesh import TriangleMesh
 from .validation import CheckedMesh
 
@@ -30,7 +32,7 @@ def result_numbering(checked: CheckedMesh, input_count: int) -> tuple[IntArray, 
 # Size of a mesh of which texels per unit of length, and their like, are numbers.
 SMALLEST = 1e-300
 
-Values = TypeVar("Values", IntArray, BoolArray)
+Values = TypeVar("Values", IntArray, BoolArray, FloatArray)
 
 
 def at_unit_size(checked: CheckedMesh) -> CheckedMesh:
@@ -51,3 +53,22 @@ def turn_corners(checked: CheckedMesh, per_corner: Values) -> Values:
     """Bring values at the input's triangle corners (m, 3) to the faces of the checked mesh."""
     values = per_corner[checked.face_origin]
     return np.where(checked.is_turned[:, None], values[:, [0, 2, 1]], values)
+
+
+def lengths_of_input(checked: CheckedMesh, lengths: ArrayLike, face_count: int) -> FloatArray:
+    """Bring a metric that the user gives to the checked mesh: (m, 3) side lengths there, at its size.
+
+    Faces that a repair dropped do not matter, nor that both sides agree where it separated them. Triangles may be flat,
+    as `mollify` is to open them.
+
+    Args:
+        checked: the mesh.
+        lengths: (f, 3) for the input's faces, column i opposite corner i, model units.
+        face_count: f.
+
+    Raises:
+        ArrayShapeError, NonFiniteError, LengthError: they are no metric, by the input's numbers of faces and vertices.
+    """
+    values = turn_corners(checked, as_lengths(lengths, face_count))
+    names = {"face_names": checked.face_origin, "vertex_names": checked.vertex_origin}
+    return np.ldexp(check_lengths(checked.mesh, values, flat=True, **names), checked.exponent)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray, as_faces
 from ..compiled import compiled
+from ..errors import ArrayShapeError
 from ..geometry.straight import FlatTriangles
 
 # Iterations that spread the gaps; each costs as much as half a breadth-first search.
@@ -15,13 +17,17 @@ SWEEPS = 10
 NO_LENGTH = 1e-12
 
 
-def unfold(flat: FlatTriangles, corners: IntArray, cut: BoolArray) -> FloatArray:
-    """Return (u, 2) the places in the plane of the vertices of a flat mesh, cut into charts, in linear time.
+def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
+    """Return (u, 2) the places in the plane of the points of a flat mesh, cut into charts, in linear time.
 
     Args:
-        flat: the triangles; no vertex off the cut has curvature.
-        corners: (m, 3) vertices of the cut mesh.
-        cut: (3m,) True for half-edges along which the mesh is cut.
+        flat: the m triangles, in any unit: `ExactMetric.straight` has those of an exact metric, `flat_triangles` those
+            of other lengths. No vertex off the cut may have curvature, or there are gaps, which are spread.
+        corners: (m, 3) the points at the triangles' corners, from 0: `cut_open(mesh, seams).mesh.faces`, say. The mesh
+            is cut along the sides whose ends have other points on the other side. Points of no triangle are at 0.
+
+    Raises:
+        ArrayShapeError, FaceIndexError: `corners` does not fit the triangles.
 
     Notes:
         Every vertex has one place, and every chart is placed by itself, its first triangle at the origin.
@@ -43,9 +49,15 @@ def unfold(flat: FlatTriangles, corners: IntArray, cut: BoolArray) -> FloatArray
         | border first, 10 steps | 1e-13, 7e-13 | 8e-13, 7e-11 | 1e-11, 3e-9 |
         | border first, 100 steps | 1e-13, 8e-13 | 8e-13, 2e-11 | 1e-11, 2e-10 |
     """
-    corner = np.ascontiguousarray(corners, dtype=np.int64).ravel()
-    cut = cut | (flat.twin < 0)
-    m, count = len(corners), int(corner.max()) + 1
+    faces = as_faces(corners, len(flat.twin))
+    if faces.size != len(flat.twin):
+        raise ArrayShapeError(
+            f"corners must have the shape {(len(flat.twin) // 3, 3)}, a point for each corner of the flat triangles, "
+            f"not {faces.shape}"
+        )
+    corner = faces.ravel()
+    cut = find_cut(flat.twin, corner)
+    m, count = len(faces), int(corner.max()) + 1
     frame, points = np.ones(m, dtype=np.complex128), np.zeros(count, dtype=np.complex128)
     placed, reached = np.zeros(count, dtype=np.bool_), np.zeros(m, dtype=np.bool_)
     queue = np.empty(m, dtype=np.int64)
@@ -58,11 +70,11 @@ def unfold(flat: FlatTriangles, corners: IntArray, cut: BoolArray) -> FloatArray
         tails = corner[_next(border)]
         points[tails] = closed_chain(frames * flat.sides[border])
         placed[tails] = pinned[tails] = True
-        faces, first = np.unique(border // 3, return_index=True)
-        frame[faces] = frames[first]
-        reached[faces] = True
-        queue[: len(faces)] = faces
-        spread(*arrays, len(faces), reached, frame, placed, points)
+        along, first = np.unique(border // 3, return_index=True)
+        frame[along] = frames[first]
+        reached[along] = True
+        queue[: len(along)] = along
+        spread(*arrays, len(along), reached, frame, placed, points)
     while not reached.all():  # charts without a border
         seed = int(reached.argmin())
         reached[seed] = placed[corner[3 * seed]] = pinned[corner[3 * seed]] = True
@@ -109,7 +121,7 @@ def _close_gaps(
     ends = corner.reshape(-1, 3)
     diagonal = np.bincount(ends[:, [1, 2, 0]].ravel(), weight, len(points))
     diagonal += np.bincount(ends[:, [2, 0, 1]].ravel(), weight, len(points))
-    damping = np.where(pinned, 0.0, 1 / diagonal)
+    damping = np.divide(1.0, diagonal, out=np.zeros(len(points)), where=~pinned & (diagonal > 0))
     residual, pull = np.empty_like(points), np.empty_like(points)
     gap_forces(corner, sides, weight, frame, points, residual)
     shift = np.zeros_like(points)
@@ -126,6 +138,19 @@ def _close_gaps(
         product, before = np.vdot(residual, damped).real, product
         direction = damped + product / before * direction
     points += shift
+
+
+@compiled
+def find_cut(twin: IntArray, corner: IntArray) -> BoolArray:
+    """Return (3m,) True for half-edges on the boundary, or with other points at their ends than their twins have."""
+    cut = np.ones(len(twin), np.bool_)
+    for h in range(len(twin)):
+        t = twin[h]
+        if t >= 0:
+            start, end = h - h % 3 + (h + 1) % 3, h - h % 3 + (h + 2) % 3
+            other_start, other_end = t - t % 3 + (t + 1) % 3, t - t % 3 + (t + 2) % 3
+            cut[h] = corner[start] != corner[other_end] or corner[end] != corner[other_start]
+    return cut
 
 
 @compiled

@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._arrays import BoolArray, FloatArray, IntArray, dots
 from ..compiled import compiled
 from ..errors import ArrayShapeError
 from ..geometry.charts import both_sides, joined_edges, label_charts
+from ..geometry.lengths import check_lengths
 from ..geometry.overlap import Overlaps, find_overlaps
 from ..mesh import TriangleMesh
 from ..threads import meanwhile
@@ -96,6 +98,7 @@ def measure(
     cones: IntArray | None = None,
     prescribed: FloatArray | None = None,
     overlaps: Overlaps | None = None,
+    lengths: ArrayLike | None = None,
 ) -> Distortion:
     """Measure a UV map.
 
@@ -106,14 +109,18 @@ def measure(
         curvature_error: what `curvature_errors` returns for the metric.
         prescribed: (n,) curvature that vertices are to have in the plane, radians; NaN where it is free.
         overlaps: what `find_overlaps` returns, if that is known.
+        lengths: (m, 3) side lengths of the metric that is mapped, column i opposite corner i; None for those between
+            the positions of the vertices.
 
     Raises:
         ArrayShapeError, NonFiniteError: the arrays do not fit the mesh, or UVs are not finite.
+        LengthError: the lengths are no metric.
     """
     _check_shapes(mesh, corner_uv, prescribed)
     find = partial(find_overlaps, corner_uv) if overlaps is None else lambda: overlaps
     with meanwhile(find, len(corner_uv)) as finding:
-        measured = measure_map(mesh, corner_uv, curvature_error, cones)
+        own = None if lengths is None else check_lengths(mesh, lengths, flat=True)
+        measured = measure_map(mesh, corner_uv, curvature_error, cones, own)
         if prescribed is not None:
             error = angle_sum_errors(mesh, corner_uv, prescribed)[0]
             measured = replace(measured, angle_sum_error=float(np.nanmax(np.abs(error), initial=0.0)))
@@ -156,12 +163,12 @@ def measure_map(
     corner_uv: FloatArray,
     curvature_error: tuple[float, float] = (np.nan, np.nan),
     cones: IntArray | None = None,
+    lengths: FloatArray | None = None,
 ) -> Distortion:
     """Return all measures but those of overlaps; arguments are those of `measure`."""
     corner_uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
-    area, has_area, uv_area, has_uv_area, qc = measure_triangles(
-        mesh.vertices, mesh.faces, corner_uv, ZERO_AREA
-    )
+    shapes = (mesh.vertices, mesh.faces) if lengths is None else _drawn(lengths)
+    area, has_area, uv_area, has_uv_area, qc = measure_triangles(*shapes, corner_uv, ZERO_AREA)
     valid = has_area & has_uv_area
     log_scale = np.full(len(area), np.nan)
     log_scale[valid] = np.log(np.abs(uv_area[valid]) / area[valid]) / 2
@@ -175,6 +182,8 @@ def measure_map(
     majority = np.sign(np.bincount(chart, weights=np.abs(uv_area) * sign, minlength=charts))
     against = sign * majority[chart] < 0
     seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
+    if lengths is not None:
+        seam_lengths = lengths.ravel()[mesh.edge_halfedges[seams, 0]]
     return Distortion(
         qc=qc,
         log_area_scale=log_scale,
@@ -261,6 +270,16 @@ def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
     order = np.argsort(values)
     cumulated = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(cumulated, fraction * cumulated[-1])])
+
+
+def _drawn(lengths: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return triangles with given side lengths, each drawn by itself: positions (3m, 3), and (m, 3) indices of them."""
+    sides = np.empty(lengths.size, dtype=np.complex128)
+    place_triangles(lengths.ravel(), sides)
+    along = sides.reshape(-1, 3)
+    corners = np.stack([np.zeros(len(along)), along[:, 2], along[:, 2] + along[:, 0]], axis=1).ravel()
+    positions = np.stack([corners.real, corners.imag, np.zeros(len(corners))], axis=1)
+    return positions, np.arange(len(corners)).reshape(-1, 3)
 
 
 @compiled

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray
+from .._arrays import BoolArray, ComplexArray, FloatArray
 from ..geometry.handles import handle_loops, off_multiple
 from ..geometry.planar import sides_between
 from ..mesh import TriangleMesh
@@ -57,10 +57,19 @@ def seam_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) ->
     return np.abs(off_multiple(_turns(mesh, corner_uv), quantum))
 
 
-def _turns(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
-    """Return the rotation between the two sides of each inner edge, radians; 0 where a side has no length."""
+def ratios_across(mesh: TriangleMesh, corner_uv: FloatArray) -> ComplexArray:
+    """Return (k,) the second side of each inner edge over the first, as complex numbers: how it is turned and scaled.
+
+    Not finite where the first has no length.
+    """
     sides = sides_between(corner_uv).ravel()
     pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
     with np.errstate(divide="ignore", invalid="ignore"):
-        turns: FloatArray = np.angle(-sides[pairs[:, 1]] / sides[pairs[:, 0]])
+        ratios: ComplexArray = -sides[pairs[:, 1]] / sides[pairs[:, 0]]
+    return ratios
+
+
+def _turns(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
+    """Return the rotation between the two sides of each inner edge, radians; 0 where a side has no length."""
+    turns: FloatArray = np.angle(ratios_across(mesh, corner_uv))
     return np.where(np.isfinite(turns), turns, 0.0)

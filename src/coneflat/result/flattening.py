@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .._arrays import FloatArray, IntArray
 from ..input.mesh_file import MeshFile
@@ -14,6 +15,13 @@ from ..quality.distortion import Distortion
 from ..quality.rotations import Rotations
 from ..quality.statistics import SolveStatistics
 from ..text import plural
+
+if TYPE_CHECKING:
+    import meshio
+    import pyvista
+    import trimesh
+
+    from .seam_data import SeamData
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +88,13 @@ class Flattening:
         """(m, 3, 2) the point of every triangle corner."""
         return self.uv[self.uv_faces]
 
+    @cached_property
+    def seam_data(self) -> SeamData:
+        """The cut as arrays: both sides of every seam edge and the motion between them, charts, cone angles, scales."""
+        from .seam_data import seam_data
+
+        return seam_data(self)
+
     def report(self) -> dict[str, Any]:
         """Return all measures as plain Python values, ready for JSON."""
         from .report import as_dict
@@ -114,6 +129,42 @@ class Flattening:
         from ..files.written import as_written
 
         return as_written(self, ending)
+
+    def to_trimesh(self) -> trimesh.Trimesh:
+        """Return a textured mesh of trimesh, the vertices split where UVs are.
+
+        Vertex attribute `vertex` is the vertex of the result that each came from, face attribute `chart` the chart.
+
+        Raises:
+            OptionError: trimesh is not installed.
+        """
+        from ..files.packages import to_trimesh
+
+        return to_trimesh(self)
+
+    def to_pyvista(self) -> pyvista.PolyData:
+        """Return a surface of PyVista with active texture coordinates, the points split where UVs are.
+
+        Point data `vertex` is the vertex of the result that each came from, cell data `chart` the chart.
+
+        Raises:
+            OptionError: PyVista is not installed.
+        """
+        from ..files.packages import to_pyvista
+
+        return to_pyvista(self)
+
+    def to_meshio(self) -> meshio.Mesh:
+        """Return a mesh of meshio, the points split where UVs are, which are its point data `obj:vt`.
+
+        Point data `vertex` is the vertex of the result that each came from, cell data `chart` the chart.
+
+        Raises:
+            OptionError: meshio is not installed.
+        """
+        from ..files.packages import to_meshio
+
+        return to_meshio(self)
 
     def view(
         self,

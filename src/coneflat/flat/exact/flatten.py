@@ -9,7 +9,7 @@ import numpy as np
 from ..._arrays import BoolArray, FloatArray, IntArray
 from ...cones import ConeSolution
 from ...geometry import double_areas
-from ...geometry.straight import FlatTriangles, straight_triangles
+from ...geometry.straight import FlatTriangles
 from ...layout.unfold import unfold
 from ...layout.untangle import untangle
 from ...mesh import TriangleMesh
@@ -112,15 +112,13 @@ class ExactFlatMetric:
     def _lay_out_straight(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
         mesh, solved = self.mesh, self.solved
         flat = self.straight()
-        cut = mesh.is_boundary_edge.copy()
-        cut[seams] = True
         on_boundary = mesh.is_boundary_vertex
         pinned, on_seam = self.is_held.copy(), np.zeros(len(mesh.vertices), dtype=bool)
         pinned[self.cones] = True
         on_seam[mesh.edges[seams]] = True
         angles = np.where(on_boundary, np.pi, 2 * np.pi) - self.target
         untangled = untangle(flat, mesh.faces, angles, pinned, on_seam, on_boundary)
-        points = unfold(untangled.flat, disk.faces, cut[mesh.halfedge_edges]) * self.shrink
+        points = unfold(untangled.flat, disk.faces) * self.shrink
         curvature = laid_out_curvature(mesh, points[disk.faces])
         return LaidOut(
             mesh=mesh,
@@ -144,7 +142,7 @@ class ExactFlatMetric:
 
     def straight(self) -> FlatTriangles:
         """Return the input's triangles with straight sides in the metric."""
-        return straight_triangles(self.solved.triangulation, self.solved.flips, len(self.mesh.faces))
+        return self.solved.straight()
 
     def _lay_out_refined(self, seams: IntArray) -> LaidOut:
         from ...layout.refine import refine
@@ -152,9 +150,7 @@ class ExactFlatMetric:
         refined = refine(self.mesh, self.solved)
         mesh, edges = refined.mesh, refined.edges_on(seams)
         disk = cut_open(mesh, edges).mesh
-        cut = mesh.is_boundary_edge.copy()
-        cut[edges] = True
-        points = unfold(refined.flat, disk.faces, cut[mesh.halfedge_edges]) * self.shrink
+        points = unfold(refined.flat, disk.faces) * self.shrink
         return LaidOut(
             mesh=mesh,
             face_origin=refined.face_origin,
@@ -218,7 +214,7 @@ def _lengths_missed(
     if choices.kept is None or not solved.doubled:
         return ()
     sides = mesh.edge_halfedges[mesh.is_boundary_edge & choices.kept[mesh.edges].all(axis=1), 0]
-    flat = straight_triangles(solved.triangulation, solved.flips, len(mesh.faces))
+    flat = solved.straight()
     off = np.abs(np.abs(flat.sides[sides]) / lengths.ravel()[sides] - 1)
     missed = int(np.count_nonzero(off > LENGTH_TOLERANCE))
     if not missed:

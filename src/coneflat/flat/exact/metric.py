@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..._arrays import BoolArray, FloatArray, IntArray
-from ...errors import CurvatureError
+from ..._arrays import BoolArray, FloatArray, IntArray, as_floats
+from ...errors import ArrayShapeError, CurvatureError, NonFiniteError
 from ...geometry.intrinsic import IntrinsicTriangulation, double, intrinsic_triangulation
+from ...geometry.lengths import check_lengths
+from ...geometry.straight import FlatTriangles, straight_triangles
 from ...geometry.triangles import double_areas
 from ...mesh import TriangleMesh
+from ...text import list_some, plural
 from .newton import ConformalProblem, State, find_scale
 from .preconditioner import Inverse
 
@@ -55,15 +59,20 @@ class ExactMetric:
         """The number of flips during the solve."""
         return len(self.flips) - self.euclidean_flips
 
+    def straight(self) -> FlatTriangles:
+        """Return the input's m triangles with straight sides in the metric, which `unfold` lays out."""
+        count = self.triangulation.face_count
+        return straight_triangles(self.triangulation, self.flips, count // 2 if self.doubled else count)
+
 
 def exact_metric(
     mesh: TriangleMesh,
-    lengths: FloatArray,
-    target: FloatArray,
+    lengths: ArrayLike,
+    target: ArrayLike,
     *,
-    fixed: BoolArray | None = None,
-    fixed_log_scale: FloatArray | float = 0.0,
-    start: FloatArray | None = None,
+    fixed: ArrayLike | None = None,
+    fixed_log_scale: ArrayLike = 0.0,
+    start: ArrayLike | None = None,
     preconditioner: Inverse | None = None,
     tolerance: float = 1e-10,
     delaunay: bool = True,
@@ -73,9 +82,10 @@ def exact_metric(
     """Return the metric l_ij exp((phi_i + phi_j) / 2) whose curvature is the target.
 
     Args:
-        mesh: the mesh.
-        lengths: (m, 3) side lengths, model units; the triangles must have area.
-        target: (n,) curvature in radians; not used at fixed vertices.
+        mesh: the mesh, such as `check_mesh(vertices, faces).mesh`.
+        lengths: (m, 3) side lengths, column i opposite corner i, model units: those of `edge_lengths`, or any others
+            whose triangles have area.
+        target: (n,) curvature in radians, or one number for all vertices; not used at fixed vertices.
         fixed: (n,) True for vertices whose log scale is given and whose curvature comes out: cones with
             phi = 0, a free boundary. None: all curvatures are prescribed, and phi, then known up to a
             constant, is chosen to keep the total area.
@@ -93,8 +103,10 @@ def exact_metric(
             (`coneflat.flat.ricci.PackingProblem`).
 
     Raises:
+        ArrayShapeError, NonFiniteError: arrays do not fit the mesh, or lengths are not finite.
+        LengthError: the lengths make no triangles with area, or differ between the two sides of an edge.
         CurvatureError: a target is 2 pi or more inside, pi or more on the boundary, or the targets of a
-            component without fixed vertices miss Gauss-Bonnet.
+            component without fixed vertices do not sum to 2 pi times its Euler characteristic.
 
     Notes:
         Springborn, Schroeder, Pinkall, "Conformal equivalence of triangle meshes", 2008, with the flips of
@@ -104,11 +116,14 @@ def exact_metric(
         boundary to flip, too: where the solution has broken triangles there, the surface is glued to its
         mirror image and solved again.
     """
-    n = len(mesh.vertices)
-    fixed = np.zeros(n, dtype=bool) if fixed is None else np.asarray(fixed, dtype=bool)
-    target, pinned = checked_target(mesh, np.asarray(target, dtype=np.float64), fixed)
-    log_scale = np.zeros(n) if start is None else np.array(start, dtype=np.float64)
-    log_scale[fixed] = np.broadcast_to(np.asarray(fixed_log_scale, dtype=np.float64), (n,))[fixed]
+    lengths, n = check_lengths(mesh, lengths), len(mesh.vertices)
+    fixed = np.zeros(n, dtype=bool) if fixed is None else _per_vertex("fixed", fixed, n).astype(bool)
+    target, pinned = checked_target(mesh, _per_vertex("target", target, n), fixed)
+    log_scale = np.zeros(n) if start is None else _per_vertex("start", start, n).copy()
+    log_scale[fixed] = _per_vertex("fixed_log_scale", fixed_log_scale, n)[fixed]
+    bad = np.flatnonzero(fixed & ~np.isfinite(log_scale))
+    if len(bad):
+        raise NonFiniteError(f"fixed_log_scale is NaN or infinite at {_at(bad)}")
 
     plain = np.where(fixed, log_scale, 0.0)
     if not np.ptp(log_scale) <= WIDEST_RANGE:
@@ -152,6 +167,20 @@ def exact_metric(
     if pinned.any():
         state.place = _keep_area(mesh, lengths, problem, state.place, original)
     return _finish(problem, state, n, euclidean, steps, tolerance, doubled)
+
+
+def _per_vertex(name: str, values: ArrayLike, count: int) -> FloatArray:
+    """Return (n,) values, or one number for all; raises ArrayShapeError if they are none."""
+    array = as_floats(name, values)
+    if array.shape not in ((), (count,)):
+        raise ArrayShapeError(
+            f"{name} must have the shape {(count,)}, a number for each vertex, not {array.shape}"
+        )
+    return np.broadcast_to(array, (count,))
+
+
+def _at(vertices: IntArray) -> str:
+    return f"{plural(len(vertices), 'vertex', 'vertices')}: {list_some(vertices)}"
 
 
 def _is_solved(state: State, tolerance: float) -> bool:
@@ -218,6 +247,9 @@ def _finish(
 
 def checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> tuple[FloatArray, BoolArray]:
     """Return a target that satisfies Gauss-Bonnet to rounding, and a pinned vertex a component, if needed."""
+    bad = np.flatnonzero(~fixed & ~np.isfinite(target))
+    if len(bad):
+        raise CurvatureError(f"the target curvature is NaN or infinite at {_at(bad)}")
     on_boundary = mesh.is_boundary_vertex
     for where, limit, name, place in (
         (~on_boundary, 2 * np.pi, "2 pi", "inside"),
