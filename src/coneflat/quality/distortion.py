@@ -15,6 +15,7 @@ from ..errors import ArrayShapeError
 from ..geometry.charts import both_sides, joined_edges, label_charts
 from ..geometry.lengths import check_lengths
 from ..geometry.overlap import Overlaps, find_overlaps
+from ..geometry.straight import place_triangles
 from ..mesh import TriangleMesh
 from ..threads import meanwhile
 
