@@ -13,7 +13,7 @@ import threading
 import numpy as np
 import pytest
 import shapes
-from coneflat.apps.cli.given import parse_angle, parse_curvature, parse_vertices
+from coneflat.apps.cli.values import parse_angle, parse_curvature, read_vertex_map
 
 from coneflat import errors, read_mesh
 
@@ -176,7 +176,7 @@ def test_what_is_no_angle_is_said_once():
 
 def test_cones_named_twice():
     with pytest.raises(errors.OptionError, match="vertex 4 is given as a cone twice"):
-        parse_vertices("cone", ["4", "4:pi"])
+        read_vertex_map("--cones", "cone", ["4", "4:pi"])
 
 
 def test_nonmanifold_is_refused_and_repaired(tmp_path):

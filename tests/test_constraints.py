@@ -197,7 +197,7 @@ def test_the_linear_metric_takes_the_cones_of_the_search():
         ({"cones": [1, 2, 3], "required_cones": [5]}, "required_cones is an option"),
         ({"required_cones": {1: 0.5}}, "without curvatures"),
         ({"min_cone_angle": "pi/2"}, "min_cone_angle must be a number"),
-        ({"quantum": True}, "quantum must be a number"),
+        ({"quantise": True}, "quantise must be a number"),
         ({"positive_only": "no"}, "True or False"),
         ({"weights": np.full(162, np.nan)}, "finite"),
         ({"solver": "gauss"}, "unknown solver"),

@@ -106,12 +106,12 @@ def test_measured_rotations_of_a_cut_square():
 @pytest.mark.parametrize(
     ("options", "kind", "message"),
     [
-        ({"quantum": 0}, errors.OptionError, "quantum must be from 0.0001 radians"),
-        ({"quantum": 1.0}, errors.CurvatureError, "no multiple"),
-        ({"quantum": QUARTER, "cones": "greedy"}, errors.OptionError, "pursuit"),
-        ({"correct_handles": True}, errors.OptionError, "quantum"),
+        ({"quantise": 0}, errors.OptionError, "quantum must be from 0.0001 radians"),
+        ({"quantise": 1.0}, errors.CurvatureError, "no multiple"),
+        ({"quantise": QUARTER, "cones": "greedy"}, errors.OptionError, "pursuit"),
+        ({"correct_handles": True}, errors.OptionError, "give quantise"),
         (
-            {"quantum": QUARTER, "correct_handles": True, "method": "linear"},
+            {"quantise": QUARTER, "correct_handles": True, "method": "linear"},
             errors.OptionError,
             "method 'exact' only",
         ),

@@ -8,7 +8,7 @@ from scipy.sparse import csc_matrix, diags
 from coneflat import errors, flatten
 from coneflat.apps.cli.main import cli
 from coneflat.geometry import cotangent_laplacian, cotangents, edge_lengths
-from coneflat.options import SOLVERS as SOLVER_NAMES
+from coneflat.options.declared import SOLVERS as SOLVER_NAMES
 from coneflat.solver import available, factorize, pardiso, solving
 from coneflat.solver.back_ends import HUGE, LARGE, MODULES, best_for
 
