@@ -5,6 +5,8 @@ import pytest
 import shapes
 
 from coneflat import TriangleMesh, check_mesh
+from coneflat._arrays import unit_exponent
+from coneflat.geometry.charts import joined_edges, label_charts, point_seams, uv_seams
 from coneflat.mesh import corner_fans
 
 CASES = [
@@ -57,3 +59,33 @@ def test_fans_are_the_vertices_of_the_glued_surface():
 def test_orientation_of_shapes_is_consistent():
     for shape, _, _ in CASES:
         assert check_mesh(*shape).notes == ()
+
+
+def test_the_walk_around_a_boundary_passes_every_side_once_and_goes_on_where_it_came():
+    mesh = TriangleMesh(*shapes.hill(7, 5))
+    walk = mesh.boundary_walk()
+    np.testing.assert_array_equal(mesh.heads[walk], np.roll(mesh.tails[walk], -1))
+    np.testing.assert_array_equal(np.sort(mesh.halfedge_edges[walk]), np.flatnonzero(mesh.is_boundary_edge))
+    # With the mesh to the left: the walk is that of its triangles.
+    corners = mesh.vertices[mesh.tails[walk], :2] @ [1, 1j]
+    assert (np.conj(corners) * np.roll(corners, -1)).imag.sum() > 0
+
+
+def test_seams_are_where_sides_have_different_points_and_charts_what_is_left_between():
+    mesh = TriangleMesh(*shapes.grid(4, 3))
+    columns = np.minimum((3.999 * mesh.vertices[mesh.faces].mean(axis=1)[:, 0]).astype(int), 3)
+    corners = mesh.faces + len(mesh.vertices) * (columns // 2)[:, None]
+    seams = point_seams(mesh, corners)
+    np.testing.assert_allclose(mesh.vertices[mesh.edges[seams]][..., 0], 0.5)
+    assert len(seams) == 3
+    uv = mesh.vertices[mesh.faces][..., :2] + 1e-9 + 2.0 * (columns // 2)[:, None, None]
+    np.testing.assert_array_equal(uv_seams(mesh, uv), seams)
+    count, chart = label_charts(mesh, joined_edges(mesh, uv))
+    assert count == 2
+    np.testing.assert_array_equal(chart, chart[0] ^ (columns // 2 != columns[0] // 2))
+
+
+@pytest.mark.parametrize("value", [1.0, -1.0, 0.75, 3e-310, 1e300, 0.5 - 2.0**-54])
+def test_by_its_exponent_a_value_is_brought_to_between_a_half_and_one(value):
+    scaled = np.ldexp(value, -unit_exponent(np.array([value, value / 3])))
+    assert 0.5 <= abs(scaled) < 1

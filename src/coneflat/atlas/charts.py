@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import BoolArray, FloatArray, IntArray, as_floats
-from ..compiled import compiled
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
+from ..geometry.outline import cancel_sides
 from ..mesh import NEXT
 
 # Of the area, relative to the square of the extent: less is a line, but for rounding.
@@ -145,9 +145,9 @@ def find_outlines(
         flipped: (m,) True for triangles upside down.
         chart: (m,) chart of each triangle, below `count`. Every chart has a triangle.
     """
-    corners = corners + 0.0  # no -0.0: it has other bits
-    corners[flipped] = corners[flipped][:, [0, 2, 1]]
-    kept = _uncancelled(corners, chart).reshape(-1, 3)
+    corners = np.where(flipped[:, None], corners[:, [0, 2, 1]], corners)
+    same, balance = cancel_sides(corners, chart)
+    kept = (balance[same] != 0).reshape(-1, 3)
     # A chart all of whose sides cancel has no area: all its sides stand for it.
     kept |= (np.bincount(chart, weights=kept.any(axis=1), minlength=count) == 0)[chart][:, None]
     triangle, corner = np.nonzero(kept)
@@ -155,71 +155,3 @@ def find_outlines(
     triangle, corner = triangle[order], corner[order]
     sides = np.stack([corners[triangle, corner], corners[triangle, NEXT[corner]]], axis=1)
     return Outlines(sides, np.searchsorted(chart[triangle], np.arange(count + 1)))
-
-
-def _uncancelled(corners: NDArray[np.complex128], chart: IntArray) -> BoolArray:
-    """Return (3m,) False for sides that run as often there as back between their ends, all in one chart."""
-    table = np.full(2 ** int(np.ceil(np.log2(2 * corners.size))), -1, dtype=np.int32)
-    same, balance = np.empty((2, corners.size), dtype=np.int32)
-    match_sides(np.ascontiguousarray(corners).view(np.uint64).reshape(-1, 2), chart, table, same, balance)
-    kept: BoolArray = balance[same] != 0
-    return kept
-
-
-@compiled
-def match_sides(
-    bits: NDArray[np.uint64],
-    chart: IntArray,
-    table: NDArray[np.int32],
-    same: NDArray[np.int32],
-    balance: NDArray[np.int32],
-) -> None:
-    """Find the sides of a chart that have the same ends, by a table of the sides seen so far.
-
-    Args:
-        bits: (3m, 2) of the coordinates of the triangle corners. Side i runs from corner i to the next.
-        chart: (m,) chart of each triangle.
-        table: 2^p numbers, at least twice as many as sides, all -1; overwritten.
-        same: (3m,) filled: the first side with the same ends, in either order.
-        balance: (3m,) filled: of each such side, how often it is there as it runs less how often against it.
-    """
-    mask = np.uint64(len(table) - 1)
-    for side in range(len(bits)):
-        start, end = side, side - side % 3 + (side + 1) % 3
-        # The hash must not depend on the order of the ends.
-        key = _mixed(_hash(bits[start]) + _hash(bits[end]) + np.uint64(chart[side // 3]))
-        balance[side] = 0
-        while True:
-            slot = np.int64(key & mask)
-            other = table[slot]
-            if other < 0:
-                table[slot] = other = side
-            other_start, other_end = other, other - other % 3 + (other + 1) % 3
-            if chart[other // 3] == chart[side // 3]:
-                if _equal(bits, start, other_start) and _equal(bits, end, other_end):
-                    same[side] = other
-                    balance[other] += 1
-                    break
-                if _equal(bits, start, other_end) and _equal(bits, end, other_start):
-                    same[side] = other
-                    balance[other] -= 1
-                    break
-            key += np.uint64(1)
-
-
-@compiled
-def _equal(bits: NDArray[np.uint64], one: int, two: int) -> bool:
-    return bool(bits[one, 0] == bits[two, 0] and bits[one, 1] == bits[two, 1])
-
-
-@compiled
-def _hash(point: NDArray[np.uint64]) -> np.uint64:
-    return _mixed(_mixed(point[0]) + point[1])
-
-
-@compiled
-def _mixed(bits: np.uint64) -> np.uint64:
-    """Return 64 bits, each of which depends on all given: products with odd numbers carry up, shifts carry down."""
-    bits = (bits ^ (bits >> np.uint64(32))) * np.uint64(0x9E3779B97F4A7C15)
-    bits = (bits ^ (bits >> np.uint64(29))) * np.uint64(0xD6E8FEB86659FD93)
-    return bits ^ (bits >> np.uint64(32))

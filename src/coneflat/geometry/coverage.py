@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
-from ..mesh import NEXT, sort_pairs
+from ..mesh import NEXT
+from .outline import cancel_sides
 
 # Crossings of horizontal lines with sides that are sorted at a time, to bound the memory.
 AT_A_TIME = 2_000_000
@@ -74,16 +75,11 @@ def _cross(one: FloatArray, two: FloatArray) -> FloatArray:
 def _outline(corners: FloatArray) -> IntArray:
     """Return (m, 3) how often the side from each corner is in the outline, those with the same ends added up.
 
-    One side of each number of equal ones stands for all: positive as it runs, negative if it runs against it.
+    The first of equal ones stands for all: positive as it runs, negative if it runs against it.
     """
-    _, ends = np.unique(corners.reshape(-1, 2) @ np.array([1, 1j]), return_inverse=True)
-    tails, heads = ends, ends.reshape(-1, 3)[:, NEXT].ravel()
-    order, first = sort_pairs(tails, heads, len(ends))
-    signs = np.where(tails < heads, 1, -1)
-    sides = order[first]
-    steps = np.zeros(len(ends), dtype=np.int64)
-    steps[sides] = np.add.reduceat(signs[order], np.flatnonzero(first)) * signs[sides]
-    return steps.reshape(-1, 3)
+    places = corners @ np.array([1, 1j])
+    same, balance = cancel_sides(places, np.zeros(len(places), dtype=np.int64))
+    return np.where(same == np.arange(len(same)), balance, 0).astype(np.int64).reshape(-1, 3)
 
 
 def _crossings(corners: FloatArray, on_outline: BoolArray, pairs: IntArray) -> FloatArray:

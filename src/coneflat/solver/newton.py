@@ -63,6 +63,7 @@ class Limits:
         steps: Newton steps at most.
         goal: gradient below which nothing is left to gain but rounding.
         halvings: of a step, at most.
+        halvings_below: the same once the gradient is below the tolerance.
         largest_step: largest change of a variable in one step.
         least_change: part of the gradient that a step must change; less is a slope without an end.
     """
@@ -71,6 +72,7 @@ class Limits:
     steps: int
     goal: float
     halvings: int
+    halvings_below: int = 0
     largest_step: float = np.inf
     least_change: float = 0.0
 
@@ -96,7 +98,8 @@ def minimise(function: Convex[P], start: P, limits: Limits) -> tuple[P, int]:
             break
         if not is_reached and np.abs(step).max() <= ROUNDING * np.abs(here.place).max():
             break
-        found = _search_line(function, here, step, best.largest, 0 if is_reached else limits.halvings, limits)
+        halvings = limits.halvings_below if is_reached else limits.halvings
+        found = _search_line(function, here, step, best.largest, halvings, limits.largest_step)
         if found is None:
             if is_exact or is_reached:
                 break
@@ -116,13 +119,13 @@ def minimise(function: Convex[P], start: P, limits: Limits) -> tuple[P, int]:
 
 
 def _search_line(
-    function: Convex[P], here: P, step: FloatArray, least: float, halvings: int, limits: Limits
+    function: Convex[P], here: P, step: FloatArray, least: float, halvings: int, largest_step: float
 ) -> P | None:
     """Return the first point accepted; None if there is none."""
     reach = float(np.abs(step).max(initial=0.0))
     if not np.isfinite(reach) or reach == 0.0:
         return None
-    length = min(1.0, limits.largest_step / reach)
+    length = min(1.0, largest_step / reach)
     for _ in range(halvings + 1):
         place = here.place + length * step
         if np.array_equal(place, here.place):  # shorter than rounding

@@ -25,7 +25,7 @@ TOLERANCE = 1e-10
 ROUNDS, MAX_STEPS = 4, 40
 # When to stop: rounding of a sum of some angles, radians; halvings after which a step is taken for rounding; and part
 # of the gradient that a step must change, as where there is no solution the function falls without an end.
-LIMITS = Limits(TOLERANCE, MAX_STEPS, goal=1e-12, halvings=40, least_change=1e-6)
+LIMITS = Limits(TOLERANCE, MAX_STEPS, goal=1e-12, halvings=40, halvings_below=40, least_change=1e-6)
 # Damping of a step, relative to its residual, where rank is wanting.
 DAMPING, LARGEST_DAMPING, LEAST_DAMPING = 1e-5, 1e-6, 1e-13
 

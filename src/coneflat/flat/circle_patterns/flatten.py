@@ -136,7 +136,15 @@ SETTLED, MOST_STEPS, PART = 1e-5, 60, 0.9
 HALVINGS = 30
 # When to stop: rounding of a sum of some angles, radians; halvings after which a step is taken for rounding; largest
 # change of a log radius in one step; and part of the gradient that a step must change.
-LIMITS = Limits(RADII_TOLERANCE, MAX_STEPS, goal=1e-12, halvings=40, largest_step=5.0, least_change=1e-6)
+LIMITS = Limits(
+    RADII_TOLERANCE,
+    MAX_STEPS,
+    goal=1e-12,
+    halvings=40,
+    halvings_below=40,
+    largest_step=5.0,
+    least_change=1e-6,
+)
 # By how much log radii may differ: squares of lengths, whose logs lie half as far from 0 each way, are to be finite.
 LARGEST_SPREAD = 600.0
 

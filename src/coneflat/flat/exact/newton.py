@@ -186,7 +186,9 @@ def find_scale(
     if not start.is_admissible:
         start = problem.evaluate(np.where(problem.fixed, log_scale, 0.0))
     halvings = HALVINGS_BOUNDED if problem.is_bounded else HALVINGS
-    best, steps = minimise(problem, start, Limits(tolerance, max_steps, GOAL, halvings, LARGEST_STEP))
+    best, steps = minimise(
+        problem, start, Limits(tolerance, max_steps, GOAL, halvings, largest_step=LARGEST_STEP)
+    )
     return best if best is problem.last else problem.evaluate(best.place), steps
 
 
