@@ -1,4 +1,7 @@
-"""Reading glTF and GLB scenes."""
+"""Reading glTF and GLB scenes as one mesh, with the way back to their parts.
+
+Ours, since libraries give a scene's meshes without saying which corner became which.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""What a glTF scene shows: its triangle primitives, once for every node."""
+"""What a glTF scene shows: its triangle primitives, once for every node.
+
+Ours, since a writer must know of each triangle which node, mesh and primitive it came from.
+"""
 
 from __future__ import annotations
 
