@@ -41,10 +41,12 @@ class GltfScene:
     Attributes:
         data: the file.
         parts: whose corners are those of the mesh, one after the other.
+        blocks: where the vertices of each node begin, and where the last end; only within a node may they be merged.
     """
 
     data: GltfData
     parts: tuple[ScenePart, ...]
+    blocks: tuple[int, ...]
 
 
 def shown_nodes(data: GltfData) -> Iterator[tuple[int, FloatArray]]:
