@@ -12,7 +12,7 @@ from bars import cut_bar, read_bar
 import coneflat
 from coneflat.errors import MeshFileError, UnknownFormatError
 from coneflat.files import OUTPUT_FORMATS, atomic_write, check_output, write_flattening
-from coneflat.view.page.picture import read_picture
+from coneflat.files.texture import read_picture
 
 
 @pytest.fixture

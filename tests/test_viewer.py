@@ -17,11 +17,11 @@ from shapes import sphere
 
 import coneflat
 from coneflat.errors import ArrayShapeError, MeshError, MeshFileError, OptionError, UnknownFormatError
+from coneflat.files.texture import read_picture
 from coneflat.mesh import end_corners
 from coneflat.view import colours
 from coneflat.view.figures.raster import rasterise
 from coneflat.view.page.content import content_of, outline_halfedges
-from coneflat.view.page.picture import read_picture
 from coneflat.view.page.webpage import MOST_IN_NOTEBOOK, SHOWS, notebook_html, open_page, page_of
 from coneflat.view.quantity import ColorScale
 

@@ -11,7 +11,7 @@ import shapes
 from coneflat import flatten
 from coneflat.atlas.touch import snap_apart
 from coneflat.errors import MeshFileError
-from coneflat.files.polygons import merge_convex
+from coneflat.files.convex_pieces import merge_convex
 from coneflat.files.write import write_measured
 from coneflat.files.written import stored_in_glb
 from coneflat.geometry.overlap import find_overlaps

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
 from ..errors import EmptyMeshError, FaceIndexError, MeshFileError
-from ..input.mesh_file import COLOURS
+from ..input.mesh_file import COLOURS, MeshFile
 from ..input.polygons import first_bad_corner
-from .raw import NO_UV, RawMesh, offsets_of
+from .raw import NO_UV, offsets_of
 from .text import Growing, TextBlock, newline_of, text_blocks
 
 _OTHER, _VERTEX, _FACE, _TEXTURE, _NORMAL, _ELEMENT, _COMMENTED_FACE = range(7)
@@ -56,7 +56,7 @@ class ObjText:
     newline: bytes
 
 
-def parse_obj(path: Path, content: bytes) -> RawMesh:
+def parse_obj(path: Path, content: bytes) -> MeshFile:
     """Return the mesh of an OBJ file.
 
     The weight w behind the coordinates is not used; it survives in the text.
@@ -108,7 +108,8 @@ def parse_obj(path: Path, content: bytes) -> RawMesh:
         if len(known):
             known.add(np.full(len(corners) - len(known), none))
     has_colours = len(colours) == len(vertices)
-    mesh = RawMesh(
+    mesh = MeshFile(
+        path,
         vertices=vertices.done(),
         corners=corners.done(),
         offsets=offsets_of(sizes.done()),
@@ -182,7 +183,7 @@ def _texts(block: TextBlock, kinds: NDArray[np.uint8], newline: bytes) -> Iterat
         yield int(polygons[runs[i]]), text
 
 
-def _check_corners(path: Path, content: bytes, mesh: RawMesh) -> None:
+def _check_corners(path: Path, content: bytes, mesh: MeshFile) -> None:
     """Raise FaceIndexError for the first corner that names no vertex, or no UV point."""
     c = first_bad_corner(mesh.corners, len(mesh.vertices))
     if c is not None:

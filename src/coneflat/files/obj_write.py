@@ -12,8 +12,8 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
+from .convex_pieces import find_pieces
 from .obj import ObjText
-from .polygons import find_pieces
 
 if TYPE_CHECKING:
     from ..result.flattening import Flattening

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from .._arrays import IntArray
 from ..errors import MeshFileError
-from .raw import RawMesh, offsets_of
+from ..input.mesh_file import MeshFile
+from .raw import offsets_of
 from .text import Growing, TextBlock, text_blocks
 
 # Normals follow the position, then colours and texture coordinates, so that these can be passed over; "4" and "n"
@@ -24,7 +26,7 @@ def is_off(content: bytes) -> bool:
     return _HEADER.match(next((line for _, line, _ in _filled_lines(content[:4096])), b"")) is not None
 
 
-def parse_off(path: Path, content: bytes) -> RawMesh:
+def parse_off(path: Path, content: bytes) -> MeshFile:
     """Return the mesh of an OFF file: OFF, COFF, NOFF, STOFF and their combinations, in text.
 
     Raises:
@@ -51,10 +53,10 @@ def parse_off(path: Path, content: bytes) -> RawMesh:
     if lines < vertex_count + face_count:
         held = lines - vertex_count
         raise MeshFileError(f"{path} ends after {held} of the {face_count} faces it promises")
-    mesh = RawMesh(vertices.done(), corners.done(), offsets_of(sizes.done()))
+    mesh = MeshFile(path, vertices.done(), corners.done(), offsets_of(sizes.done()))
     if len(normals) < vertex_count or not vertex_count:
         return mesh
-    return mesh._replace(normals=normals.done(), normal=mesh.corners)
+    return replace(mesh, normals=normals.done(), normal=mesh.corners)
 
 
 def _polygons(block: TextBlock, rows: IntArray) -> tuple[IntArray, IntArray]:

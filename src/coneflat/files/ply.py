@@ -16,8 +16,8 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..errors import EmptyMeshError, MeshFileError
-from ..input.mesh_file import COLOURS
-from .raw import NO_UV, RawMesh, offsets_of
+from ..input.mesh_file import COLOURS, MeshFile
+from .raw import NO_UV, offsets_of
 from .text import Growing, text_blocks
 
 _TYPES = {
@@ -64,7 +64,7 @@ class _Element:
         ]
 
 
-def parse_ply(path: Path, content: bytes) -> RawMesh:
+def parse_ply(path: Path, content: bytes) -> MeshFile:
     """Return the mesh of a PLY file.
 
     Raises:
@@ -104,7 +104,8 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
     normals = None
     if all(name in properties for name in _NORMAL):
         normals = np.stack([properties[name] for name in _NORMAL], axis=1)
-    mesh = RawMesh(
+    mesh = MeshFile(
+        path,
         vertices,
         polygons[1],
         offsets_of(polygons[0]),
@@ -113,10 +114,10 @@ def parse_ply(path: Path, content: bytes) -> RawMesh:
         normal=None if normals is None else polygons[1],
     )
     if corner_uv is not None and len(corner_uv[1]):
-        return mesh._replace(texture=corner_uv[0], uv=corner_uv[1])
+        return replace(mesh, texture=corner_uv[0], uv=corner_uv[1])
     for pair in _VERTEX_UV:
         if all(name in properties for name in pair):
-            return mesh._replace(texture=mesh.corners, uv=np.stack([properties[n] for n in pair], axis=1))
+            return replace(mesh, texture=mesh.corners, uv=np.stack([properties[n] for n in pair], axis=1))
     return mesh
 
 

@@ -1,25 +1,18 @@
-"""What every reader returns, and the errors they share."""
+"""The content of files, and what all readers check of a mesh."""
 
 from __future__ import annotations
 
 import os
 import stat
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import IntArray
 from ..errors import ConeflatError, EmptyMeshError, FaceIndexError, MeshFileError
+from ..input.mesh_file import MeshFile
 from ..input.polygons import first_bad_corner
-
-if TYPE_CHECKING:
-    from .gltf.scene import GltfScene
-    from .obj import ObjText
-
 
 #: Instead of the number of a UV point: the corner has none.
 NO_UV = -1
@@ -27,25 +20,6 @@ NO_UV = -1
 
 #: Stands for standard input, and for standard output.
 PIPE = Path("-")
-
-
-class RawMesh(NamedTuple):
-    """The content of a mesh file: (n, 3) vertices, (c,) corners, (p + 1,) offsets, and what else `MeshFile` has of it.
-
-    blocks: (b + 1,) where blocks of vertices begin and the last ends; only within a block may they be merged.
-    """
-
-    vertices: FloatArray
-    corners: IntArray
-    offsets: IntArray
-    obj: ObjText | None = None
-    properties: Mapping[str, FloatArray] = MappingProxyType({})
-    texture: IntArray | None = None
-    uv: FloatArray | None = None
-    normals: FloatArray | None = None
-    normal: IntArray | None = None
-    scene: GltfScene | None = None
-    blocks: IntArray | None = None
 
 
 def read_bytes(path: Path) -> bytes:
@@ -100,7 +74,7 @@ def read_input() -> bytes:
     return content
 
 
-def check_corners(path: Path, mesh: RawMesh) -> None:
+def check_corners(path: Path, mesh: MeshFile) -> None:
     """Refuse a mesh without vertices or faces, with a face of fewer than 3 corners, or a bad index.
 
     Raises:

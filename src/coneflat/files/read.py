@@ -23,10 +23,10 @@ from .normals import usable_normals
 from .obj import parse_obj
 from .off import is_off, parse_off
 from .ply import parse_ply
-from .raw import PIPE, RawMesh, check_corners, read_bytes, read_input
+from .raw import PIPE, check_corners, read_bytes, read_input
 from .stl import is_stl, parse_stl
 
-_READERS: dict[str, Callable[[Path, bytes], RawMesh]] = {
+_READERS: dict[str, Callable[[Path, bytes], MeshFile]] = {
     ".obj": parse_obj,
     ".ply": parse_ply,
     ".stl": parse_stl,
@@ -115,22 +115,8 @@ def read_mesh_from(
     normal = None
     if mesh.normals is not None and mesh.normal is not None:
         normal = usable_normals(mesh.normals, mesh.normal)
-    whole = MeshFile(
-        path,
-        mesh.vertices,
-        mesh.corners,
-        mesh.offsets,
-        obj=mesh.obj,
-        properties=mesh.properties,
-        texture=mesh.texture,
-        uv=mesh.uv,
-        normals=None if normal is None else mesh.normals,
-        normal=normal,
-        scene=mesh.scene,
-    )
-    if not (ending in _WELDED_BY_DEFAULT if weld is None else weld):
-        return whole
-    return _welded(whole, [0, len(whole.vertices)] if mesh.blocks is None else mesh.blocks.tolist())
+    mesh = replace(mesh, normals=None if normal is None else mesh.normals, normal=normal)
+    return _welded(mesh) if (ending in _WELDED_BY_DEFAULT if weld is None else weld) else mesh
 
 
 def format_of(content: bytes) -> str:
@@ -147,8 +133,9 @@ def format_of(content: bytes) -> str:
     return ".off" if is_off(content) else ".obj"
 
 
-def _welded(mesh: MeshFile, blocks: list[int]) -> MeshFile:
-    """Return a mesh with vertices at the same position merged, of each block for itself."""
+def _welded(mesh: MeshFile) -> MeshFile:
+    """Return a mesh with vertices at the same position merged, those of each node of a scene for themselves."""
+    blocks = (0, len(mesh.vertices)) if mesh.scene is None else mesh.scene.blocks
     kept, merged, count = [], [], 0
     for begin, end in pairwise(blocks):
         first, number = weld_vertices(mesh.vertices[begin:end])

@@ -9,7 +9,8 @@ import numpy as np
 
 from .._arrays import FloatArray
 from ..errors import EmptyMeshError, MeshFileError
-from .raw import RawMesh, triangle_offsets
+from ..input.mesh_file import MeshFile
+from .raw import triangle_offsets
 from .text import Growing, text_blocks
 
 _HEADER_BYTES = 84
@@ -24,7 +25,7 @@ def is_stl(content: bytes) -> bool:
     return len(content) == _HEADER_BYTES + promised * _TRIANGLE.itemsize
 
 
-def parse_stl(path: Path, content: bytes) -> RawMesh:
+def parse_stl(path: Path, content: bytes) -> MeshFile:
     """Return the triangles of an STL file, three vertices each.
 
     Raises:
@@ -47,7 +48,7 @@ def parse_stl(path: Path, content: bytes) -> RawMesh:
         raise MeshFileError(f"{path} is not an STL file: it is shorter than the header of one")
     if not len(points):
         raise EmptyMeshError(f"{path} has no faces")
-    return RawMesh(points, np.arange(len(points), dtype=np.int64), triangle_offsets(len(points) // 3))
+    return MeshFile(path, points, np.arange(len(points), dtype=np.int64), triangle_offsets(len(points) // 3))
 
 
 def _text_points(path: Path, content: bytes) -> FloatArray:

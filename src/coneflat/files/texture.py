@@ -1,4 +1,4 @@
-"""Images that GLB files carry as textures."""
+"""Images that GLB files carry as textures, and pages as pictures."""
 
 from __future__ import annotations
 
@@ -24,6 +24,16 @@ IMAGE_SIDE = 2048
 
 EMBEDDED = {"PNG": "image/png", "JPEG": "image/jpeg"}
 """The formats that glTF knows, and their names there."""
+
+MOST_BYTES = 32 * 2**20
+"""A page with a picture that has more is slow to open."""
+
+_BEGINNINGS = {
+    b"\x89PNG\r\n\x1a\n": "image/png",
+    b"\xff\xd8\xff": "image/jpeg",
+    b"GIF8": "image/gif",
+    b"\xabKTX 20\xbb\r\n\x1a\n": "image/ktx2",
+}
 
 
 class Texture(NamedTuple):
@@ -64,6 +74,30 @@ def find_texture(texture: str | PathLike[str], result: Flattening | None = None)
         # Whatever a damaged file makes Pillow do, the caller sees one kind of error.
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise MeshFileError(f"{path} is not a readable image: {reason}") from error
+
+
+def image_kind(content: bytes) -> str | None:
+    """Return the media type of an image, of those that GLB files or pages can have, by how it begins; else None."""
+    if content[:4] == b"RIFF" and content[8:12] == b"WEBP":
+        return "image/webp"
+    return next((kind for beginning, kind in _BEGINNINGS.items() if content.startswith(beginning)), None)
+
+
+def read_picture(path: str | PathLike[str]) -> Texture:
+    """Return a PNG, JPEG, GIF or WebP file as it is: browsers read them. The content counts, not the ending.
+
+    Raises:
+        MeshFileError: it cannot be read, is no such picture, or is too large.
+    """
+    path = as_path(path)
+    content = read_bytes(path)
+    kind = image_kind(content)
+    if kind is None or kind == "image/ktx2":
+        raise MeshFileError(f"{path} is no PNG, JPEG, GIF or WebP picture")
+    if len(content) > MOST_BYTES:
+        size = f"{len(content) / 2**20:.0f} MiB; a page takes up to {MOST_BYTES / 2**20:.0f}"
+        raise MeshFileError(f"the picture {path} has {size}")
+    return Texture(content, kind)
 
 
 def _checkerboard(result: Flattening, image: Any) -> Texture:

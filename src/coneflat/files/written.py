@@ -14,8 +14,8 @@ from ..errors import MeshFileError
 from ..input.polygons import polygon_of
 from ..result.promises import DOUBLE, SINGLE, remeasured
 from ..text import plural
+from .convex_pieces import find_pieces
 from .gltf.scene_write import scene_losses
-from .polygons import find_pieces
 
 if TYPE_CHECKING:
     from ..result.flattening import Flattening

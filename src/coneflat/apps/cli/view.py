@@ -60,7 +60,7 @@ def view(
       coneflat view horse.npz -o horse.html --show qc
       coneflat view hand.obj -o hand.html --texture leather.jpg
     """
-    from ...view.page.picture import read_picture
+    from ...files.texture import read_picture
     from ...view.page.webpage import check_page, open_page, page_of, write_page
     from .console import Console
     from .run import FLATTENED, open_result

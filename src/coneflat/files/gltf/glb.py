@@ -1,8 +1,7 @@
 """A GLB on its way: its JSON, and its one buffer in pieces.
 
-An own writer, since a scene that was read is written again with all that was not flattened as it was, under the same
-numbers; libraries take a scene apart and make another one of it. Names and numbers are those of the glTF 2.0
-specification (Khronos).
+Ours, since a scene that was read is written with all else under the numbers that it had. Names and numbers are those of
+the glTF 2.0 specification (Khronos).
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Which arrays the rest of a glTF tree names, beyond what the mesh is made of."""
+"""Which arrays the rest of a glTF tree names, beyond what the mesh is made of.
+
+Ours, since what is written keeps all that, extensions included, and must not carry along what nothing names any more.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Reading glTF and GLB scenes."""
+"""Reading glTF and GLB scenes as one mesh, with the way back to their parts.
+
+Ours, since libraries give a scene's meshes without saying which corner became which.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,9 @@ import numpy as np
 
 from ..._arrays import FloatArray, IntArray
 from ...errors import EmptyMeshError
+from ...input.mesh_file import MeshFile
 from ...input.weld import weld
-from ..raw import RawMesh, triangle_offsets
+from ..raw import triangle_offsets
 from .data import GltfData
 from .names import check_references
 from .scene import DRACO, GltfScene, ScenePart, shown_nodes, triangle_corners
@@ -21,7 +25,7 @@ MOST_CORNERS = 10_000_000
 MOST_CORNERS_PER_BYTE = 8
 
 
-def parse_gltf(path: Path, content: bytes) -> RawMesh:
+def parse_gltf(path: Path, content: bytes) -> MeshFile:
     """Return all triangle meshes of the scene as one, in scene coordinates.
 
     A mesh that several nodes show is there as often as it is shown. Lines and points are left out. What a skeleton or
@@ -95,7 +99,7 @@ class _Reading:
         if self._count > self._blocks[-1]:
             self._blocks.append(self._count)
 
-    def done(self) -> RawMesh:
+    def done(self) -> MeshFile:
         """Return the mesh.
 
         Raises:
@@ -106,7 +110,8 @@ class _Reading:
             raise EmptyMeshError(f"{self.data.path} has no faces: its scene shows no triangle")
         uv, texture = self._uvs.numbered()
         normals, normal = self._normals.numbered()
-        return RawMesh(
+        return MeshFile(
+            self.data.path,
             np.concatenate(self._vertices),
             corners,
             triangle_offsets(len(corners) // 3),
@@ -115,8 +120,7 @@ class _Reading:
             uv=None if uv is None else uv * [1, -1] + [0, 1],
             normals=normals,
             normal=normal,
-            scene=GltfScene(self.data, tuple(self._parts)),
-            blocks=np.array(self._blocks),
+            scene=GltfScene(self.data, tuple(self._parts), tuple(self._blocks)),
         )
 
     def _check_copied(self, primitive: dict[str, Any], count: int) -> None:

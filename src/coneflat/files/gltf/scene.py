@@ -1,4 +1,7 @@
-"""What a glTF scene shows: its triangle primitives, once for every node."""
+"""What a glTF scene shows: its triangle primitives, once for every node.
+
+Ours, since a writer must know of each triangle which node, mesh and primitive it came from.
+"""
 
 from __future__ import annotations
 
@@ -38,10 +41,12 @@ class GltfScene:
     Attributes:
         data: the file.
         parts: whose corners are those of the mesh, one after the other.
+        blocks: where the vertices of each node begin, and where the last end; only within a node may they be merged.
     """
 
     data: GltfData
     parts: tuple[ScenePart, ...]
+    blocks: tuple[int, ...]
 
 
 def shown_nodes(data: GltfData) -> Iterator[tuple[int, FloatArray]]:

@@ -1,4 +1,8 @@
-"""Writing GLB: the scene of the glTF file that a mesh was read from, with new UVs."""
+"""Writing the scene of the glTF file that a mesh was read from, with new UVs and all else as it was.
+
+What stays keeps its number in the lists of the JSON, so that extensions, animations and skins that this package knows
+nothing of go on naming what they named. That is why the file is not taken apart and built anew, as libraries do.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,7 @@ from ...errors import ConeflatError
 from ...text import plural
 from ..obj_write import moved_path
 from ..raw import read_bytes
-from ..texture import Texture
+from ..texture import Texture, image_kind
 from .data import COMPRESSED, GltfData
 from .glb import FOR_INDICES, FOR_VERTICES, Glb, bounds
 from .names import accessors_named, keys_of, view_owners, views_named
@@ -27,13 +31,6 @@ if TYPE_CHECKING:
 UV = "TEXCOORD_0"
 #: What an array of some elements has of the whole one.
 _KEPT = ("componentType", "type", "normalized", "name", "extras")
-#: How files of images that glTF knows begin, and what they are called.
-_IMAGES = {
-    b"\x89PNG\r\n\x1a\n": "image/png",
-    b"\xff\xd8\xff": "image/jpeg",
-    b"RIFF": "image/webp",
-    b"\xabKTX 20\xbb\r\n\x1a\n": "image/ktx2",
-}
 
 
 def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: Texture | None) -> Glb:
@@ -207,8 +204,8 @@ def _embed_images(glb: Glb, data: GltfData, folder: Path) -> None:
             content = read_bytes(data.beside(uri))
         except ConeflatError:
             content = b""
-        kind = next((kind for head, kind in _IMAGES.items() if content.startswith(head)), None)
-        if kind is None:
+        kind = image_kind(content)
+        if kind is None or kind == "image/gif":  # glTF knows no GIF
             old, new = (os.path.realpath(place) for place in (data.path.parent, folder))
             image["uri"] = quote(moved_path(os.fsencode(unquote(uri)), old, new))
             continue

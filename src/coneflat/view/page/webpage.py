@@ -17,10 +17,10 @@ import numpy as np
 
 from ...errors import OptionError
 from ...files.atomic import as_path, atomic_write, check_target, known_ending
+from ...files.texture import read_picture
 from ...text import shown
 from .content import content_of
 from .payload import payload_of
-from .picture import read_picture
 
 if TYPE_CHECKING:
     from ...result.flattening import Flattening
