@@ -1,4 +1,4 @@
-"""The house: which rooms there are, and who imports whom; `tools/remake.py` puts a drawing of it into the documentation.
+"""The house: which rooms there are, and who imports whom; `tools/remake.py` draws it for the documentation.
 
 Rooms stand on floors. A file imports from its own floor and from those below.
 """

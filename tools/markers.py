@@ -1,7 +1,7 @@
 """What stands between markers in the documentation: comments that neither a site nor a forge shows.
 
-A block stands between `<!-- name -->` and `<!-- /name -->`, where only the first word of a name is repeated at its end:
-`<!-- table gallery -->` ends with `<!-- /table -->`. A number in a sentence or a cell stands between `<!-- n what -->` and
+A block stands between `<!-- name -->` and `<!-- /name -->`; only the first word of a name is repeated at its end, as in
+`<!-- table gallery -->` and `<!-- /table -->`. A number in a sentence or a cell stands between `<!-- n what -->` and
 `<!-- /n -->`.
 """
 

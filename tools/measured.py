@@ -1,8 +1,9 @@
 """The numbers of the documentation, measured.
 
-A number in a sentence names itself: `<!-- n bunny charts=one qc_mean .3f -->` is a model, options of `coneflat.flatten` if
-there are any, a key of the report, and how it is written. Tables are functions below, `<!-- table gallery -->` say. Where
-a model is not there its numbers stay as they are; times and what other packages do stay always, unless they are asked for.
+A number in a sentence names itself: `<!-- n bunny charts=one qc_mean .3f -->` is a model, options of
+`coneflat.flatten` if there are any, a key of the report, and how it is written. Tables are functions below, `<!-- table gallery -->` say.
+Where a model is not there its numbers stay as they are; what other packages do stays always, and so do times, unless
+they are asked for.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ sys.path.insert(0, str(ROOT / "tests"))
 import shapes
 
 README = (
-    "sample", "fandisk", "rocker-arm", "hand", "bunny", "3holes", "face", "camelhead", "kitten", "horse", "stanford-bunny",
+    "sample", "fandisk", "rocker-arm", "hand", "bunny", "3holes", "face", "camelhead", "kitten", "horse",
+    "stanford-bunny",
 )  # fmt: skip
 GALLERY = (
     "3holes", "bunny", "camelhead", "elephant", "face", "fandisk", "hand", "horse", "kitten", "rocker-arm",
@@ -74,7 +76,7 @@ class Measured:
 
     def has(self, *models: str) -> bool:
         """Whether all of some models are there."""
-        return all([self.path(model) is not None for model in models])
+        return None not in [self.path(model) for model in models]
 
     def flattening(self, model: str) -> coneflat.Flattening:
         """Return a model flattened with all defaults, which pictures and numbers share."""
@@ -190,8 +192,8 @@ def quality_table(measured: Measured, body: str) -> str:
             f"{measured.seconds(model):.2f}" if measured.times else seconds,
         ]
     headings = (
-        "model | triangles | cones | charts | angle sums | seam mismatch | flipped | QC distortion | seam length, √area | "
-        "time, s"
+        "model | triangles | cones | charts | angle sums | seam mismatch | flipped | QC distortion | "
+        "seam length, √area | time, s"
     )
     return _table(headings, list(_each(README, body, made)))
 
@@ -247,7 +249,7 @@ TRADEOFF = {
 
 
 def tradeoff(measured: Measured) -> np.ndarray | None:
-    """Return (a, models, k) what each area distortion allowed makes of models in one chart; None if some are missing."""
+    """Return (a, models, k) what each area distortion allowed makes of models in one chart, or None."""
     if not measured.has(*TRADED):
         return None
     rows = [
@@ -354,7 +356,10 @@ def atlases_table(measured: Measured, body: str) -> str:
             ", ".join([*(format(value, form.replace("d", ".1f")) for value in values), *cell.split(", ")[2:]])
             for values, form, cell in zip(means, keys.values(), was["mean"][2:], strict=True)
         ]
-    headings = "model | triangles | charts: coneflat, with more cones, xatlas, uvunwrap | seam length | QC distortion | packed"
+    headings = (
+        "model | triangles | charts: coneflat, with more cones, xatlas, uvunwrap | seam length | "
+        "QC distortion | packed"
+    )
     return _table(headings, [*rows, mean])
 
 

@@ -1,8 +1,8 @@
 """Remake what the documentation shows of the program: `python tools/remake.py`.
 
-Its parts are the tables of options, the drawing of the house, the numbers, the times and the pictures; `--only options,house`
-takes some of them, and `--check` changes nothing and fails where something is out of date. Times are those of this machine,
-and so no part of the whole: `--only times` measures them.
+Its parts are the tables of options, the drawing of the house, the numbers, the times and the pictures. Some of them:
+`--only options,house`. `--check` changes nothing, and fails where something is out of date. Times are those of this
+machine, and so no part of the whole: `--only times` measures them.
 """
 
 from __future__ import annotations
