@@ -1,15 +1,14 @@
 """The numbers of the documentation, measured.
 
 A number in a sentence names itself: `<!-- n bunny charts=one qc_mean .3f -->` is a model, options of
-`coneflat.flatten` if there are any, a key of the report, and how it is written. Tables are functions below, `<!-- table gallery -->` say.
-Where a model is not there its numbers stay as they are; what other packages do stays always, and so do times, unless
-they are asked for.
+`coneflat.flatten` if there are any, a key of the report, and how it is written. Tables are functions below,
+`<!-- table gallery -->` say. Where a model is not there its numbers stay as they are. So do times, which are those of a
+machine, and what other packages do: they are measured by `benchmarks/`.
 """
 
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -49,15 +48,10 @@ Rows = dict[str, list[str]]
 
 
 class Measured:
-    """Reports of models, each made once.
+    """Reports of models, each made once."""
 
-    Attributes:
-        times: whether times are measured, too.
-    """
-
-    def __init__(self, models: Path, *, times: bool = False) -> None:
+    def __init__(self, models: Path) -> None:
         """Look for models in a folder; the sample and a bumpy sphere are there in any case."""
-        self.times = times
         self._folder = models
         self._reports: dict[str, Report | None] = {}
         self._defaults: dict[str, coneflat.Flattening] = {}
@@ -108,16 +102,6 @@ class Measured:
             print(f"  {model} by {len(methods)} methods", flush=True)
             self._comparisons[key] = compare_methods(self.path(model), methods=methods, peers=())
         return self._comparisons[key]
-
-    def seconds(self, model: str) -> float:
-        """Return the least wall time of three flattenings with all defaults."""
-        path, times = self.path(model), []
-        mesh = coneflat.read_mesh(path)
-        for _ in range(3):
-            start = time.perf_counter()
-            coneflat.flatten(mesh)
-            times.append(time.perf_counter() - start)
-        return min(times)
 
 
 def fill_page(text: str, measured: Measured) -> str:
@@ -172,14 +156,10 @@ def _each(models: tuple[str, ...], body: str, made: Mapping[str, list[str] | Non
 
 def quality_table(measured: Measured, body: str) -> str:
     """Return how good the defaults are."""
-    was, made = _rows_of(body), dict[str, list[str] | None]()
+    made = dict[str, list[str] | None]()
     for model in README:
         report = measured.report(model)
-        if report is None:
-            made[model] = None
-            continue
-        seconds = was[model][-1] if model in was else ""
-        made[model] = [
+        made[model] = report and [
             model,
             f"{report['triangles']:,}",
             f"{report['cones']}",
@@ -189,11 +169,10 @@ def quality_table(measured: Measured, body: str) -> str:
             f"{report['flipped']}",
             f"{report['qc_mean']:.4f}",
             f"{report['seam_length']:.2f}",
-            f"{measured.seconds(model):.2f}" if measured.times else seconds,
         ]
     headings = (
         "model | triangles | cones | charts | angle sums | seam mismatch | flipped | QC distortion | "
-        "seam length, √area | time, s"
+        "seam length, √area"
     )
     return _table(headings, list(_each(README, body, made)))
 
@@ -292,7 +271,7 @@ def methods_table(measured: Measured, body: str) -> str:
     rows = []
     for name in names:
         found = np.array([_compared(comparison, name) for comparison in comparisons])
-        error, _, _, flipped, _, mismatch, seconds = found.T
+        error, _, _, flipped, _, mismatch = found.T
         qc, std, overlap = found[:, [1, 2, 4]].mean(axis=0)
         rows.append(
             [
@@ -303,7 +282,7 @@ def methods_table(measured: Measured, body: str) -> str:
                 f"{flipped.sum():.0f}",
                 f"{overlap:.1%}",
                 _brief(np.median(mismatch)),
-                f"{seconds.mean():.1f}" if measured.times or name not in was else was[name][-1],
+                was[name][-1],
             ]
         )
     return _table(
@@ -312,7 +291,7 @@ def methods_table(measured: Measured, body: str) -> str:
 
 
 def _compared(comparison: Comparison, name: str) -> list[float]:
-    entry, first = comparison[name], comparison["exact"]
+    entry = comparison[name]
     if entry.result is None:
         raise SystemExit(f"{name} on {comparison.name}: {entry.note}")
     d = entry.result.distortion
@@ -323,7 +302,6 @@ def _compared(comparison: Comparison, name: str) -> list[float]:
         d.flipped + d.degenerate,
         d.overlap,
         d.seam_mismatch_max,
-        entry.seconds / first.seconds,
     ]
 
 

@@ -1,8 +1,8 @@
 """Remake what the documentation shows of the program: `python tools/remake.py`.
 
-Its parts are the tables of options, the drawing of the house, the numbers, the times and the pictures. Some of them:
-`--only options,house`. `--check` changes nothing, and fails where something is out of date. Times are those of this
-machine, and so no part of the whole: `--only times` measures them.
+Its parts are the tables of options, the drawing of the house, the numbers and the pictures. `--only options,house`
+takes some of them. `--check` changes nothing, and fails where something is out of date. Times are those of a machine, and
+are measured by `benchmarks/`.
 """
 
 from __future__ import annotations
@@ -34,21 +34,16 @@ def remake_house(_: argparse.Namespace) -> Iterator[tuple[Path, str]]:
     yield DOCS / "images" / "house.svg", draw_house()
 
 
-def remake_numbers(arguments: argparse.Namespace, times: bool = False) -> Iterator[tuple[Path, str]]:
+def remake_numbers(arguments: argparse.Namespace) -> Iterator[tuple[Path, str]]:
     """Yield the pages with their numbers."""
     from measured import Measured, fill_page
 
-    measured = arguments.measured = Measured(arguments.models, times=times)
+    measured = arguments.measured = Measured(arguments.models)
     for page in PAGES:
         fill_page(
             page.read_text(encoding="utf-8"), measured
         )  # takes its time, in which the page may be edited
         yield page, fill_page(page.read_text(encoding="utf-8"), measured)
-
-
-def remake_times(arguments: argparse.Namespace) -> Iterator[tuple[Path, str]]:
-    """Yield the pages with their numbers, times among them."""
-    yield from remake_numbers(arguments, times=True)
 
 
 def remake_pictures(arguments: argparse.Namespace) -> Iterator[tuple[Path, str]]:
@@ -65,7 +60,6 @@ PARTS: dict[str, Callable[[argparse.Namespace], Iterator[tuple[Path, str]]]] = {
     "options": remake_options,
     "house": remake_house,
     "numbers": remake_numbers,
-    "times": remake_times,
     "pictures": remake_pictures,
 }
 
@@ -82,7 +76,7 @@ def main() -> int:
         "--check", action="store_true", help="change nothing, and fail where something differs"
     )
     arguments = parser.parse_args()
-    parts = arguments.only.split(",") if arguments.only else [part for part in PARTS if part != "times"]
+    parts = arguments.only.split(",") if arguments.only else list(PARTS)
     unknown = [part for part in parts if part not in PARTS]
     if unknown:
         parser.error(f"no part {unknown[0]!r}: choose from {', '.join(PARTS)}")
