@@ -1,8 +1,8 @@
 """Remake what the documentation shows of the program: `python tools/remake.py`.
 
 Its parts are the tables of options, the drawing of the house, the numbers and the pictures. `--only options,house`
-takes some of them. `--check` changes nothing, and fails where something is out of date. Times are those of a machine, and
-are measured by `benchmarks/`.
+takes some of them. `--check` changes nothing, and fails where something is out of date. Times are those of a machine,
+and are measured by `benchmarks/`.
 """
 
 from __future__ import annotations
