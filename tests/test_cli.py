@@ -13,9 +13,9 @@ import threading
 import numpy as np
 import pytest
 import shapes
-from coneflat.apps.cli.values import parse_angle, parse_curvature, read_vertex_map
 
 from coneflat import errors, read_mesh
+from coneflat.apps.cli.values import parse_angle, parse_curvature, read_vertex_map
 
 #: A line of progress, which comes by the clock.
 PROGRESS = re.compile(r" *\d+\.\d s +\d+%  .*")

@@ -1,17 +1,32 @@
-"""Every Python example in the documentation runs, and what it prints of itself is true."""
+"""Every example in the documentation runs; the options, files and modules that it names are there."""
 
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
+import click
 import pytest
 
 import coneflat
 from coneflat.apps.cli.main import cli
 
-ROOT = Path(__file__).resolve().parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
+from house import PACKAGE
+from markers import ROOT
+
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("**/*.md"))]
+#: A flag, not a part of a word or of a line.
+FLAG = re.compile(r"(?<![\w-])--[a-z]+(?:-[a-z]+)*")
+HELP = {"--help", "--version"}
+
+
+def flags(command: click.Command) -> set[str]:
+    return HELP | {flag for p in command.params for flag in (*p.opts, *p.secondary_opts)}
+
+
+ALL_FLAGS = set().union(*map(flags, cli.commands.values()))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -22,7 +37,7 @@ def test_examples_run(page, tmp_path, monkeypatch):
         exec(compile(block, str(page), "exec"), names)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "CHANGELOG.md"], ids=lambda page: page.name)
 def test_links_lead_somewhere(page):
     for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
         assert (page.parent / target).exists(), target
@@ -31,6 +46,38 @@ def test_links_lead_somewhere(page):
 def test_readme_gives_the_shape_of_the_sample():
     result = coneflat.flatten(coneflat.sample_path(), max_cones=20)
     assert f"{result.corner_uv.shape}" in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def unknown_flags(text: str) -> list[str]:
+    """Return the flags in a page's code that nothing has: no command, and no script of ours."""
+    blocks = re.findall(r"```.*?\n(.*?)```", text, re.DOTALL)
+    code = [line for block in blocks for line in block.splitlines()]
+    code += re.findall(r"`([^`\n]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
+    unknown = []
+    for line in code:
+        for part in re.split(r"&&|\|\||[|;#](?= )", line):
+            script = re.search(r"python (\S+\.py)", part)
+            command = re.search(r"coneflat ([a-z]+)", part)
+            known = ALL_FLAGS | HELP
+            if script:
+                known = set(FLAG.findall((ROOT / script[1]).read_text(encoding="utf-8")))
+            elif command and command[1] in cli.commands:
+                known = flags(cli.commands[command[1]])
+            unknown += [f"{flag} in {line.strip()!r}" for flag in FLAG.findall(part) if flag not in known]
+    return unknown
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_flags_exist(page):
+    assert not unknown_flags(page.read_text(encoding="utf-8"))
+
+
+def test_flags_that_do_not_exist_are_found():
+    text = "`--nowhere`, `--eye`\n```sh\nconeflat flatten a.obj --eye x | cat\nconeflat figure a.obj --eye x\n```\n"
+    assert unknown_flags(text) == [
+        "--eye in 'coneflat flatten a.obj --eye x | cat'",
+        "--nowhere in '--nowhere'",
+    ]
 
 
 def test_every_option_is_described():
@@ -44,3 +91,19 @@ def test_every_option_is_described():
         for parameter in command.params:
             if name in pages and parameter.param_type_name == "option":
                 assert any(f"{option}" in pages[name] for option in parameter.opts), parameter.name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_modules_exist(page):
+    """What is named as `coneflat.room.file.name` can be imported; what is named as `room/file.py` is there."""
+    text = page.read_text(encoding="utf-8")
+    for dotted in set(re.findall(r"(?<![\w./-])coneflat((?:\.[A-Za-z_]\w*)+)", text)):
+        value = coneflat
+        for name in dotted[1:].split("."):
+            path = getattr(value, "__path__", None)
+            if path is not None and not hasattr(value, name):
+                __import__(f"{value.__name__}.{name}")
+            assert hasattr(value, name), f"coneflat{dotted}"
+            value = getattr(value, name)
+    for path in set(re.findall(r"`((?:\w+/)+(?:\w+\.py)?)`", text)):
+        assert any((root / path).exists() for root in (ROOT, PACKAGE)), path

@@ -1,10 +1,9 @@
-"""Take the pictures of the viewer for the documentation, in a Chromium: `python tools/screenshots.py MODEL`."""
+"""The pictures of the viewer, taken in a Chromium."""
 
 from __future__ import annotations
 
 import os
 import shutil
-import sys
 import tempfile
 from io import BytesIO
 from pathlib import Path
@@ -31,14 +30,17 @@ SHOTS = (
 )
 
 
-def main(model: Path) -> None:
-    """Flatten a model, and show it."""
-    result = coneflat.flatten(model, charts="atlas")
-    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+def browser_path() -> str | None:
+    """Return where a Chromium is, or None."""
+    return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+
+
+def take_screenshots(result: coneflat.Flattening) -> None:
+    """Show a flattening in the viewer, in four ways."""
     arguments = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
         page_path = result.view(Path(folder) / "page.html")
-        browser = driver.chromium.launch(executable_path=path, args=arguments)
+        browser = driver.chromium.launch(executable_path=browser_path(), args=arguments)
         for name, size, scheme, script in SHOTS:
             context = browser.new_context(viewport=size, color_scheme=scheme, reduced_motion="reduce")
             page = context.new_page()
@@ -50,7 +52,3 @@ def main(model: Path) -> None:
                 save_small(picture, name, dither=False)
             context.close()
         browser.close()
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1]))

@@ -1,0 +1,91 @@
+"""What the documentation says in tables, drawings and numbers is what the program says of itself."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
+from house import draw_house, rooms_drawn, rooms_of
+from markers import NUMBER, PAGES, ROOT, blocks, fill, fill_numbers
+from measured import TABLES, Measured, fill_page
+from remake import remake_options
+
+SAYS = "python tools/remake.py remakes it"
+
+
+def test_tables_of_options_are_those_declared():
+    for page, text in remake_options():
+        assert page.read_text(encoding="utf-8") == text, f"{page.name} is out of date: {SAYS}"
+
+
+def test_the_drawing_shows_the_house():
+    drawing = (ROOT / "docs" / "images" / "house.svg").read_text(encoding="utf-8")
+    assert rooms_drawn(drawing) == [[room.name for room in floor] for floor in rooms_of()], (
+        f"house.svg: {SAYS}"
+    )
+
+
+def numbers_in(text: str) -> list[float]:
+    return [float(word.replace(",", "")) for word in re.findall(r"[-+]?\d[\d,]*\.?\d*(?:e[-+]?\d+)?", text)]
+
+
+def test_numbers_of_the_sample_are_those_of_today():
+    """Counts exactly, what is measured to a hundredth; what is rounding stays rounding."""
+    from measured import Measured, fill_page
+
+    measured = Measured(ROOT / "no models")
+    for page in (ROOT / "README.md", ROOT / "docs" / "index.md", ROOT / "docs" / "python.md"):
+        text = page.read_text(encoding="utf-8")
+        made = fill_page(text, measured)
+        for old, new in zip(text.splitlines(), made.splitlines(), strict=True):
+            for was, now in zip(numbers_in(old), numbers_in(new), strict=True):
+                same = was == now if now == int(now) and now else abs(was - now) <= 0.01 * abs(now)
+                assert same or max(abs(was), abs(now)) < 1e-10, f"{page.name}: {old!r} is {new!r} now"
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert "| sample |" in readme
+    assert any(match["what"].startswith("sample ") for match in NUMBER.finditer(readme))
+
+
+def test_what_stands_between_markers_is_filled():
+    page = "a\n\n<!-- table x -->\n\nold\n\n<!-- /table -->\n\n<!-- table y -->\n<!-- /table -->\n"
+    filled = fill(page, "table x", "new")
+    assert filled == page.replace("old", "new")
+    assert list(blocks(filled, "table")) == [("table x", "new"), ("table y", "")]
+    assert fill(filled, "table x", "new") == filled
+    with pytest.raises(KeyError, match="there is no <!-- table z -->"):
+        fill(page, "table z", "")
+    cell = "| <!-- n hand cones -->14<!-- /n --> |"
+    assert fill_numbers(cell, lambda what, was: f"{what} {was}") == cell.replace("14", "hand cones 14")
+
+
+def test_numbers_of_models_that_are_not_there_stay(tmp_path, capsys):
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        of_sample = "sample" in "".join(body for _, body in blocks(text, "table")) or "<!-- n sample" in text
+        if not of_sample and "table atlases" not in text:  # of which a sphere is part
+            assert fill_page(text, Measured(tmp_path)) == text
+    assert "is not in" in capsys.readouterr().out
+
+
+def test_names_of_tables_and_numbers_are_known():
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        assert {name.split()[1] for name, _ in blocks(text, "table")} <= set(TABLES)
+        for match in NUMBER.finditer(text):
+            assert re.search(r"\d", match["value"]), match["what"]
+
+
+def test_a_house_is_drawn_from_imports(tmp_path):
+    (tmp_path / "errors.py").write_text('"""All that goes wrong."""\n')
+    (tmp_path / "mesh.py").write_text('"""Meshes."""\n\nfrom . import errors\n')
+    floors = [floor for floor in rooms_of(tmp_path) if floor]
+    assert [[room.name for room in floor] for floor in floors] == [["errors"], ["mesh"]]
+    (mesh,) = floors[1]
+    assert (mesh.files, mesh.lines, mesh.below) == (1, 3, {"errors"})
+    drawing = draw_house(tmp_path)
+    assert rooms_drawn(drawing) == [["errors"], ["mesh"]]
+    assert drawing.count("marker-end") == 1

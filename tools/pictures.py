@@ -1,0 +1,300 @@
+"""The pictures of the documentation, from the same flattenings as its numbers."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from fnmatch import fnmatch
+from functools import partial
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from markers import ROOT
+from measured import ALLOWED, GALLERY, TRADED, TRADEOFF, Measured, tradeoff
+from palette import IMAGES, save_figure_small, save_small
+from PIL import Image
+from scipy.sparse import csr_matrix, identity
+
+import coneflat
+from coneflat.apps.compare.pictures import draw_layouts
+from coneflat.geometry.operators import vertex_areas
+from coneflat.options import METHODS
+from coneflat.view import demo_figure, new_figure
+from coneflat.view.figures.camera import view_aspect
+from coneflat.view.figures.compose import Panel, Row, compose
+from coneflat.view.figures.cone_marks import mark_handles
+from coneflat.view.figures.model import draw_quantity
+from coneflat.view.figures.uv_layout import layout_aspect
+from coneflat.view.quantity import ColorScale, Quantity, curvature
+
+sys.path.insert(0, str(ROOT / "tests"))
+import shapes
+
+DPI = 170.0
+GALLERY_DPI = 110.0
+SIDE = 2.6  # inches of a panel of an atlas
+
+#: How to look at the models that all kinds of figures are shown of.
+LOOKS: dict[str, dict[str, Any]] = {
+    "fandisk": {"up": "x", "eyes": ["right-front", "left-back"]},
+    "bunny": {"eyes": ["front-right", "back-left"]},
+    "horse": {"up": "z", "eyes": ["right-back", "left-front"]},
+}
+KINDS = ("layout", "checker", "quality", "cones", "curvature")
+#: The kinds that show one view, for two would be small.
+SINGLE = ("quality", "curvature")
+#: How to look at those of the gallery: what is up, and two eyes.
+SIGHTS = dict.fromkeys(GALLERY, ("y", "front-right", "back-left")) | {
+    "3holes": ("y", "front-top", "back-right"),
+    "face": ("y", "front-right", "front-left"),
+    "fandisk": ("x", "right-front", "left-back"),
+    "horse": ("z", "right-back", "left-front"),
+}
+#: Models with their layouts below, and what is up.
+ATLAS_MODELS = {"bunny": "y", "hand": "y", "horse": "z", "rocker-arm": "y", "kitten": "y"}
+#: Shapes that people complain about: title, mesh and options.
+SHAPES: dict[str, tuple[Any, dict[str, Any]]] = {
+    "cylinder of 8 sides": (shapes.cylinder(8, 1), {}),
+    "cylinder of 96 sides": (shapes.cylinder(96, 40), {}),
+    "the same closed, sharp edges cut": (shapes.cylinder(96, 40, caps=True), {"sharp_angle": 1.0}),
+    "annulus": ((shapes.annulus()[0] * [1, 1, 0], shapes.annulus()[1]), {}),
+    "box": (shapes.box(6), {}),
+    "torus": (shapes.torus(), {}),
+    "bottle with a hole": (shapes.bottle(), {}),
+    "the same, sharp edges cut": (shapes.bottle(), {"sharp_angle": 1.0}),
+}
+
+
+def draw_pictures(measured: Measured, names: list[str]) -> None:
+    """Draw the pictures whose names match; those whose models are not there are left, which is said."""
+    for name, (models, draw) in PICTURES.items():
+        if any(fnmatch(name, pattern) for pattern in names) and measured.has(*models):
+            save_figure_small(draw(measured), name)
+    if any(fnmatch("convergence", pattern) for pattern in names):
+        _draw_convergence()
+    if any(fnmatch("viewer", pattern) for pattern in names):
+        _take_screenshots(measured)
+
+
+def _draw_convergence() -> None:
+    path = IMAGES / "convergence.png"
+    subprocess.run(
+        [sys.executable, ROOT / "benchmarks" / "convergence.py", "-o", path],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
+    with Image.open(path) as picture:
+        save_small(picture.copy(), path.stem, dither=False)
+
+
+def _take_screenshots(measured: Measured) -> None:
+    """Take the pictures of the viewer, where there is a browser."""
+    if find_spec("playwright") is None:
+        print("playwright is not installed: the pictures of the viewer are left as they are")
+        return
+    from screenshots import browser_path, take_screenshots
+
+    if browser_path() is None:
+        print("there is no Chromium: the pictures of the viewer are left as they are")
+    elif measured.has("bunny"):
+        take_screenshots(measured.flattening("bunny"))
+
+
+def curvature_figure(measured: Measured) -> Any:
+    """Return a figure of what curvature a model has, and what the linear and the exact metric leave of it."""
+    linear = coneflat.flatten(measured.path("bunny"), **coneflat.PAPER)
+    exact = measured.flattening("bunny")
+    labels = ("On the model", "After the linear metric", "After the exact metric")
+    panels = [
+        Panel(
+            view_aspect(result.vertices), partial(coneflat.draw_curvature, result, flat=flat, dpi=DPI), label
+        )
+        for result, flat, label in zip((exact, linear, exact), (False, True, True), labels, strict=True)
+    ]
+    left = [
+        replace(curvature(result, True), label=f"|K| left, {name} metric")
+        for result, name in ((linear, "linear"), (exact, "exact"))
+    ]
+    return compose([Row(panels, left)], dpi=DPI, width=9.0)
+
+
+def quarters_figure(measured: Measured) -> Any:
+    """Return a figure of a model with a checkerboard: with any cones, and with cones of whole quarter turns."""
+    free = measured.flattening("bunny")
+    quarters = coneflat.flatten(measured.path("bunny"), quantise=np.pi / 2, correct_handles=True)
+    assert quarters.rotations is not None
+    off = f"{quarters.rotations.worst:.0e}"
+    labels = (
+        f"Any curvatures: {len(free.cones)} cones",
+        f"Multiples of a quarter turn, to {off} rad: {len(quarters.cones)} cones",
+    )
+    panels = [
+        Panel(
+            view_aspect(result.vertices), partial(coneflat.draw_checker, result, cones=True, dpi=DPI), label
+        )
+        for result, label in zip((free, quarters), labels, strict=True)
+    ]
+    return compose([Row(panels)], marks=mark_handles(free), dpi=DPI)
+
+
+def on_vertices(result: coneflat.Flattening, values: Any, colors: str, percent: float) -> Quantity:
+    """Return numbers at vertices, to be shown around 0; beyond the percentile of their amounts nothing changes."""
+    top = float(np.nanpercentile(np.abs(values), percent))
+    scale = ColorScale(-top, top, colors, "linear", ((-top, f"{-top:.2g}"), (0.0, "0"), (top, f"{top:.2g}")))
+    return Quantity("", values, np.isfinite(values) * 1.0, scale, ".2f", result.faces)
+
+
+def even_curvature(result: coneflat.Flattening, rounds: int = 4) -> Any:
+    """Return the curvature per area at the vertices, each the mean of what is around."""
+    faces, count = result.faces, len(result.vertices)
+    lengths = coneflat.edge_lengths(result.vertices, faces)
+    mesh = coneflat.TriangleMesh(result.vertices, faces)
+    curvature = coneflat.angle_defect(faces, coneflat.corner_angles(lengths), mesh.is_boundary_vertex)
+    area = vertex_areas(faces, lengths, count)
+    ends = faces[:, [0, 1, 2, 1, 2, 0]].ravel(), faces[:, [1, 2, 0, 0, 1, 2]].ravel()
+    around = identity(count) + csr_matrix((np.ones(len(ends[0])), ends), shape=(count, count))
+    for _ in range(rounds):
+        curvature, area = around @ curvature, around @ area
+    return curvature / area
+
+
+def steps_figure(measured: Measured) -> Any:
+    """Return a figure of the steps from a model to its texture."""
+    result = measured.flattening("bunny")
+    eye, look = "front-right", {"dpi": DPI}
+
+    def draw(quantity: Quantity, axes: Any) -> None:
+        draw_quantity(axes, result, quantity, eye, "y", DPI)
+
+    curved = on_vertices(result, even_curvature(result), "RdGy_r", 95)
+    scaled = on_vertices(result, result.log_scale - np.nanmean(result.log_scale), "PuOr_r", 99)
+
+    def draw_dots(axes: Any) -> None:
+        bare = replace(result, seams=np.empty((0, 2), dtype=np.int64))
+        coneflat.draw_cones(bare, axes, eye=eye, **look)
+
+    aspect = view_aspect(result.vertices, eye)
+    model = [
+        (partial(draw, curved), "1  Curvature of the model"),
+        (draw_dots, f"2  Cones that are to carry it: {len(result.cones)}"),
+        (partial(draw, scaled), "3  Metric: scaled to be flat"),
+        (partial(coneflat.draw_cones, result, eye=eye, **look), "4  Cut through the cones"),
+    ]
+    panels = [Panel(aspect, drawn, label) for drawn, label in model]
+    panels += [
+        Panel(
+            aspect,
+            partial(coneflat.draw_layout, result, edges=False, crop=True),
+            "5  Layout of the flat metric",
+        ),
+        Panel(
+            aspect, partial(coneflat.draw_checker, result, eye=eye, **look), "6  What it puts on the model"
+        ),
+    ]
+    return compose([Row(panels[:3]), Row(panels[3:])], dpi=DPI, marks=mark_handles(result))
+
+
+def gallery_figure(model: str, measured: Measured) -> Any:
+    """Return a figure of a model with a checkerboard from two sides, and of its layout."""
+    result, (up, *eyes) = measured.flattening(model), SIGHTS[model]
+    panels = [
+        Panel(
+            view_aspect(result.vertices, eye, up),
+            partial(coneflat.draw_checker, result, eye=eye, up=up, cones=True, dpi=GALLERY_DPI),
+        )
+        for eye in eyes
+    ]
+    layout = partial(coneflat.draw_layout, result, edges=False, color_charts=True, crop=True)
+    panels.append(Panel(layout_aspect(result, crop=True), layout))
+    return compose([Row(panels)], dpi=GALLERY_DPI, width=8.0)
+
+
+def kind_figure(model: str, kind: str, measured: Measured) -> Any:
+    """Return a figure of a kind."""
+    look = LOOKS[model]
+    eyes = look["eyes"][:1] if kind in SINGLE else look["eyes"]
+    return coneflat.make_figure(measured.flattening(model), kind, dpi=DPI, **{**look, "eyes": eyes})
+
+
+def curve_figure(model: str, measured: Measured) -> Any:
+    """Return a figure of the area distortion against the number of cones."""
+    return coneflat.make_figure(coneflat.cone_curve(measured.path(model)), "curve", dpi=DPI)
+
+
+def shapes_figure(_: Measured) -> Any:
+    """Return a figure of the layouts of all shapes."""
+    figure = new_figure(4 * SIDE, 2 * (SIDE + 0.35), dpi=GALLERY_DPI)
+    for index, (title, (mesh, options)) in enumerate(SHAPES.items()):
+        row, column = divmod(index, 4)
+        axes = figure.add_axes((column / 4 + 0.01, 0.5 * (1 - row) + 0.01, 0.23, 0.42))
+        coneflat.draw_layout(coneflat.flatten(*mesh, **options), axes)
+        axes.set_title(title, size=9)
+    return figure
+
+
+def atlases_figure(measured: Measured) -> Any:
+    """Return a figure of models with a checkerboard, and their layouts below."""
+    figure = new_figure(SIDE * len(ATLAS_MODELS), 2 * SIDE + 0.4, dpi=GALLERY_DPI)
+    for index, (model, up) in enumerate(ATLAS_MODELS.items()):
+        result = measured.flattening(model)
+        left, width = index / len(ATLAS_MODELS), 1 / len(ATLAS_MODELS)
+        axes = figure.add_axes((left, 0.5, width, 0.46))
+        coneflat.draw_checker(result, axes, up=up, cones=True, dpi=GALLERY_DPI)
+        coneflat.draw_layout(result, figure.add_axes((left + 0.01, 0.02, width - 0.02, 0.46)))
+        charts = result.distortion.charts
+        what = f"{model}: {len(result.cones)} cones, {charts} chart{'s'[: charts > 1]}"
+        figure.text(left + width / 2, 0.975, what, size=9, ha="center", va="center")
+    return figure
+
+
+def methods_figure(measured: Measured) -> Any:
+    """Return a figure of the layouts of one model by all methods."""
+    return draw_layouts(measured.comparison("rocker-arm", METHODS))
+
+
+#: What is drawn of the trade: the largest number shown for each.
+TOPS = {"cones": (0, 60), "qc_mean": (1, 1.15), "seam_length": (0, 8), "overlap": (0, 0.6)}
+
+
+def tradeoff_figure(measured: Measured) -> Any:
+    """Return a figure of what the number of cones does: a line per model, and the medians."""
+    found = tradeoff(measured)
+    assert found is not None
+    figure = new_figure(13.0, 3.6)
+    for k, (key, (low, high)) in enumerate(TOPS.items()):
+        factor = 100 if key == "overlap" else 1
+        values = factor * found[:, :, list(TRADEOFF).index(key)]
+        axes = figure.add_axes((0.05 + 0.245 * k, 0.15, 0.19, 0.72))
+        axes.plot(ALLOWED, values, color="#9db4c8", linewidth=0.8)
+        red = {"color": "#b0413e", "linewidth": 2.2, "marker": "o", "markersize": 4}
+        axes.plot(ALLOWED, np.median(values, axis=1), **red)
+        axes.axvline(0.2, color="#888888", linewidth=0.8, linestyle=":")
+        axes.set_xscale("log")
+        axes.set_xticks(ALLOWED, [f"{allowed:g}" for allowed in ALLOWED], fontsize=7)
+        axes.minorticks_off()
+        axes.invert_xaxis()
+        axes.set_ylim(factor * low, factor * high)
+        axes.set_title(TRADEOFF[key], fontsize=10)
+        axes.set_xlabel("area distortion E allowed", fontsize=9)
+        for side in ("top", "right"):
+            axes.spines[side].set_visible(False)
+    return figure
+
+
+#: Name of each picture, the models that it needs, and what draws it.
+PICTURES: dict[str, tuple[tuple[str, ...], Callable[[Measured], Any]]] = {
+    "sample": ((), lambda measured: demo_figure(measured.flattening("sample"))),
+    "atlas-shapes": ((), shapes_figure),
+    "curvature": (("bunny",), curvature_figure),
+    "quarters": (("bunny",), quarters_figure),
+    "steps": (("bunny",), steps_figure),
+    **{f"gallery-{model}": ((model,), partial(gallery_figure, model)) for model in GALLERY},
+    **{f"{model}-{kind}": ((model,), partial(kind_figure, model, kind)) for model in LOOKS for kind in KINDS},
+    **{f"{model}-curve": ((model,), partial(curve_figure, model)) for model in LOOKS},
+    "atlas-models": (tuple(ATLAS_MODELS), atlases_figure),
+    "methods": (("rocker-arm",), methods_figure),
+    "tradeoff": (TRADED, tradeoff_figure),
+}

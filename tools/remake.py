@@ -1,0 +1,98 @@
+"""Remake what the documentation shows of the program: `python tools/remake.py`.
+
+Its parts are the tables of options, the drawing of the house, the numbers and the pictures. `--only options,house`
+takes some of them. `--check` changes nothing, and fails where something is out of date. Times are those of a machine,
+and are measured by `benchmarks/`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from markers import PAGES, ROOT, fill
+
+DOCS = ROOT / "docs"
+MODELS = ROOT.parent / "shared" / "meshes"
+
+
+def remake_options(_: argparse.Namespace | None = None) -> Iterator[tuple[Path, str]]:
+    """Yield the pages with tables of options."""
+    from option_table import flag_tables, keyword_tables
+
+    tables = {"command-line.md": ("options", flag_tables), "python.md": ("keywords", keyword_tables)}
+    for page, (name, table) in tables.items():
+        yield DOCS / page, fill((DOCS / page).read_text(encoding="utf-8"), name, table())
+
+
+def remake_house(_: argparse.Namespace) -> Iterator[tuple[Path, str]]:
+    """Yield the drawing of the house."""
+    from house import draw_house
+
+    yield DOCS / "images" / "house.svg", draw_house()
+
+
+def remake_numbers(arguments: argparse.Namespace) -> Iterator[tuple[Path, str]]:
+    """Yield the pages with their numbers."""
+    from measured import Measured, fill_page
+
+    measured = arguments.measured = Measured(arguments.models)
+    for page in PAGES:
+        fill_page(
+            page.read_text(encoding="utf-8"), measured
+        )  # takes its time, in which the page may be edited
+        yield page, fill_page(page.read_text(encoding="utf-8"), measured)
+
+
+def remake_pictures(arguments: argparse.Namespace) -> Iterator[tuple[Path, str]]:
+    """Draw the pictures; no text changes."""
+    from measured import Measured
+    from pictures import draw_pictures
+
+    measured = getattr(arguments, "measured", None) or Measured(arguments.models)
+    draw_pictures(measured, arguments.pictures or ["*"])
+    yield from ()
+
+
+PARTS: dict[str, Callable[[argparse.Namespace], Iterator[tuple[Path, str]]]] = {
+    "options": remake_options,
+    "house": remake_house,
+    "numbers": remake_numbers,
+    "pictures": remake_pictures,
+}
+
+
+def main() -> int:
+    """Remake the parts that are asked for, and return the exit code."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--only", help=f"parts, with commas between, of {', '.join(PARTS)}")
+    parser.add_argument(
+        "--pictures", nargs="*", help="names of pictures as in docs/images, gallery-* say; all"
+    )
+    parser.add_argument("--models", type=Path, default=MODELS, help="the folder of models (%(default)s)")
+    parser.add_argument(
+        "--check", action="store_true", help="change nothing, and fail where something differs"
+    )
+    arguments = parser.parse_args()
+    parts = arguments.only.split(",") if arguments.only else list(PARTS)
+    unknown = [part for part in parts if part not in PARTS]
+    if unknown:
+        parser.error(f"no part {unknown[0]!r}: choose from {', '.join(PARTS)}")
+    differs = False
+    for part in parts:
+        if part == "pictures" and arguments.check:
+            continue
+        for page, text in PARTS[part](arguments):
+            if page.exists() and text == page.read_text(encoding="utf-8"):
+                continue
+            differs = True
+            print(f"{page.relative_to(ROOT)}: {part} {'differ' if arguments.check else 'remade'}", flush=True)
+            if not arguments.check:
+                page.write_text(text, encoding="utf-8")
+    return int(differs and arguments.check)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
