@@ -30,8 +30,8 @@ _NAMES = (
     "uv", "uv_faces", "vertices", "faces", "cones", "curvatures", "log_scale", "curvature_residual", "seams",
     "vertex_origin", "face_origin", "qc", "log_area_scale", "uv_scale", "report",
 )  # fmt: skip
-#: Archives of version 0.1.0 do not have these.
-_NEWER = ("prescribed",)
+#: Archives of version 0.1.0 do not have these, and only results of given lengths have lengths.
+_NEWER = ("prescribed", "lengths")
 #: Results are not packed; programs that pack them gain a factor of a few.
 _MOST_UNPACKED = 30
 
@@ -55,6 +55,8 @@ def write_npz(result: Flattening, stream: IO[bytes]) -> None:
         "uv_scale": np.float64(result.uv_scale),
         "report": np.array(json.dumps(result.report())),
     }
+    if result.lengths is not None:
+        arrays["lengths"] = result.lengths
     np.savez(stream, **arrays)
 
 
@@ -166,6 +168,7 @@ def _flattening(path: Path, arrays: dict[str, NDArray[Any]]) -> Flattening:
         # Vertices that a refinement added come from none.
         vertex_origin=reading.indices("vertex_origin", (n,), None, least=-1),
         face_origin=reading.indices("face_origin", (m,), None),
+        lengths=reading.floats("lengths", (m, 3)) if "lengths" in arrays else None,
     )
 
 

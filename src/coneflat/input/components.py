@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..errors import OptionError
 from ..geometry import edge_lengths, mollify
 from ..geometry.visibility import visible_share
 from ..mesh import TriangleMesh
@@ -19,7 +20,7 @@ from ..text import list_some, plural
 from .arrays import InputMesh, as_input
 from .constraints import Constraints, locate_constraints
 from .marked_edges import effective_marks, marked_edges, named_edges
-from .numbering import at_unit_size, turn_corners
+from .numbering import at_unit_size, lengths_of_input, turn_corners
 from .validation import CheckedMesh, check_mesh
 
 
@@ -57,6 +58,7 @@ class Prepared:
         notes: what was done to triangles without area, and which marks cut nothing.
         components: its connected parts, apart also where seams are marked.
         seams: (k, 2) vertices of the edges marked as seams.
+        own_lengths: (m, 3) the side lengths that were given instead of those between vertices, or None.
     """
 
     given: InputMesh
@@ -64,6 +66,7 @@ class Prepared:
     notes: tuple[str, ...]
     components: tuple[Component, ...]
     seams: IntArray
+    own_lengths: FloatArray | None
 
 
 def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
@@ -75,8 +78,9 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
     """
     given = as_input(mesh, faces)
     checked = at_unit_size(check_mesh(given.vertices, given.faces, repair=options.repair))
+    own = _own_lengths(given, checked, options)
     lengths, note = mollify(
-        edge_lengths(checked.mesh.vertices, checked.mesh.faces),
+        edge_lengths(checked.mesh.vertices, checked.mesh.faces) if own is None else own,
         strict=options.strict,
         names=checked.face_origin,
     )
@@ -114,7 +118,18 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
                 constraints.within(origin),
             )
 
-    return Prepared(given, checked, tuple(notes), tuple(components()), checked.mesh.edges[marked])
+    return Prepared(given, checked, tuple(notes), tuple(components()), checked.mesh.edges[marked], own)
+
+
+def _own_lengths(given: InputMesh, checked: CheckedMesh, options: Options) -> FloatArray | None:
+    """Return (m, 3) the side lengths that the user gives, if he does."""
+    if options.lengths is None:
+        return None
+    if given.source is not None:
+        raise OptionError(
+            "lengths are those of triangles given as arrays: give vertices and faces, not a file"
+        )
+    return lengths_of_input(checked, options.lengths, len(np.asarray(given.faces)))
 
 
 def _nothing_cut(pairs: IntArray) -> str:

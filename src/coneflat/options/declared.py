@@ -284,6 +284,14 @@ class AtlasOptions:
 class InputOptions:
     """Input."""
 
+    lengths: ArrayLike | None = option(
+        None,
+        Kind(),
+        "A metric of one's own instead of the distances between vertices: (m, 3) side lengths of the triangles given, "
+        "column i opposite corner i. For meshes given as arrays.",
+        flag=False,
+        one_mesh=True,
+    )
     repair: bool = option(
         False,
         Flag(),
@@ -341,6 +349,11 @@ class Options(RunOptions, AtlasOptions, SeamOptions, MetricOptions, ConeOptions)
         if not 0 <= self.padding < self.resolution / 4:
             raise OptionError(
                 f"padding must be from 0 to a quarter of the resolution of {self.resolution:,}, not {self.padding:g}"
+            )
+        if self.lengths is not None and self.refine:
+            raise OptionError(
+                "a refinement has triangles of its own, between positions, which given lengths do not tell: leave out "
+                "refine"
             )
         if self.sharp_angle is not None and not 0 < self.sharp_angle < math.pi:
             raise OptionError(f"the sharp angle must be between 0 and pi, not {self.sharp_angle:g} radians")

@@ -94,6 +94,8 @@ def settings(options: Options) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for name, (_, declaration) in declarations(type(options)).items():
         value = getattr(options, name)
+        if name == "lengths" and value is not None:
+            values[name] = "given"
         if not declaration.flag:
             continue
         if hasattr(value, "tolist"):

@@ -171,6 +171,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         face_origin=triangles.face_origin,
         face_corners=face_corners,
         source=given.source,
+        lengths=None if prepared.own_lengths is None else np.ldexp(prepared.own_lengths, -checked.exponent),
     )
     return replace(result, notes=(*result.notes, *broken_promises(result)))
 
@@ -249,6 +250,7 @@ def _measure(
         curvature_error=curvature_errors(residual[np.isfinite(residual)]),
         cones=cones,
         prescribed=curvature.prescribed,
+        lengths=prepared.own_lengths,
     )
     distortion = measured(layout.uv[layout.corners])
     if options.charts == "atlas" and distortion.overlapping_pairs:

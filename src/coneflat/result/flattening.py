@@ -57,6 +57,7 @@ class Flattening:
         face_corners: (m, 3) for a mesh read from a file: the polygon corner of `source` at each
             triangle corner; else None.
         source: the file it was read from, if any.
+        lengths: (m, 3) the side lengths that were given as a metric of its own, column i opposite corner i; else None.
     """
 
     vertices: FloatArray
@@ -82,6 +83,7 @@ class Flattening:
     face_origin: IntArray | None = None
     face_corners: IntArray | None = None
     source: MeshFile | None = None
+    lengths: FloatArray | None = None
 
     @property
     def corner_uv(self) -> FloatArray:

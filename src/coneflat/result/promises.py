@@ -83,6 +83,7 @@ def remeasured(
         changed.cones,
         changed.prescribed,
         overlaps,
+        None if changed.lengths is None else np.ldexp(changed.lengths, exponent),
     ).rescaled(exponent * float(np.log(2)))
     changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
     kept = tuple(note for note in result.notes if note not in told)
@@ -174,6 +175,8 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
     exponent = unit_exponent(mesh.vertices)
     sides_in_space = np.ldexp(mesh.vertices[mesh.heads[sides]] - mesh.vertices[mesh.tails[sides]], -exponent)
     lengths = np.linalg.norm(sides_in_space, axis=1) * np.ldexp(result.uv_scale, exponent)
+    if result.lengths is not None:
+        lengths = result.lengths.ravel()[sides] * result.uv_scale
     off = np.abs(np.abs(sides_between(result.corner_uv).ravel()[sides]) - lengths)
     beyond = off > EXACT * lengths + ROUNDINGS * unit
     if beyond.any():

@@ -102,7 +102,7 @@ def seam_data(result: Flattening) -> SeamData:
         face_chart=chart,
         cones=result.cones,
         cone_angles=(errors + full)[result.cones],
-        vertex_log_scale=_vertex_scales(mesh, result.distortion.log_area_scale),
+        vertex_log_scale=_vertex_scales(mesh, result.distortion.log_area_scale, result.lengths),
         log_area_scale=result.distortion.log_area_scale,
     )
 
@@ -139,11 +139,14 @@ def _ratios(mesh: TriangleMesh, corner_uv: FloatArray, halfedges: IntArray) -> C
     return np.where(is_known, own, complex(np.nan, np.nan))
 
 
-def _vertex_scales(mesh: TriangleMesh, log_area_scale: FloatArray) -> FloatArray:
+def _vertex_scales(mesh: TriangleMesh, log_area_scale: FloatArray, lengths: FloatArray | None) -> FloatArray:
     """Return (n,) half the log of the area around each vertex in the plane over that on the model."""
     # At a size of one, as squares of extreme positions are none; factors cancel.
-    size = float(np.abs(mesh.vertices[mesh.faces]).max())
-    lengths = edge_lengths(np.ldexp(mesh.vertices, -int(np.frexp(size)[1])), mesh.faces)
+    if lengths is None:
+        size = float(np.abs(mesh.vertices[mesh.faces]).max())
+        lengths = edge_lengths(np.ldexp(mesh.vertices, -int(np.frexp(size)[1])), mesh.faces)
+    else:
+        lengths = np.ldexp(lengths, -int(np.frexp(lengths.max())[1]))
     known = np.isfinite(log_area_scale)
     corners, areas = mesh.faces[known].ravel(), np.repeat(double_areas(lengths[known]), 3)
     largest = log_area_scale[known].max(initial=-np.inf)
