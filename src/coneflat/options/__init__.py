@@ -1,5 +1,6 @@
 """Options: declared once, parsed at the door."""
 
+from .combined import Options
 from .declared import (
     CONED,
     LEAST_QUANTUM,
@@ -11,7 +12,6 @@ from .declared import (
     WIDEST_CONE,
     CurveOptions,
     FindOptions,
-    Options,
 )
 from .reading import declarations, read_options, settings, takes
 

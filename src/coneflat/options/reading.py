@@ -11,7 +11,8 @@ from dataclasses import Field, fields
 from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, cast
 
 from ..errors import OptionError
-from .declared import WIDEST_CONE, Declaration, Options
+from .combined import Options
+from .declared import WIDEST_CONE, Declaration
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
