@@ -282,7 +282,7 @@ def methods_table(measured: Measured, body: str) -> str:
                 f"{flipped.sum():.0f}",
                 f"{overlap:.1%}",
                 _brief(np.median(mismatch)),
-                was[name][-1],
+                was[name][-1] if name in was else "",
             ]
         )
     return _table(
