@@ -39,6 +39,24 @@ DENT = [(0, 0), (4, 0), (1, 1), (0, 4)]  # concave at corner 2
 ARROW = [(0, 0), (4, 0), (4, 4), (2, 1), (0, 4)]  # concave at corner 3
 COMB = [(0, 0), (7, 0), (7, 3), (6, 1), (5, 3), (4, 1), (3, 3), (2, 1), (1, 3)]
 SIDE_POINTS = [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
+# No corner sees all of it, and there are corners along its sides.
+CLASP = [
+    (0, 0),
+    (2, 0),
+    (4, 0),
+    (6, 0),
+    (6, 3),
+    (6, 6),
+    (4, 6),
+    (4, 2),
+    (3, 2),
+    (2, 2),
+    (2, 6),
+    (0, 6),
+    (0, 3),
+]
+# A square with a hole, to which a bridge leads there and back.
+FRAME = [(0, 0), (4, 0), (4, 4), (0, 4), (0, 0), (1, 1), (1, 3), (3, 3), (3, 1), (1, 1)]
 REGULAR = [(np.cos(t), np.sin(t)) for t in np.arange(7) * 2 * np.pi / 7]
 
 
@@ -53,7 +71,7 @@ class TestTriangulate:
         assert [int(sides[polygon[:, 0] == i].sum()) for i in range(4)] == [3, 4, 5, 3]
         np.testing.assert_array_equal(is_polygon_side(face_corners[:, ::-1], offsets).sum(1), sides.sum(1))
 
-    @pytest.mark.parametrize("shape", [SQUARE[:, :2], DENT, ARROW, COMB, SIDE_POINTS, REGULAR])
+    @pytest.mark.parametrize("shape", [SQUARE[:, :2], DENT, ARROW, COMB, SIDE_POINTS, CLASP, FRAME, REGULAR])
     def test_triangles_tile_the_polygon(self, shape):
         points = lifted(shape)
         count = len(points)

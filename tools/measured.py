@@ -134,7 +134,7 @@ def _value(name: str, text: str) -> Any:
 
 def _rows_of(body: str) -> Rows:
     """Return the rows of a table by the text of their first cell, without links."""
-    rows = [[cell.strip() for cell in line.strip("| ").split(" | ")] for line in body.splitlines()[2:]]
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in body.splitlines()[2:]]
     return {row[0].partition("]")[0].strip("[*"): row for row in rows}
 
 
@@ -282,7 +282,7 @@ def methods_table(measured: Measured, body: str) -> str:
                 f"{flipped.sum():.0f}",
                 f"{overlap:.1%}",
                 _brief(np.median(mismatch)),
-                was[name][-1],
+                was[name][-1] if name in was else "",
             ]
         )
     return _table(

@@ -102,7 +102,7 @@ def _values(kind: Kind) -> str:
         case Number(is_angle=True):
             return "`1.57`, `pi/2`, `90deg`"
         case Strength():
-            return f"{kind.bounds}; 1 where none is written"
+            return f"{kind.bounds}; alone it is 1"
         case Direction():
             return "`z`, `-y`, `0,0.5,1`"
         case Vertices():

@@ -1,18 +1,14 @@
 """Compiling the kernels ahead: `python -m coneflat.ahead`.
 
-Kernels are compiled when first called and kept beside their sources from then on (see `geometry.compiled`), which
+Kernels are compiled when first called and kept beside their sources from then on (see `coneflat.compiled`), which
 makes the first flattening of an installation wait for half a minute. The build does this for it (hatch_build.py).
 """
 
 from __future__ import annotations
 
-from pathlib import Path
-from tempfile import TemporaryDirectory
-
 import numpy as np
 
 from ._arrays import FloatArray, IntArray
-from .files import read_mesh
 from .geometry.visibility import visible_share
 from .input.polygons import Polygons
 from .layout.convex import make_convex
@@ -27,8 +23,6 @@ def compile_kernels() -> None:
     """Flatten small meshes of every kind, so that every kernel that flattening uses is compiled."""
     sample = flatten(sample_path(), charts="atlas")
     pack_together([sample, sample])
-    with TemporaryDirectory() as folder:
-        read_mesh(sample.save(Path(folder) / "flat.obj"), weld=True)
     flatten(sample_path(), cones="greedy", method="linear")
     for mesh in (_tube(closed=True), _tube(closed=False)):
         flatten(*mesh)
