@@ -18,8 +18,8 @@ RIGHT = np.pi / 2
 RIGID = {
     "one chart": (shapes.sphere(3), {}),
     "atlas": (shapes.join(shapes.torus(), shapes.sphere(2)), {"charts": "atlas", "sharp_angle": 0.5}),
-    "quanta": (shapes.sphere(3), {"quantum": RIGHT, "charts": "atlas"}),
-    "handles": (shapes.genus(2), {"quantum": RIGHT, "correct_handles": True}),
+    "quanta": (shapes.sphere(3), {"quantise": RIGHT, "charts": "atlas"}),
+    "handles": (shapes.genus(2), {"quantise": RIGHT, "correct_handles": True}),
     "refined": (shapes.sphere(3), {"refine": True}),
     "faces of a box": (shapes.box(), {"sharp_angle": 1.0, "charts": "atlas"}),
     "two borders": (shapes.annulus(), {"charts": "atlas"}),

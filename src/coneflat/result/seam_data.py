@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._arrays import ComplexArray, FloatArray, IntArray
-from ..atlas.chart_seams import Layout, Seams
+from .._arrays import ComplexArray, FloatArray, IntArray, unit_exponent
 from ..geometry import double_areas, edge_lengths
-from ..mesh import TriangleMesh, end_corners, label_components
+from ..geometry.charts import label_charts, point_seams
+from ..mesh import TriangleMesh, end_corners
 from ..quality.distortion import angle_sum_errors
 from ..quality.rotations import ratios_across
 
@@ -83,7 +83,9 @@ def seam_data(result: Flattening) -> SeamData:
     # The ends as seams name them: along the half-edge on side 0, against it on side 1.
     ends = np.stack([np.stack([start[:, 0], end[:, 0]], 1), np.stack([end[:, 1], start[:, 1]], 1)], axis=1)
     points = np.where(is_there[:, :, None], result.uv_faces.ravel()[ends], -1)
-    chart = _charts(mesh, result.uv_faces)
+    joined = ~mesh.is_boundary_edge
+    joined[point_seams(mesh, result.uv_faces)] = False
+    chart = label_charts(mesh, joined)[1]
     faces = np.where(is_there, halfedges // 3, -1)
     ratio = _ratios(mesh, result.corner_uv, halfedges)
     middles = result.uv[points].mean(axis=2) @ np.array([1, 1j])
@@ -119,14 +121,6 @@ def _sides(mesh: TriangleMesh, seams: IntArray) -> IntArray:
     return np.stack([np.where(each, sides, -1).max(axis=1) for each in (is_left, is_right)], axis=1)
 
 
-def _charts(mesh: TriangleMesh, uv_faces: IntArray) -> IntArray:
-    """Return (m,) the chart of each triangle: those with a side in common whose ends have the same points."""
-    layout = Layout(np.empty((0, 2)), uv_faces, np.zeros(len(uv_faces), dtype=np.int64))
-    joined = ~mesh.is_boundary_edge
-    joined[Seams(mesh, layout).edges] = False
-    return label_components(len(uv_faces), *mesh.edge_faces[joined].T)[1]
-
-
 def _ratios(mesh: TriangleMesh, corner_uv: FloatArray, halfedges: IntArray) -> ComplexArray:
     """Return (k,) side 1 over side 0 as complex numbers; NaN where one of them is missing or has no length."""
     ratios = np.full(len(mesh.edges), np.nan, dtype=np.complex128)
@@ -143,10 +137,9 @@ def _vertex_scales(mesh: TriangleMesh, log_area_scale: FloatArray, lengths: Floa
     """Return (n,) half the log of the area around each vertex in the plane over that on the model."""
     # At a size of one, as squares of extreme positions are none; factors cancel.
     if lengths is None:
-        size = float(np.abs(mesh.vertices[mesh.faces]).max())
-        lengths = edge_lengths(np.ldexp(mesh.vertices, -int(np.frexp(size)[1])), mesh.faces)
+        lengths = edge_lengths(np.ldexp(mesh.vertices, -unit_exponent(mesh.vertices[mesh.faces])), mesh.faces)
     else:
-        lengths = np.ldexp(lengths, -int(np.frexp(lengths.max())[1]))
+        lengths = np.ldexp(lengths, -unit_exponent(lengths))
     known = np.isfinite(log_area_scale)
     corners, areas = mesh.faces[known].ravel(), np.repeat(double_areas(lengths[known]), 3)
     largest = log_area_scale[known].max(initial=-np.inf)

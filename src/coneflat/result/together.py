@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._arrays import IntArray
 from ..atlas.arrange import whole_turns
 from ..atlas.pack import pack_charts
 from ..atlas.touch import part_touching
 from ..errors import EmptyMeshError, OptionError
-from ..geometry.charts import label_charts
-from ..mesh import TriangleMesh
 
 if TYPE_CHECKING:
     from .flattening import Flattening
@@ -50,7 +47,7 @@ def pack_together(
     turns: str | int = rotate
     if quanta and rotate in ("any", "quarter"):
         turns = math.gcd(*(whole_turns(quantum) for quantum in quanta))
-    labels = [_charts(result) for result in results]
+    labels = [result.seam_data.face_chart for result in results]
     first = np.cumsum([0, *(int(label.max()) + 1 for label in labels)])
     packed = pack_charts(
         np.concatenate([result.corner_uv / result.uv_scale for result in results]),
@@ -98,9 +95,3 @@ def _checked(results: object) -> list[Flattening]:
     if not listed:
         raise EmptyMeshError("there are no results to pack")
     return listed
-
-
-def _charts(result: Flattening) -> IntArray:
-    """Return (m,) the chart of each triangle: what hangs together in the plane."""
-    flat = TriangleMesh(result.uv, result.uv_faces)
-    return label_charts(flat, ~flat.is_boundary_edge)[1]
