@@ -74,7 +74,7 @@ def test_crashes_hangs_and_swollen_memory_are_told_and_survived():
 @pytest.fixture(scope="module")
 def ball():
     mesh = shapes.sphere(2)
-    options = {"charts": "atlas", "quantum": np.pi / 2}
+    options = {"charts": "atlas", "quantise": np.pi / 2}
     return coneflat.flatten(*mesh, **options), options, mesh
 
 
