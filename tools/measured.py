@@ -1,50 +1,26 @@
-"""The numbers of the documentation, measured.
+"""Measures of models, for the numbers and pictures of the documentation.
 
 A number in a sentence names itself: `<!-- n bunny charts=one qc_mean .3f -->` is a model, options of
-`coneflat.flatten` if there are any, a key of the report, and how it is written. Tables are functions below,
-`<!-- table gallery -->` say. Where a model is not there its numbers stay as they are. So do times, which are those of a
-machine, and what other packages do: they are measured by `benchmarks/`.
+`coneflat.flatten` if there are any, a key of the report, and how it is written.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from markers import ROOT, blocks, fill, fill_numbers
+from markers import ROOT
 
 import coneflat
 from coneflat.apps.cli.values import parse_angle
 from coneflat.apps.compare import Comparison, compare_methods
-from coneflat.options import METHODS, PAPER, VARIANTS, Options, declarations
+from coneflat.options import Options, declarations
 
 sys.path.insert(0, str(ROOT / "tests"))
 import shapes
 
-README = (
-    "sample", "fandisk", "rocker-arm", "hand", "bunny", "3holes", "face", "camelhead", "kitten", "horse",
-    "stanford-bunny",
-)  # fmt: skip
-GALLERY = (
-    "3holes", "bunny", "camelhead", "elephant", "face", "fandisk", "hand", "horse", "kitten", "rocker-arm",
-)  # fmt: skip
-ATLASES = ("sphere", "3holes", "bunny", "camelhead", "elephant", "face", "fandisk", "hand")
-COMPARED = (
-    "3holes", "bunny", "camelhead", "elephant", "face", "fandisk", "hand", "plane-holes", "rocker-arm", "spot",
-)  # fmt: skip
-TRADED = (
-    "3holes", "bunny", "camelhead", "elephant", "face", "fandisk", "hand", "horse", "human", "kitten", "knight",
-    "plane-holes", "rocker-arm", "spot", "stanford-bunny",
-)  # fmt: skip
-ALLOWED = (0.5, 0.35, 0.25, 0.2, 0.15, 0.1, 0.07)
-#: Area distortion that others have who make dozens of charts.
-MORE_CONES = 0.05
-
 Report = dict[str, Any]
-Rows = dict[str, list[str]]
 
 
 class Measured:
@@ -55,7 +31,7 @@ class Measured:
         self._folder = models
         self._reports: dict[str, Report | None] = {}
         self._defaults: dict[str, coneflat.Flattening] = {}
-        self._comparisons: dict[tuple[str, tuple[str, ...]], Comparison] = {}
+        self._comparisons: dict[tuple[str, tuple[str, ...], str], Comparison] = {}
         self._missing: set[str] = set()
 
     def path(self, model: str) -> Path | None:
@@ -95,23 +71,16 @@ class Measured:
             self._reports[key] = result.report()
         return self._reports[key]
 
-    def comparison(self, model: str, methods: tuple[str, ...]) -> Comparison:
+    def comparison(self, model: str, methods: tuple[str, ...], **options: Any) -> Comparison:
         """Return what several methods make of a model with the same cones and cut."""
-        key = (model, methods)
+        key = (model, methods, str(options))
         if key not in self._comparisons:
             print(f"  {model} by {len(methods)} methods", flush=True)
-            self._comparisons[key] = compare_methods(self.path(model), methods=methods, peers=())
+            self._comparisons[key] = compare_methods(self.path(model), methods=methods, peers=(), **options)
         return self._comparisons[key]
 
 
-def fill_page(text: str, measured: Measured) -> str:
-    """Return a page with its tables and numbers measured."""
-    for name, body in list(blocks(text, "table")):
-        text = fill(text, name, TABLES[name.split()[1]](measured, body))
-    return fill_numbers(text, lambda what, was: _number(measured, what, was))
-
-
-def _number(measured: Measured, what: str, was: str) -> str:
+def number_text(measured: Measured, what: str, was: str) -> str:
     """Return what a number is now: by its name, and as it stands there."""
     model, *words = what.split()
     form = words.pop() if words[-1][0] in ".," else ","
@@ -130,222 +99,3 @@ def _value(name: str, text: str) -> Any:
         return float(text) if "." in text else int(text)
     except ValueError:
         return text
-
-
-def _rows_of(body: str) -> Rows:
-    """Return the rows of a table by the text of their first cell, without links."""
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in body.splitlines()[2:]]
-    return {row[0].partition("]")[0].strip("[*"): row for row in rows}
-
-
-def _table(headings: str, rows: list[list[str]]) -> str:
-    """Return a table; headings stand in one line, with bars between."""
-    columns = headings.count("|") + 1
-    lines = [f"| {headings} |", "| " + " | ".join(["---"] * columns) + " |"]
-    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])
-
-
-def _each(models: tuple[str, ...], body: str, made: Mapping[str, list[str] | None]) -> Iterator[list[str]]:
-    """Yield a row for each model: as it is made, or as it was."""
-    was = _rows_of(body)
-    for model in models:
-        row = made[model] or was.get(model)
-        if row is not None:
-            yield row
-
-
-def quality_table(measured: Measured, body: str) -> str:
-    """Return how good the defaults are."""
-    made = dict[str, list[str] | None]()
-    for model in README:
-        report = measured.report(model)
-        made[model] = report and [
-            model,
-            f"{report['triangles']:,}",
-            f"{report['cones']}",
-            f"{report['charts']}",
-            f"{report['angle_sum_error']:.0e}",
-            f"{report['seam_mismatch_max']:.0e}",
-            f"{report['flipped']}",
-            f"{report['qc_mean']:.4f}",
-            f"{report['seam_length']:.2f}",
-        ]
-    headings = (
-        "model | triangles | cones | charts | angle sums | seam mismatch | flipped | QC distortion | "
-        "seam length, √area"
-    )
-    return _table(headings, list(_each(README, body, made)))
-
-
-#: The paper's curvature errors, in units of pi, and QC distortions.
-PAPERS = {"fandisk": ("4.6e-6", "1.012"), "rocker-arm": ("1.4e-5", "1.028")}
-
-
-def paper_table(measured: Measured, body: str) -> str:
-    """Return the published method on the models that the paper and we have alike."""
-    made = dict[str, list[str] | None]()
-    for model, (error, distortion) in PAPERS.items():
-        report = measured.report(model, **PAPER)
-        made[model] = report and [
-            model,
-            f"{report['triangles']:,}",
-            f"{error} π",
-            f"{report['curvature_error']:.2e} π".replace("e-0", "e-"),
-            distortion,
-            f"{report['qc_mean']:.4f}",
-            f"{report['cones']}",
-        ]
-    headings = "model | triangles | curvature error: paper | here | QC distortion: paper | here | cones"
-    return _table(headings, list(_each(tuple(PAPERS), body, made)))
-
-
-def gallery_table(measured: Measured, body: str) -> str:
-    """Return the numbers of the gallery."""
-    made = dict[str, list[str] | None]()
-    for model in GALLERY:
-        report = measured.report(model)
-        made[model] = report and [
-            f"[{model}](#{model})",
-            f"{report['triangles']:,}",
-            f"{report['cones']}",
-            f"{report['charts']}",
-            f"{report['qc_mean']:.3f}",
-            f"{report['area_std']:.2f}",
-            f"{report['seam_length']:.2f}",
-        ]
-    headings = "model | triangles | cones | charts | QC distortion | area distortion | seam length, √area"
-    return _table(headings, list(_each(GALLERY, body, made)))
-
-
-#: What more cones change: keys of the report, and how they are called.
-TRADEOFF = {
-    "cones": "cones",
-    "qc_mean": "QC distortion",
-    "seam_length": "seam length, √area",
-    "overlap": "overlap, % of area",
-    "area_distortion": "exact E",
-}
-
-
-def tradeoff(measured: Measured) -> np.ndarray | None:
-    """Return (a, models, k) what each area distortion allowed makes of models in one chart, or None."""
-    if not measured.has(*TRADED):
-        return None
-    rows = [
-        [measured.report(model, distortion=allowed, charts="one") or {} for model in TRADED]
-        for allowed in ALLOWED
-    ]
-    return np.array([[[report[key] for key in TRADEOFF] for report in row] for row in rows], dtype=np.float64)
-
-
-def tradeoff_table(measured: Measured, body: str) -> str:
-    """Return what the number of cones does, medians over models."""
-    found = tradeoff(measured)
-    if found is None:
-        return body
-    rows = [
-        [
-            f"**{allowed}**" if allowed == 0.2 else f"{allowed}",
-            f"{cones:.0f}",
-            f"{distortion:.4f}",
-            f"{length:.2f}",
-            f"{100 * overlap:.1f}",
-            f"{exact:.3f}",
-        ]
-        for allowed, (cones, distortion, length, overlap, exact) in zip(
-            ALLOWED, np.median(found, axis=1), strict=True
-        )
-    ]
-    return _table(" | ".join(["E allowed", *TRADEOFF.values()]), rows)
-
-
-def methods_table(measured: Measured, body: str) -> str:
-    """Return what all methods make of ten models with the same cones and cut."""
-    if not measured.has(*COMPARED):
-        return body
-    names = sorted(METHODS + VARIANTS, key=lambda name: (METHODS.index(name.partition("/")[0]), name))
-    comparisons = []
-    for model in COMPARED:
-        comparisons.append(measured.comparison(model, tuple(names)))
-    was = _rows_of(body)
-    rows = []
-    for name in names:
-        found = np.array([_compared(comparison, name) for comparison in comparisons])
-        error, _, _, flipped, _, mismatch = found.T
-        qc, std, overlap = found[:, [1, 2, 4]].mean(axis=0)
-        rows.append(
-            [
-                name,
-                _brief(error.max()),
-                f"{qc:.4f}",
-                f"{std:.3f}",
-                f"{flipped.sum():.0f}",
-                f"{overlap:.1%}",
-                _brief(np.median(mismatch)),
-                was[name][-1] if name in was else "",
-            ]
-        )
-    return _table(
-        "method | curvature error, π | QC | area std | flipped | overlap | seam mismatch | time", rows
-    )
-
-
-def _compared(comparison: Comparison, name: str) -> list[float]:
-    entry = comparison[name]
-    if entry.result is None:
-        raise SystemExit(f"{name} on {comparison.name}: {entry.note}")
-    d = entry.result.distortion
-    return [
-        d.curvature_error_max,
-        d.qc_mean,
-        d.area_std,
-        d.flipped + d.degenerate,
-        d.overlap,
-        d.seam_mismatch_max,
-    ]
-
-
-def _brief(value: float) -> str:
-    """Return a number with one digit."""
-    return f"{value:.0e}" if value < 0.01 else f"{value:.1g}"
-
-
-def atlases_table(measured: Measured, body: str) -> str:
-    """Return our atlases beside those of others, whose numbers stay."""
-    was, made, ours = _rows_of(body), dict[str, list[str] | None](), []
-    keys = {"charts": "d", "seam_length": ".2f", "qc_mean": ".3f", "packing_efficiency": ".2f"}
-    for model in ATLASES:
-        reports = [measured.report(model), measured.report(model, distortion=MORE_CONES)]
-        if None in reports:
-            made[model] = None
-            continue
-        ours.append([[report[key] for report in reports] for key in keys])
-        made[model] = [model, f"{reports[0]['triangles']:,}"]
-        made[model] += [
-            ", ".join([*(format(value, form) for value in values), *cell.split(", ")[2:]])
-            for values, form, cell in zip(ours[-1], keys.values(), was[model][2:], strict=True)
-        ]
-    rows = list(_each(ATLASES, body, made))
-    mean = was["mean"]
-    if len(ours) == len(ATLASES):
-        means = np.mean(ours, axis=0)
-        mean = ["mean", ""]
-        mean += [
-            ", ".join([*(format(value, form.replace("d", ".1f")) for value in values), *cell.split(", ")[2:]])
-            for values, form, cell in zip(means, keys.values(), was["mean"][2:], strict=True)
-        ]
-    headings = (
-        "model | triangles | charts: coneflat, with more cones, xatlas, uvunwrap | seam length | "
-        "QC distortion | packed"
-    )
-    return _table(headings, [*rows, mean])
-
-
-TABLES = {
-    "quality": quality_table,
-    "paper": paper_table,
-    "gallery": gallery_table,
-    "tradeoff": tradeoff_table,
-    "methods": methods_table,
-    "atlases": atlases_table,
-}

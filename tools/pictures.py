@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 from markers import ROOT
-from measured import ALLOWED, GALLERY, TRADED, TRADEOFF, Measured, tradeoff
+from measured import Measured
 from palette import IMAGES, save_figure_small, save_small
 from PIL import Image
 from scipy.sparse import csr_matrix, identity
+from tables import ALLOWED, GALLERY, TRADED, TRADEOFF, tradeoff
 
 import coneflat
 from coneflat.apps.compare.pictures import draw_layouts

@@ -36,7 +36,8 @@ def remake_house(_: argparse.Namespace) -> Iterator[tuple[Path, str]]:
 
 def remake_numbers(arguments: argparse.Namespace) -> Iterator[tuple[Path, str]]:
     """Yield the pages with their numbers."""
-    from measured import Measured, fill_page
+    from measured import Measured
+    from tables import fill_page
 
     measured = arguments.measured = Measured(arguments.models)
     for page in PAGES:
