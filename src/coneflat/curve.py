@@ -22,7 +22,7 @@ from .text import shown
 from .threads import one_blas_thread
 
 if TYPE_CHECKING:
-    from .cones.cone_search import ConeSearch
+    from .cones.sparse import ConeSearch
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +90,6 @@ def find_cones(
     Arguments are those of `coneflat.flatten`, and so are the errors; `progress` is called with what is being done
     and the fraction that is done.
     """
-    from .cones.pursuit import pursue
-
     options = Options(
         distortion=distortion,
         cone_count=cone_count,
@@ -112,7 +110,8 @@ def find_cones(
             return opened
         search, part = opened
         with stages("cones"):
-            found = pursue(search, distortion=options.distortion, count=options.cone_count)
+            count = options.cone_count
+            found = search.fewest(options.distortion) if count is None else search.best_of(count)
     return _named(found.solution, found.distortion, part)
 
 
@@ -157,10 +156,10 @@ def cone_curve(
             return ConeCurve((opened,))
         search, part = opened
         with stages("cones"):
-            found = search.best_of_sizes(int(most))
+            found = search.curve(int(most))
     if not found:
         raise OptionError(f"no set of up to {most} cones carries this surface's curvature; allow more")
-    return ConeCurve(tuple(_named(search.solution(members), energy, part) for energy, members in found))
+    return ConeCurve(tuple(_named(each.solution, each.distortion, part) for each in found))
 
 
 def _open(

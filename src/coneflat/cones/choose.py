@@ -21,7 +21,7 @@ from ..threads import HUGE
 from . import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
 
 if TYPE_CHECKING:
-    from .cone_search import ConeSearch
+    from .sparse import ConeSearch
 
 # The angle of a cone for which each triangle around it has room on its straight sides: less than half a turn, as not
 # all of them can be spread alike.
@@ -83,7 +83,7 @@ def pursues(mesh: TriangleMesh, options: Options) -> bool:
 
 def is_riddled(mesh: TriangleMesh, options: Options) -> bool:
     """Whether a mesh has so many handles, and needs so many cones for them, that few of them are no aim."""
-    from .cone_search import MOST_CONES
+    from .sparse.limits import MOST_CONES
 
     if options.cone_choice != "auto" or options.wishes_cones or mesh.is_boundary_vertex.any():
         return False
@@ -142,9 +142,8 @@ def _pursued(
 ) -> ConeSolution:
     """Return the fewest cones for the distortion allowed, or the best of the number asked for."""
     from ..geometry.handles import open_turning
-    from .align import align_handles
-    from .pursuit import pursue
-    from .quantise import quantise_cones
+    from .integer.align import align_handles
+    from .integer.search import quantise_cones
 
     mesh = surface.mesh
     only = only_choice(surface, wishes, options)
@@ -154,7 +153,8 @@ def _pursued(
 
     distortion, count = options.distortion, options.cone_count
     if options.quantum is None:
-        found = pursue(search, distortion=distortion, count=count, most=options.max_cones).solution
+        sparse = search.fewest(distortion, options.max_cones) if count is None else search.best_of(count)
+        found = sparse.solution
     else:
         quantised = quantise_cones(
             search, options.quantum, distortion=distortion, count=count, most=options.max_cones
@@ -195,7 +195,7 @@ def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages
 
     One that is open on the surface goes on: only where cones are allowed may have changed.
     """
-    from .pursuit import open_search
+    from .sparse import ConeSearch
 
     mesh = surface.mesh
     is_straight = options.boundary_kind == "straight" and mesh.is_boundary_vertex.any()
@@ -207,7 +207,7 @@ def search_on(surface: Surface, wishes: Wishes, options: Options, stages: Stages
         return surface.search
     if len(room) >= FINE:
         room = np.minimum(room, WIDEST / surface.widest)
-    search = open_search(
+    search = ConeSearch(
         surface.laplacian,
         surface.curvature,
         surface.areas,

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix, diags, identity
 
-from .._arrays import FloatArray, IntArray
+from ..._arrays import FloatArray, IntArray
+from ...compiled import compiled
 
 # Largest factor by which one level shrinks the model: an aggregate is a vertex and its neighbours.
 LARGEST_AGGREGATE = 7.0
@@ -100,8 +101,6 @@ def _smoothed_aggregates(
 
     Couplings below the share `weak` do not join vertices.
     """
-    from .aggregate_kernel import aggregate
-
     count = level.shape[0]
     diagonal = np.maximum(level.diagonal(), 1e-300)
     rows = level.indptr.astype(np.int64), level.indices.astype(np.int64), level.data, diagonal, order
@@ -132,6 +131,72 @@ def _without_rounding(matrix: csr_matrix, sizes: FloatArray) -> csr_matrix:
     kept.data[np.abs(kept.data) <= ROUNDED * np.repeat(sizes, np.diff(kept.indptr))] = 0.0
     kept.eliminate_zeros()
     return kept
+
+
+@compiled
+def aggregate(
+    indptr: IntArray,
+    indices: IntArray,
+    weights: FloatArray,
+    diagonal: FloatArray,
+    order: IntArray,
+    size: float,
+    weak: float,
+) -> tuple[IntArray, int]:
+    """Return (n,) the aggregate of each vertex, and their number.
+
+    A vertex whose strong neighbours are mostly free takes the strongest of them; leftovers join their strongest
+    neighbour's aggregate.
+    """
+    count = len(diagonal)
+    labels = np.full(count, -1, np.int64)
+    number = 0
+    for vertex in order:
+        if labels[vertex] >= 0:
+            continue
+        free = 0
+        taken = 0
+        for e in range(indptr[vertex], indptr[vertex + 1]):
+            other = indices[e]
+            if other != vertex and -weights[e] > weak * np.sqrt(diagonal[vertex] * diagonal[other]):
+                if labels[other] < 0:
+                    free += 1
+                else:
+                    taken += 1
+        if free + 1 < 0.6 * size and taken > 0:
+            continue
+        labels[vertex] = number
+        room = size - 1 if free + 1 > size else free
+        # A fractional size is met on average: the remainder decides for every so many aggregates.
+        room = np.floor((number + 1) * room) - np.floor(number * room) if room != free else free
+        while room >= 1:
+            strongest, best = -1, 0.0
+            for e in range(indptr[vertex], indptr[vertex + 1]):
+                other = indices[e]
+                if other != vertex and labels[other] < 0:
+                    strength = -weights[e] / np.sqrt(diagonal[vertex] * diagonal[other])
+                    if strength > max(weak, best * (1 + TIE)):
+                        strongest, best = other, strength
+            if strongest < 0:
+                break
+            labels[strongest] = number
+            room -= 1
+        number += 1
+    joined = labels.copy()
+    for vertex in order:
+        if labels[vertex] >= 0:
+            continue
+        strongest, best = -1, 0.0
+        for e in range(indptr[vertex], indptr[vertex + 1]):
+            other = indices[e]
+            if other != vertex and labels[other] >= 0 and -weights[e] > best * (1 + TIE):
+                strongest, best = other, -weights[e]
+        if strongest >= 0:
+            joined[vertex] = labels[strongest]
+        else:
+            joined[vertex] = number
+            number += 1
+    return joined, number
 
 
 def _order_of_aggregates(part: csr_matrix, order: IntArray) -> IntArray:
