@@ -6,9 +6,8 @@ import shapes
 from scipy.sparse import csr_matrix
 
 from coneflat import check_mesh, edge_lengths, read_mesh
-from coneflat.cones import fit_kernel, pursuit
-from coneflat.cones.coarsen import coarse_basis
-from coneflat.cones.pursuit import open_search
+from coneflat.cones.sparse import ConeSearch, fit_curvatures
+from coneflat.cones.sparse.aggregation import coarse_basis
 from coneflat.errors import CurvatureError, OptionError
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, double_areas
 from coneflat.geometry.operators import area_distortion
@@ -31,7 +30,8 @@ def surface(vertices, faces):
 
 
 def pursue_cones(*given, distortion=0.2, count=None, **options):
-    return pursuit.pursue(open_search(*given, **options), distortion=distortion, count=count)
+    search = ConeSearch(*given, **options)
+    return search.fewest(distortion) if count is None else search.best_of(count)
 
 
 def pursue(vertices, faces, **options):
@@ -81,20 +81,21 @@ def test_positive_only():
 def test_bounds_that_leave_nothing_to_gain_end_the_search():
     """On a torus curvatures sum to 0: without negative ones there are none."""
     vertices, faces = shapes.genus(1)
-    search = open_search(*surface(vertices, faces), positive_only=True)
-    energy, members = search.fewest(0.01)
-    assert energy > 0.01
-    assert max(search.coarse.best) < 30
-    assert not search.solution(members).cones.size
+    search = ConeSearch(*surface(vertices, faces), positive_only=True)
+    found = search.fewest(0.01)
+    assert found.distortion > 0.01
+    assert max(search.coarse.best.sizes) < 30
+    assert not found.solution.cones.size
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_no_cone_can_be_left_out(name):
-    search = open_search(*surface(*SHAPES[name]), tie_key=tie_key(SHAPES[name][0]))
-    energy, members = search.fewest(0.1)
-    assert energy <= 0.1
+    search = ConeSearch(*surface(*SHAPES[name]), tie_key=tie_key(SHAPES[name][0]))
+    found = search.fewest(0.1)
+    assert found.distortion <= 0.1
+    members = search.exact.insert(search.unknowns_of(found.solution.cones))
     for place in range(len(members)):
-        assert search.pool.model.energy(np.delete(members, place)) > 0.01
+        assert search.exact.energy(np.delete(members, place)) > 0.01
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -205,11 +206,13 @@ def test_options_that_make_no_sense(options, error):
 def fit_one_by_one(gram, slope, least, most, total):
     size = len(slope)
     curvatures, state, room = np.zeros(size), np.zeros(size, dtype=np.int64), np.empty((size, size))
-    multiplier = fit_kernel.fit_one_by_one(gram, slope, least, most, total, state, curvatures, room)
+    multiplier = fit_curvatures.fit_one_by_one(gram, slope, least, most, total, state, curvatures, room)
     return curvatures, multiplier, True
 
 
-@pytest.mark.parametrize("fit", [fit_kernel.fit_curvatures, fit_one_by_one], ids=["at once", "one by one"])
+@pytest.mark.parametrize(
+    "fit", [fit_curvatures.fit_curvatures, fit_one_by_one], ids=["at once", "one by one"]
+)
 def test_fit_agrees_with_the_optimality_conditions(fit):
     rng = np.random.default_rng(3)
     for trial in range(210):

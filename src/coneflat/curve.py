@@ -19,7 +19,7 @@ from .progress import Stages
 from .threads import one_blas_thread
 
 if TYPE_CHECKING:
-    from .cones.cone_search import ConeSearch
+    from .cones.sparse import ConeSearch
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +73,6 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
         mesh, faces: as for `coneflat.flatten`, and so are the errors.
         options: see below.
     """
-    from .cones.pursuit import pursue
-
     asked = read_options(options, FindOptions)
     chosen = Options(**vars(asked))
     stages = Stages(chosen.progress)
@@ -84,7 +82,8 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
             return opened
         search, part = opened
         with stages("cones"):
-            found = pursue(search, distortion=chosen.distortion, count=chosen.cone_count)
+            count = chosen.cone_count
+            found = search.fewest(chosen.distortion) if count is None else search.best_of(count)
     return _named(found.solution, found.distortion, part)
 
 
@@ -105,10 +104,10 @@ def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Con
             return ConeCurve((opened,))
         search, part = opened
         with stages("cones"):
-            found = search.best_of_sizes(asked.most)
+            found = search.curve(asked.most)
     if not found:
         raise OptionError(f"no set of up to {asked.most} cones carries this surface's curvature; allow more")
-    return ConeCurve(tuple(_named(search.solution(members), energy, part) for energy, members in found))
+    return ConeCurve(tuple(_named(each.solution, each.distortion, part) for each in found))
 
 
 def _open(

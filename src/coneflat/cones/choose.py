@@ -22,7 +22,7 @@ from ..threads import HUGE
 from . import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
 
 if TYPE_CHECKING:
-    from .cone_search import ConeSearch
+    from .sparse import ConeSearch
 
 # The angle of a cone for which each triangle around it has room on its straight sides: less than half a turn, as not
 # all of them can be spread alike.
@@ -86,7 +86,7 @@ def pursues(mesh: TriangleMesh, options: Options) -> bool:
 
 def has_many_handles(mesh: TriangleMesh, options: Options) -> bool:
     """Whether a mesh has so many handles, and needs so many cones for them, that few of them are no aim."""
-    from .cone_search import MOST_CONES
+    from .sparse.limits import MOST_CONES
 
     if options.cone_choice != "auto" or options.asks_for_pursuit or mesh.is_boundary_vertex.any():
         return False
@@ -145,9 +145,8 @@ def _pursued(
 ) -> ConeSolution:
     """Return the fewest cones for the distortion allowed, or the best of the number asked for."""
     from ..geometry.handles import open_turning
-    from .align import align_handles
-    from .pursuit import pursue
-    from .quantise import quantise_cones
+    from .integer.align import align_handles
+    from .integer.search import quantise_cones
 
     mesh = surface.mesh
     only = only_choice(surface, constraints, options)
@@ -157,7 +156,8 @@ def _pursued(
 
     distortion, count = options.distortion, options.cone_count
     if options.quantise is None:
-        found = pursue(search, distortion=distortion, count=count, most=options.max_cones).solution
+        sparse = search.fewest(distortion, options.max_cones) if count is None else search.best_of(count)
+        found = sparse.solution
     else:
         quantised = quantise_cones(
             search, options.quantise, distortion=distortion, count=count, most=options.max_cones
@@ -200,7 +200,7 @@ def search_on(surface: Surface, constraints: Constraints, options: Options, stag
 
     One that is open on the surface goes on: only where cones are allowed may have changed.
     """
-    from .pursuit import open_search
+    from .sparse import ConeSearch
 
     mesh = surface.mesh
     is_straight = options.boundary_kind == "straight" and mesh.is_boundary_vertex.any()
@@ -212,7 +212,7 @@ def search_on(surface: Surface, constraints: Constraints, options: Options, stag
         return surface.search
     if len(room) >= FINE:
         room = np.minimum(room, WIDEST / surface.widest)
-    search = open_search(
+    search = ConeSearch(
         surface.laplacian,
         surface.curvature,
         surface.areas,

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
-from ..compiled import compiled
+from ..._arrays import FloatArray, IntArray
+from ...compiled import compiled
 
 # Pivots below this share of the largest diagonal count as it: cones on neighbouring vertices are nearly dependent.
 SMALLEST_PIVOT = 1e-13

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
-from .._arrays import BoolArray, FloatArray, IntArray
-from ..solver import Factor, factorize
+from ..._arrays import BoolArray, FloatArray, IntArray
+from ...solver import Factor, factorize
 
 # Right-hand sides solved at once: more gain nothing and cost memory, of which they take so many numbers at most.
 BATCH, NUMBERS = 32, 50_000_000

@@ -1,4 +1,4 @@
-"""All candidates projected off a set of cones, and what each would gain: plain loops, the innermost over candidates.
+"""What each candidate would gain, by projecting all of them off a set of cones: plain loops, the innermost over them.
 
 Small matrix products by BLAS take longer here: it starts threads for them.
 """
@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
-from ..compiled import compiled
-from .fit_kernel import factor_lower, fit_members
+from ..._arrays import BoolArray, FloatArray, IntArray
+from ...compiled import compiled
+from .fit_curvatures import factor_lower
 
 # What must remain of a candidate's diagonal for it to be independent of the members.
 INDEPENDENT = 1e-9
@@ -119,22 +119,54 @@ def addition_scores(
 
 
 @compiled
-def energies_with(
-    gram: FloatArray,
-    slope: FloatArray,
-    constant: float,
+def swap_table(
+    rows: FloatArray,
+    kept: FloatArray,
+    curvatures: FloatArray,
+    gradient: FloatArray,
+    remain: FloatArray,
+    floor: FloatArray,
+    is_open: BoolArray,
     least: FloatArray,
     most: float,
-    total: float,
-    members: IntArray,
-    candidates: IntArray,
-) -> FloatArray:
-    """Return (c,) E^2 of the members with each of the candidates, infinite where bounds leave no curvatures."""
-    size = len(members)
-    chosen = np.empty(size + 1, np.int64)
-    chosen[:size] = members
-    energies = np.empty(len(candidates))
-    for c in range(len(candidates)):
-        chosen[size] = candidates[c]
-        energies[c] = fit_members(gram, slope, constant, least, most, total, chosen)[3]
-    return energies
+    tie: float,
+) -> tuple[FloatArray, IntArray]:
+    """Return (p,) the change of E^2 by the best replacement of each member, and which candidate that is.
+
+    Args:
+        rows: (p, m) coefficients of the projection of candidates on members.
+        kept: (p,) diagonal of the inverse of the members' gram matrix, with the sum kept.
+        curvatures: (p,) of the members.
+        gradient: (m,) half the derivative of E^2 by the curvature of a candidate.
+        remain: (m,) what the projection leaves of the candidates' gram entries.
+        floor: (m,) what must be left of them once a member is gone.
+        is_open: (m,) the candidates that may come in.
+        least: (m,) bound of the candidates' curvatures.
+        most: the upper bound.
+        tie: changes that differ by less, relatively, are equal; the first candidate counts.
+    """
+    size, count = rows.shape
+    change = np.full(size, np.inf)
+    which = np.full(size, -1)
+    values = np.empty(count)
+    for i in range(size):
+        k, share = curvatures[i], 1.0 / kept[i]
+        lost = k * k * share
+        lowest = np.inf
+        for t in range(count):
+            values[t] = np.inf
+            if is_open[t]:
+                w = rows[i, t]
+                h = remain[t] + w * w * share
+                if h > floor[t]:
+                    g = gradient[t] - w * k * share
+                    x = min(max(-g / h, least[t]), most)
+                    values[t] = lost + (2.0 * g + h * x) * x
+                    lowest = min(lowest, values[t])
+        if lowest < np.inf:
+            limit = lowest + tie * abs(lowest)
+            for t in range(count):
+                if values[t] <= limit:
+                    change[i], which[i] = values[t], t
+                    break
+    return change, which

@@ -8,15 +8,14 @@ import numpy as np
 from scipy.linalg import lapack
 from scipy.sparse import csr_matrix
 
-from .._arrays import FloatArray, IntArray
-from ..errors import MetricError
-from .coarsen import coarse_basis, representatives
+from ..._arrays import FloatArray, IntArray
+from ...compiled import compiled
+from ...errors import MetricError
+from .aggregation import coarse_basis, representatives
 from .green import GreenOperator
 
 # E^2 that is zero but for rounding.
 ROUNDING = 1e-18
-# Rows of a dense product made at a time.
-BLOCK = 128
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +51,6 @@ class CoarseModel:
 
     def squared_distances(self, one: int, others: IntArray) -> FloatArray:
         """Return (p,) the squared norm of the difference of two Green's functions, for each of the others."""
-        from .aggregate_kernel import squared_distances
-
         basis = self.basis
         return squared_distances(basis.indptr, basis.indices, basis.data, self.kernel, one, others)
 
@@ -75,9 +72,8 @@ def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> C
         # Makes it definite, and means the same: what a source has in sum is taken off in proportion to area.
         stiffness += np.outer(weights, weights) * (stiffness.trace() / (weights @ weights) / len(weights))
     green = inverse_of_definite(stiffness)
-    kernel = symmetric_product(green, coarse.mass @ green)
-    mean = green @ weights
-    kernel -= np.outer(mean, mean)
+    kernel, mean = green @ (coarse.mass @ green), green @ weights
+    kernel = (kernel + kernel.T) / 2 - np.outer(mean, mean)
     bare = basis.T @ curvature
     slope = -(kernel @ bare)
     return CoarseModel(basis, kernel, slope, float(-(slope @ bare)))
@@ -112,13 +108,32 @@ def inverse_of_definite(matrix: FloatArray) -> FloatArray:
     return inverse
 
 
-def symmetric_product(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return one other, (n, n) arrays whose product is symmetric: the upper triangle in blocks, and its mirror."""
-    half = np.zeros_like(one)
-    for start in range(0, len(one), BLOCK):
-        end = start + BLOCK
-        half[start:end, start:] = one[start:end] @ other[:, start:]
-        half[start:end, start:end] = np.triu(half[start:end, start:end])
-    product = half + half.T
-    product[np.diag_indices(len(product))] /= 2
-    return product
+@compiled
+def squared_distances(
+    indptr: IntArray, indices: IntArray, data: FloatArray, kernel: FloatArray, one: int, others: IntArray
+) -> FloatArray:
+    """Return (p,) the squared norm of the difference of row `one` and each other row of a sparse matrix.
+
+    Args:
+        indptr, indices, data: the matrix (n, m).
+        kernel: (m, m) the inner product.
+        one, others: a row, and (p,) rows.
+    """
+    found = np.zeros(len(others))
+    start, stop = indptr[one], indptr[one + 1]
+    own = 0.0
+    image = np.zeros(len(kernel))
+    for e in range(start, stop):
+        for j in range(len(kernel)):
+            image[j] += data[e] * kernel[indices[e], j]
+    for e in range(start, stop):
+        own += data[e] * image[indices[e]]
+    for i in range(len(others)):
+        start, stop = indptr[others[i]], indptr[others[i] + 1]
+        value = own
+        for e in range(start, stop):
+            value -= 2.0 * data[e] * image[indices[e]]
+            for d in range(start, stop):
+                value += data[e] * data[d] * kernel[indices[e], indices[d]]
+        found[i] = max(value, 0.0)
+    return found

@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
-from ..geometry.handles import off_multiple
-from .cone_search import ConeSearch
-from .quantise import QuantisedCones
-from .solution import ConeSolution
+from ..._arrays import FloatArray, IntArray
+from ...geometry.handles import off_multiple
+from ..solution import ConeSolution
+from ..sparse import ConeSearch
+from .search import QuantisedCones
 
 # Vertices around each cone among which it may move, and moves of one or two cones at most.
 NEIGHBOURS, MOVES = 60, 30
@@ -71,10 +71,8 @@ def moved_cones(
         bound: of E.
     """
     operator = search.operator
-    unknown = np.full(len(search.curvature), -1)
-    unknown[operator.vertices] = np.arange(len(operator.vertices))
-    places = unknown[quantised.solution.cones]
-    curvatures = quantised.quantum * quantised.units.astype(np.float64)
+    places = search.unknowns_of(quantised.solution.cones)
+    curvatures = quantised.quantum * quantised.indices.astype(np.float64)
     before, caution = (places, off), 1.0
     for _ in range(MOVES):
         here = search.solution_of(places, curvatures).log_scale[operator.vertices]
@@ -90,7 +88,7 @@ def moved_cones(
         k, old = curvatures[cones], places[cones]
         turned = k[:, None] * (by_curvature[targets] - by_curvature[old])
         bending = np.concatenate(
-            [search.pool.squared_distances(places[c], targets[cones == c]) for c in np.unique(cones)]
+            [search.exact.squared_distances(places[c], targets[cones == c]) for c in np.unique(cones)]
         )
         dearer = 2 * k * (score[targets] - score[old]) + caution * k**2 * bending
         # The last stands for no move.
@@ -116,7 +114,7 @@ def _moves(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray]:
     """Return which cone, and whereto, of all moves to usable vertices nearby; required cones stay."""
     cones, targets = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for i in range(len(search.coarse.fixed), len(places)):
-        near = search.pool.near(int(places[i]), NEIGHBOURS)
+        near = search.exact.near(int(places[i]), NEIGHBOURS)
         near = near[~np.isin(near, places)]
         cones.append(np.full(len(near), i))
         targets.append(near)

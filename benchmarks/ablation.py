@@ -1,0 +1,223 @@
+"""What each part of the cone search brings: `python benchmarks/ablation.py` prints a Markdown table.
+
+The models of `../shared/meshes` and 20 deformed ones, E = 0.1, 0.2 and 0.3; per variant the cones in total and the CPU
+time of the search, the factorization and the coarse model aside where the variant does not concern them. --largest
+leaves models out, --variants takes those whose names contain one of the words given.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import gc
+import json
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import coneflat
+from coneflat.cones import choose
+from coneflat.cones.sparse import aggregation, dense_model, exact_model
+from coneflat.cones.sparse import search as cone_search
+from coneflat.input.components import prepare
+from coneflat.options import Options
+from coneflat.progress import Stages
+from coneflat.threads import one_blas_thread
+
+MODELS = Path(__file__).resolve().parents[2] / "shared" / "meshes"
+DEFORMED = (
+    "3holes.off", "knight.off", "elephant.obj", "fandisk.obj", "spot.obj", "plane-holes.obj", "rocker-arm.obj",
+    "hand.obj", "camelhead.off", "face.obj",
+)  # fmt: skip
+WAYS = ("noise", "stretch", "holes", "slivers", "shuffled")
+DISTORTIONS = (0.1, 0.2, 0.3)
+
+
+def deformed(name: str, how: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return a model, deformed in a way that depends on the two names alone."""
+    mesh = coneflat.read_mesh(MODELS / name)
+    points = np.asarray(mesh.vertices, dtype=float).copy()
+    starts, sizes = np.asarray(mesh.offsets[:-1]), np.diff(mesh.offsets)
+    fans = [
+        mesh.corners[
+            np.stack([starts[sizes > k + 1], starts[sizes > k + 1] + k, starts[sizes > k + 1] + k + 1], 1)
+        ]
+        for k in range(1, sizes.max() - 1)
+    ]
+    faces = np.concatenate(fans)
+    random = np.random.default_rng(sum(map(ord, name + how)))
+    sides = np.linalg.norm(points[faces[:, 1]] - points[faces[:, 0]], axis=1)
+    if how == "noise":
+        points += 0.25 * sides.mean() * random.normal(size=points.shape)
+    elif how == "stretch":
+        points *= [4.0, 1.0, 0.7]
+    elif how == "holes":
+        middles = points[faces].mean(axis=1)
+        for centre in middles[random.choice(len(faces), 4)]:
+            away = np.linalg.norm(middles - centre, axis=1)
+            faces = faces[away > 0.04 * np.ptp(points)]
+            middles = points[faces].mean(axis=1)
+    elif how == "slivers":
+        moved = random.choice(len(faces), len(faces) // 40, replace=False)
+        points[faces[moved, 0]] += 0.97 * (points[faces[moved, 1]] - points[faces[moved, 0]])
+    elif how == "shuffled":
+        order = random.permutation(len(points))
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        points, faces = points[order], place[faces][random.permutation(len(faces))]
+    return points, faces
+
+
+def cases() -> Iterator[tuple[str, tuple[Any, ...]]]:
+    """Yield names and meshes."""
+    for path in sorted(MODELS.glob("*.*"), key=lambda path: path.stat().st_size):
+        if path.suffix != ".md":
+            yield path.name, (path,)
+    for i, name in enumerate(DEFORMED):
+        for how in (WAYS[i % 5], WAYS[(i + 2) % 5]):
+            yield f"{name} {how}", deformed(name, how)
+
+
+Patch = tuple[Any, str, Any]
+
+
+def variants() -> dict[str, list[Patch]]:
+    """Return what is changed in each variant."""
+    search, dense, exact = cone_search, dense_model, exact_model
+    found: dict[str, list[Patch]] = {"as it is": []}
+    for module, name, values in (
+        (search, "NEAR", (1.0, 1.1, 1.35)),
+        (search, "COARSE_DOUBT", (1.2, 1.6)),
+        (search, "SHAKES", (10, 40)),
+        (search, "VERTICES_PER_UNKNOWN", (8, 30)),
+        (search, "LEAST_SIZE", (400, 800)),
+        (search, "MOST_SIZE", (600, 2000)),
+        (aggregation, "LARGEST_AGGREGATE", (7.0,)),
+        (exact, "WORTHWHILE", (1e-2, 1e-4)),
+        (exact, "CAUTIONS", ((1.0,), (2.0,))),
+    ):
+        found |= {f"{name} {value}": [(module, name, value)] for value in values}
+    found["held cones stay"] = [(dense, "MANY", 0)]
+    found["no descent"] = [(dense.DenseModel, "descend", lambda *_: None)]
+    found["no shaking"] = [(dense.DenseModel, "shake", lambda *_: False)]
+    resting = lambda self, count: self.exact.best.energy(count)  # noqa: E731
+    found["no shaking on the mesh"] = [(search.ConeSearch, "_shaken", resting)]
+    found["no start without a cone"] = [(search.ConeSearch, "_on_mesh", on_mesh_from_coarse)]
+    return found
+
+
+def on_mesh_from_coarse(self: Any, count: int) -> float:
+    if count in self.coarse.best:
+        self.exact.polish(self.exact.insert(self.places[self.coarse.best[count].members]))
+    return float(self.exact.best.energy(count))
+
+
+@contextlib.contextmanager
+def patched(patches: list[Patch]) -> Iterator[None]:
+    kept = [(owner, name, getattr(owner, name)) for owner, name, _ in patches]
+    try:
+        for owner, name, value in patches:
+            setattr(owner, name, value)
+        yield
+    finally:
+        for owner, name, value in kept:
+            setattr(owner, name, value)
+
+
+OPENING = (
+    "X800",
+    "X600",
+    "X1200",
+    "VERTICES",
+    "LEAST_SIZE",
+    "MOST_SIZE",
+    "WEAK",
+    "LARGEST_AGGREGATE",
+    "TRIES",
+)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--largest", type=int, default=10**9, help="triangles")
+    parser.add_argument("--smallest", type=int, default=0, help="triangles")
+    parser.add_argument("--variants", default="", help="words, comma between")
+    parser.add_argument("--skip", default="", help="words in the names of models to leave out, comma between")
+    parser.add_argument("--out", type=Path, help="JSON of all counts")
+    arguments = parser.parse_args()
+    words = [word for word in arguments.variants.split(",") if word]
+    skipped = [word for word in arguments.skip.split(",") if word]
+    chosen = {
+        n: v for n, v in variants().items() if n == "as it is" or not words or any(w in n for w in words)
+    }
+    totals: dict[str, list[float]] = {name: [0, 0.0, 0.0, 0] for name in chosen}
+    counts: dict[str, dict[str, int]] = {name: {} for name in chosen}
+    options = Options(repair=True)
+    green, model = cone_search.GreenOperator, cone_search.coarse_model
+    for case, given in cases():
+        if any(word in case for word in skipped):
+            continue
+        with one_blas_thread():
+            part = max(
+                prepare(*given, *[None] * (2 - len(given)), options).components, key=lambda e: len(e.faces)
+            )
+            if not arguments.smallest <= len(part.mesh.faces) <= arguments.largest:
+                continue
+            surface = choose.Surface.of(part.mesh, part.lengths)
+            if choose.only_choice(surface, part.wishes, options) is not None:
+                continue
+            operators: list[Any] = []
+            coarse: list[Any] = []
+
+            def one_operator(*given: Any) -> Any:
+                if not operators:  # noqa: B023
+                    operators.append(green(*given))  # noqa: B023
+                return operators[0]  # noqa: B023
+
+            def one_model(*given: Any) -> Any:
+                if not coarse:  # noqa: B023
+                    coarse.append(model(*given))  # noqa: B023
+                return coarse[0]  # noqa: B023
+
+            shared: list[Patch] = [
+                (cone_search, "GreenOperator", one_operator),
+                (cone_search, "coarse_model", one_model),
+            ]
+            with patched(shared):
+                choose.search_on(surface, part.wishes, options, Stages(None))
+            for name, patches in chosen.items():
+                changes_model = any(name.startswith(word) for word in OPENING)
+                sharing = shared[:1] if changes_model else shared
+                for distortion in DISTORTIONS:
+                    surface.search = None
+                    gc.collect()
+                    with patched(patches + sharing):
+                        start = time.process_time()
+                        search = choose.search_on(surface, part.wishes, options, Stages(None))
+                        opened = time.process_time()
+                        found = search.fewest(distortion)
+                    done = time.process_time()
+                    totals[name][0] += len(found.solution.cones)
+                    totals[name][1] += opened - start
+                    totals[name][2] += done - opened
+                    totals[name][3] += found.distortion > distortion
+                    counts[name][f"{case} {distortion}"] = len(found.solution.cones)
+        base = totals["as it is"]
+        print(case, len(part.mesh.faces), base, file=sys.stderr, flush=True)
+        if arguments.out:
+            arguments.out.write_text(json.dumps({"counts": counts, "totals": totals}))
+    print("| variant | cones | fewer, more | E missed | opening, s | search, s |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    base_counts = counts["as it is"]
+    for name, (cones, opening, seconds, missed) in totals.items():
+        fewer = sum(counts[name][key] < base_counts[key] for key in base_counts)
+        more = sum(counts[name][key] > base_counts[key] for key in base_counts)
+        print(f"| {name} | {cones:.0f} | {fewer}, {more} | {missed} | {opening:.2f} | {seconds:.2f} |")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Cones whose curvatures are whole multiples of a quantum."""

@@ -1,0 +1,170 @@
+"""The fewest cones whose curvatures are multiples of a quantum.
+
+For given positions this is an integer least squares problem in a few unknowns; here positions and indices are searched
+together, by moves that keep the sum.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..._arrays import IntArray
+from ...errors import CurvatureError, OptionError
+from ...options import LEAST_QUANTUM
+from ..solution import FULL_TURN, ConeSolution
+from ..sparse.exact_model import WORTHWHILE
+from ..sparse.search import ConeSearch
+from .lattice import Lattice, Quanta
+
+# How far, relative, 2 pi chi may be from a multiple of the quantum: what a quantum typed with seven digits is off by.
+WHOLE = 1e-6
+# Curvature, radians, that stands for "no bound": more than that of any cone worth having.
+UNBOUNDED = 2000 * math.pi
+# How far, as a factor of E^2, the coarse model is trusted: cones within are looked at on the mesh itself.
+COARSE_DOUBT = 1.35
+# The survey ends so many sizes after the goal is met, or after E has ceased to fall: more cones of whole quanta need
+# not be better.
+BEYOND, STALLED = 2, 5
+
+
+@dataclass(frozen=True, eq=False)
+class QuantisedCones:
+    """Cones with whole numbers of quanta.
+
+    Attributes:
+        solution: the cones.
+        indices: (s,) quanta of each.
+        quantum: radians, made exact where 2 pi is a multiple of it but for rounding.
+        distortion: E of the linear model.
+    """
+
+    solution: ConeSolution
+    indices: IntArray
+    quantum: float
+    distortion: float
+
+
+def quantise_cones(
+    search: ConeSearch,
+    quantum: float = math.pi / 2,
+    *,
+    distortion: float = 0.2,
+    count: int | None = None,
+    most: int | None = None,
+) -> QuantisedCones:
+    """Find the fewest cones with curvatures that are multiples of a quantum and E <= distortion.
+
+    Args:
+        search: of the mesh; cones it has found serve as starts.
+        quantum: radians.
+        distortion: the E allowed.
+        count: a number of cones instead: the least distortion with at most so many.
+        most: of the fewest, the limit.
+
+    Raises:
+        OptionError: the quantum makes no sense.
+        CurvatureError: no multiples within the bounds sum to 2 pi chi.
+    """
+    lattice = open_lattice(search, quantum)
+    goal = 0.0 if count is not None else distortion * distortion
+    if not goal >= 0 or (count is None and not 0 < distortion < math.inf):
+        raise OptionError(f"the distortion allowed must be a positive number, not {distortion:g}")
+    most = min(search.most_cones, *(limit for limit in (count, most) if limit is not None), search.most_cones)
+    survey(search, lattice, goal, most)
+    exact = Lattice(search.exact, lattice.quanta, lattice.total)
+    sizes = [size for size in lattice.best.sizes if size <= most]
+    if not sizes:
+        needed = min(lattice.best.sizes, default=lattice.fewest)
+        raise CurvatureError(
+            f"{most} cones cannot carry the total curvature in multiples of {lattice.quanta.quantum / np.pi:.4g} pi: "
+            f"{needed} or more are needed"
+        )
+    first = next((size for size in sizes if lattice.best.energy(size) <= goal), sizes[-1])
+    for size in sizes[sizes.index(first) :]:
+        if polish(search, lattice, exact, size) <= goal:
+            break
+    for size in reversed(sizes[: sizes.index(first)]):
+        near = lattice.best.energy(size) <= goal * COARSE_DOUBT
+        if not near or not polish(search, lattice, exact, size) <= goal:
+            break
+    found = exact.best.fewest(goal)
+    solution = search.solution_of(search.exact.unknowns[found.members], lattice.curvatures(found))
+    return QuantisedCones(solution, found.indices, lattice.quanta.quantum, math.sqrt(found.energy))
+
+
+def open_lattice(search: ConeSearch, quantum: float) -> Lattice:
+    """Return the lattice of multiples of a quantum that a search's limits allow, without cones yet."""
+    if not LEAST_QUANTUM <= quantum <= FULL_TURN * (1 + WHOLE):
+        raise OptionError(f"the quantum must be from {LEAST_QUANTUM:g} radians to 2 pi, not {quantum:g}")
+    parts = round(FULL_TURN / quantum)
+    if abs(parts * quantum - FULL_TURN) <= WHOLE * FULL_TURN:
+        quantum = FULL_TURN / parts
+    limits = search.limits
+    total = None
+    if limits.has_sum:
+        total = round(limits.total / quantum)
+        if abs(total * quantum - limits.total) > WHOLE * max(abs(limits.total), 1.0):
+            raise CurvatureError(
+                f"curvatures must sum to 2 pi chi = {limits.total / np.pi:.6g} pi, which is no multiple of "
+                f"{quantum / np.pi:.6g} pi"
+            )
+    least = math.ceil(max(limits.least, -UNBOUNDED) / quantum - WHOLE)
+    most = math.floor(min(limits.most, UNBOUNDED) / quantum + WHOLE)
+    if (
+        least > most
+        or least == most == 0
+        or (total is not None and (total > 0 >= most or total < 0 <= least))
+    ):
+        raise CurvatureError(
+            f"no multiple of {quantum / np.pi:.4g} pi lies within the bounds of cone curvatures, {limits.text()}, and "
+            "helps to their sum"
+        )
+    return Lattice(search.coarse, Quanta(float(quantum), least, most, total is not None), total)
+
+
+def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None:
+    """Find good cones of all numbers up to the one that is needed, and a little on, on the coarse model."""
+    model, best = search.coarse, lattice.best
+    fewest = max(lattice.fewest, len(model.fixed))
+    most = min(most + 1, search.most_cones)
+    model.climb(goal / COARSE_DOUBT, most)
+    for found in model.best:
+        start = lattice.rounded(found.members)
+        if start is not None:
+            best.offer(lattice.exchanged(start))
+    if not best.sizes:
+        start = lattice.any_of(fewest)
+        if start is None:
+            return
+        best.offer(lattice.exchanged(start))
+    size, beyond, stalled, least = min(best.sizes), 0, 0, math.inf
+    while size < most and beyond < BEYOND and stalled < STALLED:
+        grown = lattice.grown(best[size])
+        if grown is None:
+            break
+        best.offer(lattice.exchanged(grown))
+        size = len(grown)
+        beyond += best.energy(size) <= goal
+        stalled = 0 if best.energy(size) < least * (1 - WORTHWHILE) else stalled + 1
+        least = min(least, best.energy(size))
+    for size in reversed(best.sizes):
+        shrunk = lattice.shrunk(best[size])
+        if shrunk is not None:
+            best.offer(lattice.exchanged(shrunk))
+
+
+def polish(search: ConeSearch, lattice: Lattice, exact: Lattice, size: int) -> float:
+    """Move the coarse model's cones of a number over the mesh until E comes to rest; return E^2."""
+    model, start = search.exact, lattice.best[size]
+    members = model.insert(search.places[start.members])
+    cones = exact.exchanged(exact.descended(members, start.indices))
+    before = math.inf
+    while cones.energy < before * (1 - WORTHWHILE) and model.approach(
+        cones.members, exact.curvatures(cones), cones.energy
+    ):
+        before, cones = cones.energy, exact.exchanged(exact.descended(cones.members, cones.indices))
+    exact.best.offer(cones)
+    return cones.energy

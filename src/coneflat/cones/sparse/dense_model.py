@@ -1,0 +1,242 @@
+"""Energies of cones on a dense model, and the moves that improve them.
+
+The distortion of cones S with curvatures k is E^2 = constant + 2 slope_S k + k gram_SS k. With the other cones
+refitted freely, candidate t lowers it by (slope_t + gram_tS k + lambda)^2 / h_t, where h_t is what remains of gram_tt
+after projection (orthogonal matching pursuit: Y. Pati, R. Rezaiifar, P. Krishnaprasad 1993). All candidates are
+scored at once; the best is fitted exactly, bounds and all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..._arrays import BoolArray, FloatArray, IntArray
+from .best_sets import GAIN, BestSets, ConeSet
+from .fit_curvatures import fit_members, index_of_least
+from .limits import Limits
+from .scores import addition_scores, gradients, project, swap_table
+
+# Changes that differ by less, relatively, are equal, and the first in the order of candidates is taken: symmetric
+# surfaces have many that differ by rounding only.
+TIE = 1e-9
+# In sets of more cones than this, those held at a bound are not exchanged, for time.
+MANY = 40
+# So many cones more that bring E^2 down by less than this factor are no use: bounds are in the way.
+STALL, STALLED = 10, 0.99
+
+
+def above_rounding(energy: float) -> float:
+    """Return E^2, which rounding may have made less than nothing: gains are shares of it, and must not be losses."""
+    return max(float(energy), 0.0)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The best curvatures of cones.
+
+    Attributes:
+        curvatures: (s,) radians.
+        multiplier: of their sum; 0 without one.
+        feasible: whether the bounds allow the sum.
+        energy: E^2; infinite if not feasible.
+    """
+
+    curvatures: FloatArray
+    multiplier: float
+    feasible: bool
+    energy: float
+
+
+def first_least(values: FloatArray) -> int:
+    """Return the first index whose value is the least but for rounding."""
+    return int(index_of_least(values, TIE))
+
+
+@dataclass(eq=False)
+class DenseModel:
+    """Energies of cones on m candidates, and the best sets that were found.
+
+    Attributes:
+        gram, slope, constant: (m, m), (m,) and a number.
+        usable: (m,) whether a candidate may be chosen; False for required ones, which are in every set.
+        fixed: the required candidates, which come first in every set.
+        limits: of the curvatures.
+        least: (m,) bound of the curvature at each candidate, the limit or above.
+        best: by number of cones.
+    """
+
+    gram: FloatArray
+    slope: FloatArray
+    constant: float
+    usable: BoolArray
+    fixed: IntArray
+    limits: Limits
+    least: FloatArray
+    best: BestSets[ConeSet] = field(default_factory=BestSets)
+
+    @property
+    def diagonal(self) -> FloatArray:
+        """(m,) of the gram matrix."""
+        return np.ascontiguousarray(self.gram.diagonal())
+
+    def fit(self, members: IntArray) -> Fit:
+        """Return the best curvatures of a set."""
+        limits = self.limits
+        given = self.gram, self.slope, self.constant, self.least, limits.most, limits.total
+        fitted = Fit(*fit_members(*given, members))
+        return fitted if fitted.energy >= 0 else replace(fitted, energy=above_rounding(fitted.energy))
+
+    def energy(self, members: IntArray) -> float:
+        """Return E^2 of a set, infinite where bounds leave no curvatures."""
+        return self.fit(members).energy
+
+    def additions(self, members: IntArray) -> FloatArray:
+        """Return (m,) by how much E^2 changes if a candidate joins the members (0 or less), bounds of others aside."""
+        limits, diagonal, fitted = self.limits, self.diagonal, self.fit(members)
+        if limits.has_sum and not len(members):
+            change: FloatArray = (2 * self.slope + diagonal * limits.total) * limits.total
+            return change
+        least, most, free = self.least, limits.most, members[self._are_inside(members, fitted)]
+        if not fitted.feasible:  # then none is bounded
+            least, most, free = np.full_like(self.least, -math.inf), math.inf, members
+        if limits.has_sum and not len(free):
+            free = members[:1]
+        gradient = gradients(self.gram, self.slope, members, fitted.curvatures, fitted.multiplier)
+        return addition_scores(self.gram, diagonal, gradient, free, least, most, limits.has_sum)
+
+    def _are_inside(self, members: IntArray, fitted: Fit) -> BoolArray:
+        """Return a mask of the members whose curvature no bound holds."""
+        k = fitted.curvatures
+        span = 1e-9 * (1.0 + np.abs(k))
+        inside: BoolArray = (k < self.limits.most - span) & (k > self.least[members] + span)
+        return inside
+
+    def grown(self, members: IntArray, usable: BoolArray | None = None) -> IntArray | None:
+        """Return the members and the usable candidate that scores best; None if there is none left."""
+        is_open = (self.usable if usable is None else usable).copy()
+        is_open[members] = False
+        left = np.flatnonzero(is_open)
+        if self.limits.total < 0 and len(members) < self.limits.fewest:
+            # Too few to carry the total: those that can carry some of it.
+            carrying = left[self.least[left] < 0]
+            left = carrying if len(carrying) else left
+        if not len(left):
+            return None
+        return np.append(members, left[first_least(self.additions(members)[left])])
+
+    def shrunk(self, members: IntArray) -> IntArray | None:
+        """Return the members without the one that costs least while the others are refitted; None if none can go."""
+        fixed = len(self.fixed)
+        if len(members) == fixed:
+            return None
+        kept = project(self.gram, self.diagonal, members, self.limits.has_sum, True)[2]
+        loss = self.fit(members).curvatures ** 2 / np.maximum(kept, 1e-300)
+        rests = (np.delete(members, fixed + place) for place in np.argsort(loss[fixed:], kind="stable"))
+        return next((rest for rest in rests if self.fit(rest).feasible), None)
+
+    def best_swaps(self, members: IntArray, fitted: Fit) -> tuple[FloatArray, IntArray]:
+        """Return for each member the change of E^2 by its best replacement, and which that is; infinite if not known.
+
+        Removing a member is a rank one change of the inverse, so all members against all candidates cost little more
+        than scoring the candidates once. Members held at a bound, and the required, are left out.
+        """
+        limits, diagonal = self.limits, self.diagonal
+        change, which = np.full(len(members), np.inf), np.full(len(members), -1)
+        places = np.flatnonzero(self._are_inside(members, fitted))
+        if not len(places):
+            return change, which
+        gradient = gradients(self.gram, self.slope, members, fitted.curvatures, fitted.multiplier)
+        remain, rows, kept, bare = project(self.gram, diagonal, members[places], limits.has_sum, True)
+        movable = np.flatnonzero((places >= len(self.fixed)) & (kept > 1e-10 * bare))
+        places = places[movable]
+        is_open = self.usable.copy()
+        is_open[members] = False
+        change[places], which[places] = swap_table(
+            np.ascontiguousarray(rows[movable]),
+            kept[movable],
+            fitted.curvatures[places],
+            gradient,
+            remain,
+            1e-9 * diagonal,
+            is_open,
+            self.least,
+            limits.most,
+            TIE,
+        )
+        return change, which
+
+    def exchanged(self, members: IntArray) -> ConeSet:
+        """Return the set after members, one at a time, were replaced as long as E^2 falls. The required ones stay."""
+        best = ConeSet(self.energy(members), members)
+        while True:
+            swaps = (ConeSet(self.energy(swapped), swapped) for swapped in self._swaps(best.members))
+            better = next((found for found in swaps if found.energy < best.energy * (1 - GAIN)), None)
+            if better is None:
+                return best
+            best = better
+
+    def _swaps(self, members: IntArray) -> Iterator[IntArray]:
+        """Yield the members with the best replacement that the table shows, then with the best for each it leaves out.
+
+        In large sets those stay: each takes as long as the whole table.
+        """
+        fitted = self.fit(members)
+        if not fitted.feasible or not len(members):
+            return
+        change, which = self.best_swaps(members, fitted)
+        place = first_least(change)
+        if change[place] <= -GAIN * fitted.energy:
+            yield _with(members, place, which[place])
+        for place in range(len(self.fixed), len(members) if len(members) <= MANY else 0):
+            grown = self.grown(np.delete(members, place)) if np.isinf(change[place]) else None
+            if grown is not None and grown[-1] != members[place]:
+                yield _with(members, place, grown[-1])
+
+    def climb(self, bound: float, most: int, start: int | None = None) -> None:
+        """Add cones, to the best set of the size `start` if it is given, until E^2 <= bound, or there are `most`."""
+        members: IntArray | None = self.best[start].members if start is not None else self.fixed
+        while members is not None:
+            found = self.exchanged(members)
+            self.best.offer(found)
+            size, energy = len(found), self.best.energy(len(found))
+            if (
+                size >= most
+                or energy <= bound
+                or energy >= STALLED * self.best.energy(size - STALL) < math.inf
+            ):
+                break
+            members = self.grown(self.best[size].members if size in self.best else found.members)
+
+    def descend(self, least: int, most: int) -> None:
+        """Take cones away one at a time, from the best set of `most` down to one of `least`."""
+        for size in range(most, max(least, len(self.fixed)), -1):
+            shrunk = self.shrunk(self.best[size].members) if size in self.best else None
+            if shrunk is not None:
+                self.best.offer(self.exchanged(shrunk))
+
+    def shake(self, size: int, tries: int) -> bool:
+        """Take two or three cones of the best set of a size away and refill, over and over; tell if it got better."""
+        random = np.random.default_rng(0)
+        fixed, found = len(self.fixed), False
+        for i in range(tries if size - fixed >= 2 else 0):
+            members = self.best[size].members
+            out = fixed + random.choice(size - fixed, min(2 + i % 2, size - fixed), replace=False)
+            usable = self.usable.copy()
+            usable[members[out]] = False
+            rest: IntArray | None = np.delete(members, out)
+            while rest is not None and len(rest) < size:
+                rest = self.grown(rest, usable)
+            if rest is not None:
+                found |= self.best.offer(self.exchanged(rest))
+        return found
+
+
+def _with(members: IntArray, place: int, candidate: int) -> IntArray:
+    """Return the members with another one at a place."""
+    swapped = members.copy()
+    swapped[place] = candidate
+    return swapped

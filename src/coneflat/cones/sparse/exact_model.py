@@ -1,0 +1,159 @@
+"""Exact energies of cones at the vertices tried so far, and where on the mesh cones should go from there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..._arrays import BoolArray, FloatArray, IntArray
+from ...compiled import compiled
+from .best_sets import BestSets
+from .coarse_model import CoarseModel
+from .dense_model import DenseModel, first_least
+from .green import GreenOperator
+from .limits import Limits
+
+# A move is tried if it promises to lower E^2 by this share.
+WORTHWHILE = 1e-3
+# A cone is tried at the end of a longer and of a more cautious step, as the distances are those of a coarse model.
+CAUTIONS = 1.0, 4.0
+
+
+class ExactModel(DenseModel):
+    """A dense model on a growing set of vertices, with exact entries.
+
+    Attributes:
+        unknowns: (m,) the vertex of each candidate, in the numbering of the operator.
+    """
+
+    def __init__(
+        self,
+        operator: GreenOperator,
+        coarse: CoarseModel,
+        log_scale: FloatArray,
+        required: IntArray,
+        limits: Limits,
+        least: FloatArray,
+    ) -> None:
+        none = np.empty(0)
+        fixed = np.arange(len(required))
+        super().__init__(np.empty((0, 0)), none, coarse.constant, none.astype(bool), fixed, limits, none)
+        self._operator, self._coarse, self._log_scale = operator, coarse, log_scale
+        self._usable = np.ones(len(log_scale), dtype=bool)
+        self._indptr = operator.laplacian.indptr.astype(np.int64)
+        self._indices = operator.laplacian.indices.astype(np.int64)
+        self._slope = operator.solve(operator.weighted(log_scale))
+        self._least = least
+        # The Green's functions of the unknowns, in blocks as they came.
+        self._responses: list[FloatArray] = []
+        self.unknowns: IntArray = np.empty(0, dtype=np.int64)
+        self.insert(required)
+
+    def restrict(self, usable: BoolArray) -> None:
+        """Let cones move to the (f,) usable unknowns alone, and forget the sets found; energies stay known."""
+        self._usable = usable
+        self.usable = usable[self.unknowns]
+        self.best = BestSets()
+
+    def insert(self, unknowns: IntArray) -> IntArray:
+        """Add vertices, if they are not in, and return the places of all."""
+        new = np.setdiff1d(unknowns, self.unknowns)
+        if len(new):
+            # Required ones come first and stay in the order given.
+            new = unknowns if not len(self.unknowns) else new
+            old = len(self.unknowns)
+            self.unknowns = np.concatenate([self.unknowns, new])
+            self._responses.append(self._operator.responses(new))
+            rows = np.hstack(
+                [self._operator.products(self._responses[-1], block) for block in self._responses]
+            )
+            gram = np.empty((len(self.unknowns), len(self.unknowns)))
+            gram[:old, :old] = self.gram
+            gram[old:] = rows
+            gram[:old, old:] = rows[:, :old].T
+            gram[old:, old:] = (rows[:, old:] + rows[:, old:].T) / 2
+            self.gram = gram
+            self.slope = self._slope[self.unknowns]
+            self.usable = self._usable[self.unknowns]
+            self.usable[self.fixed] = False
+            self.least = self._least[self.unknowns]
+        order = np.argsort(self.unknowns, kind="stable")
+        return order[np.searchsorted(self.unknowns, unknowns, sorter=order)]
+
+    def polish(self, members: IntArray) -> float:
+        """Move cones over the mesh until E comes to rest; return E^2 of the best set of their number."""
+        found = self.exchanged(members)
+        self.best.offer(found)
+        before = math.inf
+        while found.energy < before * (1 - WORTHWHILE) and self.approach(
+            found.members, self.fit(found.members).curvatures, found.energy
+        ):
+            before, found = found.energy, self.exchanged(found.members)
+            self.best.offer(found)
+        return self.best.energy(len(found))
+
+    def approach(self, members: IntArray, curvatures: FloatArray, energy: float) -> bool:
+        """Add the vertices where cones should move by the score and the coarse model's distances; tell if any is new.
+
+        Moving curvature k from s to t changes E^2 by 2 k (q_t - q_s) + k^2 ||g_s - g_t||^2, q the score.
+        """
+        score = self._score(members, curvatures)
+        # Some of the coarse model's functions wide: from there on its distances tell nothing.
+        size = max(40, 4 * len(self._usable) // self._coarse.basis.shape[1])
+        taken = self.unknowns[members]
+        targets = []
+        for place in range(len(self.fixed), len(members)):
+            s, k = int(taken[place]), curvatures[place]
+            near = self.near(s, size)
+            near = near[~np.isin(near, taken)]
+            if not len(near) or k == 0:
+                continue
+            linear = 2 * k * (score[near] - score[s])
+            bending = k * k * self.squared_distances(s, near)
+            for caution in CAUTIONS:
+                change = linear + caution * bending
+                best = first_least(change)
+                if change[best] < -WORTHWHILE * energy:
+                    targets.append(int(near[best]))
+        known = len(self.unknowns)
+        self.insert(np.unique(np.array(targets, dtype=np.int64)))
+        return len(self.unknowns) > known
+
+    def _score(self, members: IntArray, curvatures: FloatArray) -> FloatArray:
+        """Return (f,) half the derivative of E^2 by the curvature of a cone at each vertex."""
+        log_scale = self._log_scale.copy()
+        first = 0
+        for block in self._responses:
+            inside = (members >= first) & (members < first + len(block))
+            log_scale += curvatures[inside] @ block[members[inside] - first]
+            first += len(block)
+        return self._operator.solve(self._operator.weighted(log_scale))
+
+    def near(self, unknown: int, size: int) -> IntArray:
+        """Return the usable vertices among the `size` nearest to one."""
+        found = ball(self._indptr, self._indices, unknown, size)
+        return found[self._usable[found]]
+
+    def squared_distances(self, one: int, others: IntArray) -> FloatArray:
+        """Return (p,) about the squared norm of the difference of two Green's functions, for each of the others."""
+        return self._coarse.squared_distances(one, others)
+
+
+@compiled
+def ball(indptr: IntArray, indices: IntArray, centre: int, size: int) -> IntArray:
+    """Return the `size` vertices nearest to a vertex in steps along edges, whole rings of them, itself first."""
+    seen = {centre}
+    found = [centre]
+    start = 0
+    while len(found) < size and start < len(found):
+        end = len(found)
+        for i in range(start, end):
+            vertex = found[i]
+            for e in range(indptr[vertex], indptr[vertex + 1]):
+                other = indices[e]
+                if other not in seen:
+                    seen.add(other)
+                    found.append(other)
+        start = end
+    return np.array(found)

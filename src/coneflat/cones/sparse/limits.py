@@ -1,0 +1,122 @@
+"""What curvatures cones may have, what they must sum to, and so how many cones it takes at least."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..._arrays import BoolArray, IntArray
+from ...errors import CurvatureError, OptionError
+from ...text import plural
+from ..solution import FULL_TURN
+
+# More cones than these, beside the required ones, are not searched for: a seam through them all is no use.
+MOST_CONES = 200
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds and sum of curvatures.
+
+    Attributes:
+        least, most: bounds of each cone's curvature, radians.
+        total: what they sum to, radians; NaN on a bounded mesh, whose boundary takes the rest.
+    """
+
+    least: float
+    most: float
+    total: float
+
+    @classmethod
+    def of_angles(
+        cls,
+        euler_characteristic: int | None,
+        min_cone_angle: float,
+        max_cone_angle: float | None,
+        positive_only: bool,
+    ) -> Limits:
+        """Return the limits for cone angles, radians; no Euler characteristic is given for a mesh with a boundary.
+
+        Raises:
+            OptionError: the angles leave nothing.
+            CurvatureError: cones of these angles cannot have the sum of curvatures of the surface.
+        """
+        if not 0 < min_cone_angle < math.inf:
+            raise OptionError(f"the smallest cone angle must be positive, not {min_cone_angle:g} radians")
+        if max_cone_angle is not None and not max_cone_angle > min_cone_angle:
+            raise OptionError(
+                f"the largest cone angle ({max_cone_angle:g} radians) must exceed the smallest ({min_cone_angle:g})"
+            )
+        least = -math.inf if max_cone_angle is None else FULL_TURN - max_cone_angle
+        if positive_only:
+            least = max(least, 0.0)
+        most = FULL_TURN - min_cone_angle
+        if positive_only and most <= 0:
+            raise OptionError("cones of positive curvature only have angles below 2 pi: allow smaller angles")
+        if euler_characteristic is None:
+            return cls(least, most, math.nan)
+        total = FULL_TURN * euler_characteristic
+        if (total > 0 and most <= 0) or (total < 0 and least >= 0):
+            kind = "positive" if total < 0 else "negative"
+            raise CurvatureError(
+                f"a surface of Euler characteristic {euler_characteristic} has a total curvature of "
+                f"{2 * euler_characteristic} pi, which cones of {kind} curvature alone cannot carry"
+            )
+        return cls(least, most, total)
+
+    @property
+    def has_sum(self) -> bool:
+        """Whether the curvatures have a sum to keep."""
+        return not math.isnan(self.total)
+
+    @property
+    def fewest(self) -> int:
+        """The least number of cones that can carry the total."""
+        if not self.has_sum or abs(self.total) < 1e-9:
+            return 0
+        bound = self.most if self.total > 0 else self.least
+        return math.ceil(self.total / bound - 1e-9) if math.isfinite(bound) else 1
+
+    @property
+    def largest(self) -> int | None:
+        """The largest number of cones that the total leaves room for, None for any."""
+        if self.has_sum and self.total > 0 and self.least > 0:
+            return int(self.total / self.least + 1e-9)
+        return None
+
+    def text(self) -> str:
+        """Return the bounds for a message."""
+        if not math.isfinite(self.least):
+            return f"up to {self.most / math.pi:.4g} pi"
+        return f"{self.least / math.pi:.4g} pi to {self.most / math.pi:.4g} pi"
+
+    def check_available(self, usable: BoolArray, required: IntArray) -> None:
+        """Raise CurvatureError if cones at the (n,) usable vertices and the required ones cannot carry the total."""
+        if self.fewest > MOST_CONES + len(required):
+            raise CurvatureError(
+                f"a total curvature of {self.total / np.pi:.4g} pi needs {self.fewest:,} cones or more within these "
+                f"bounds, and the pursuit finds {MOST_CONES} at most: allow other angles, or choose the greedy search "
+                "(--cones greedy), which has no bounds"
+            )
+        available = np.count_nonzero(usable) + np.count_nonzero(~usable[required])
+        if available < self.fewest:
+            raise CurvatureError(
+                f"cones are allowed at {plural(available, 'vertex', 'vertices')}, but {self.fewest} or more cones are "
+                f"needed for a total curvature of {self.total / np.pi:.4g} pi"
+            )
+
+    def check_count(self, count: int, required: int) -> None:
+        """Raise an error if so many cones, `required` of them given, cannot carry the curvature."""
+        if isinstance(count, bool) or count != int(count) or count < 0:
+            raise OptionError(f"the number of cones must be a whole number and not negative, not {count!r}")
+        if count < required:
+            raise CurvatureError(f"{plural(required, 'cone')} required, but only {count} allowed")
+        if count < self.fewest:
+            bound = self.most if self.total > 0 else self.least
+            each = f" of at most {abs(bound) / np.pi:.4g} pi each" if np.isfinite(bound) else ""
+            raise CurvatureError(
+                f"{plural(count, 'cone')}{each} cannot carry this surface's total curvature of "
+                f"{self.total / np.pi:.4g} pi: {self.fewest} or more are needed"
+            )

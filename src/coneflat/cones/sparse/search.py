@@ -1,0 +1,380 @@
+"""The fewest cones for the area distortion allowed: a search on one mesh, for any number of questions.
+
+In the linear model phi = phi_0 + sum_s k_s g_s with the Green's functions g_s of the cones, so choosing cones for a
+small norm of phi is sparse approximation. The literature goes from relaxations (Y. Soliman, D. Slepcev, K. Crane,
+"Optimal cone singularities for conformal flattening", 2018; Q. Fang, W. Ouyang, M. Li, L. Liu, X.-M. Fu, "Computing
+sparse cones with bounded distortion for conformal parameterizations", 2021) to moving given cones (M. Li, Q. Fang,
+Z. Zhang, L. Liu, X.-M. Fu, "Efficient cone singularity construction for conformal parameterizations", 2023). Here
+positions are exchanged, as in subset selection, on a dense coarse model, where that costs next to nothing, and finished
+with exact energies.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_matrix
+
+from ..._arrays import BoolArray, FloatArray, IntArray
+from ...errors import CurvatureError, OptionError
+from ...geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths, mollify
+from ...geometry.operators import vertex_areas, weighted_areas
+from ...geometry.ties import tie_key as key_of_shape
+from ...mesh import TriangleMesh
+from ...text import list_some, plural
+from ...threads import meanwhile
+from ..solution import FULL_TURN, ConeSolution, LaplacianInverse, target_from_log_scale
+from .best_sets import ConeSet
+from .coarse_model import candidates, coarse_model
+from .dense_model import DenseModel
+from .exact_model import ExactModel
+from .green import GreenOperator
+from .limits import MOST_CONES, Limits
+
+# Unknowns of the coarse model: one for so many vertices, within bounds that keep its dense inverse cheaper than the
+# factorization of the mesh's own Laplacian.
+VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 15, 600, 1200
+# How far, as a factor of E^2, the coarse model is trusted: sets within are made better there.
+COARSE_DOUBT = 1.35
+# Sets that miss the goal by less than this factor of E^2, or would by the coarse model, are tried on the mesh, and
+# shaken.
+NEAR = 1.2
+# How often some cones of a set are put elsewhere to see if it gets better; oftener gains little.
+SHAKES = 20
+# E^2, or E, that differs by less does not.
+NOTHING = 1e-9
+
+
+@dataclass(frozen=True)
+class SparseCones:
+    """What a search for cones found.
+
+    Attributes:
+        solution: the cones.
+        distortion: E of the linear model: the standard deviation of its log scale by area.
+    """
+
+    solution: ConeSolution
+    distortion: float
+
+
+class ConeSearch:
+    """A search for cones on a connected mesh: one factorization of its Laplacian answers any number of questions.
+
+    The distortion E is the area-weighted standard deviation of the linear log scale. A boundary is held at phi = 0
+    and takes what the cones leave.
+
+        search = ConeSearch.from_mesh(mesh)
+        search.fewest(0.2).solution.cones
+
+    Args:
+        laplacian: (n, n) cotangent Laplacian.
+        curvature: (n,) angle defect, radians.
+        areas: (n,) vertex areas, any unit.
+        is_boundary: (n,) mask of the vertices that take curvature without being cones. Without any, the mesh
+            counts as closed.
+        euler_characteristic: chi of the mesh.
+        tie_key: (n,) breaks ties, the lowest first; None: areas and curvatures do.
+        min_cone_angle, max_cone_angle: bounds of the cones' angles 2 pi - k, radians.
+        positive_only: no cones of negative curvature (angles above 2 pi).
+        weights: (n,) importance of each vertex, 1 where nothing is said.
+        required: vertices that are cones in any case.
+        allowed: (n,) mask of the other vertices that may be cones; None: all.
+        room: (n,) the widest angle of a cone at each vertex, radians; None: as far as `max_cone_angle` goes.
+
+    Attributes:
+        tell: called with what is being tried.
+
+    Raises:
+        OptionError: an option makes no sense.
+        CurvatureError: no curvatures within the bounds have the sum that the surface needs.
+    """
+
+    def __init__(
+        self,
+        laplacian: csc_matrix,
+        curvature: FloatArray,
+        areas: FloatArray,
+        is_boundary: BoolArray,
+        euler_characteristic: int,
+        *,
+        tie_key: FloatArray | None = None,
+        min_cone_angle: float = math.pi / 2,
+        max_cone_angle: float | None = 4 * math.pi,
+        positive_only: bool = False,
+        weights: FloatArray | None = None,
+        required: Iterable[int] = (),
+        allowed: BoolArray | None = None,
+        room: FloatArray | None = None,
+    ) -> None:
+        chi = None if is_boundary.any() else euler_characteristic
+        limits = self.limits = Limits.of_angles(chi, min_cone_angle, max_cone_angle, positive_only)
+        cones = required_vertices(required, is_boundary)
+        usable = ~is_boundary if allowed is None else ~is_boundary & allowed
+        order = np.lexsort((curvature, areas)) if tie_key is None else np.argsort(tie_key, kind="stable")
+        share = weighted_areas(areas, weights)
+        limits.check_available(usable, cones)
+        self._laplacian, self.curvature, self.is_boundary = laplacian, curvature, is_boundary
+        self.tell: Callable[[str], None] = lambda _: None
+        self.operator = GreenOperator(laplacian, share, is_boundary, order)
+        vertices = self.operator.vertices
+        inner = curvature[vertices]
+        size = min(max(len(vertices) // VERTICES_PER_UNKNOWN, LEAST_SIZE), MOST_SIZE)
+        with meanwhile(partial(coarse_model, self.operator, inner, size), 2 * len(vertices)) as modelling:
+            log_scale = -self.operator.solve(inner)
+            model = modelling.result().scaled_to(float(log_scale @ self.operator.weighted(log_scale)))
+        self._coarse_model = model
+        self._least = np.full(len(vertices), limits.least)
+        if room is not None:
+            self._least = np.maximum(self._least, np.minimum(FULL_TURN - room[vertices], 0.0))
+        self._required = self.unknowns_of(cones)
+        self.exact = ExactModel(self.operator, model, log_scale, self._required, limits, self._least)
+        self.restrict(usable)
+
+    @classmethod
+    def from_mesh(cls, mesh: TriangleMesh, lengths: FloatArray | None = None, **options: Any) -> ConeSearch:
+        """Return a search on a connected mesh.
+
+        Args:
+            mesh: see `coneflat.check_mesh`.
+            lengths: (m, 3) side lengths; None: those of the vertices, mollified.
+            options: those of the class.
+        """
+        lengths = mollify(edge_lengths(mesh.vertices, mesh.faces))[0] if lengths is None else lengths
+        count, is_boundary = len(mesh.vertices), mesh.is_boundary_vertex
+        return cls(
+            cotangent_laplacian(mesh.faces, cotangents(lengths), count),
+            angle_defect(mesh.faces, corner_angles(lengths), is_boundary),
+            vertex_areas(mesh.faces, lengths, count),
+            is_boundary,
+            mesh.euler_characteristic,
+            **{"tie_key": key_of_shape(mesh.vertices), **options},
+        )
+
+    def unknowns_of(self, vertices: IntArray) -> IntArray:
+        """Return the unknowns of vertices off the boundary."""
+        unknown = np.full(len(self.curvature), -1, dtype=np.int64)
+        unknown[self.operator.vertices] = np.arange(len(self.operator.vertices))
+        return unknown[vertices]
+
+    def restrict(self, usable: BoolArray) -> None:
+        """Search on among the (n,) usable vertices, with what is known about the mesh.
+
+        Raises:
+            CurvatureError: they cannot carry the curvature.
+        """
+        required, operator = self._required, self.operator
+        self.limits.check_available(usable, operator.vertices[required])
+        is_usable = usable[operator.vertices]
+        is_usable[required] = False
+        # Of vertices side by side, those with room for wide cones represent the others on the coarse model.
+        room = np.maximum(-self._least, 0.0)
+        fitness = 0.5 + 0.5 * room / room.max() if 0 < room.max(initial=0.0) < math.inf else 1.0
+        self.places = np.concatenate([required, candidates(self._coarse_model, is_usable * fitness)])
+        kernel, slope = self._coarse_model.at(self.places)
+        mask = np.arange(len(self.places)) >= len(required)
+        self.coarse = DenseModel(
+            np.ascontiguousarray(kernel),
+            slope,
+            self._coarse_model.constant,
+            mask,
+            np.arange(len(required)),
+            self.limits,
+            self._least[self.places],
+        )
+        self.exact.restrict(is_usable)
+
+    @property
+    def most_cones(self) -> int:
+        """The largest number of cones searched for."""
+        most = min(MOST_CONES + len(self._required), len(self.places))
+        return most if self.limits.largest is None else min(most, self.limits.largest)
+
+    def fewest(self, distortion: float = 0.2, most: int | None = None) -> SparseCones:
+        """Return the fewest cones found with E <= distortion; where they are more than `most`, the best of so many.
+
+        Raises:
+            OptionError: distortion or number make no sense.
+            CurvatureError: so many cones cannot carry the curvature.
+        """
+        if not 0 < distortion < math.inf:
+            raise OptionError(f"the distortion allowed must be a positive number, not {distortion:g}")
+        if most is not None:
+            self.limits.check_count(most, len(self._required))
+        most = self.most_cones if most is None else min(most, self.most_cones)
+        goal = distortion * distortion
+        count = self._survey(goal, most)
+        count = self._reach(count, goal, most)
+        self._reduce(count, goal, most)
+        return self._cones(self.exact.best.fewest(goal, most))
+
+    def best_of(self, count: int) -> SparseCones:
+        """Return the cones of least E that were found, at most `count` of them.
+
+        Raises:
+            OptionError: the number makes no sense.
+            CurvatureError: so many cones cannot carry the curvature.
+        """
+        self.limits.check_count(count, len(self._required))
+        count = min(count, self.most_cones)
+        self._climb(0.0, count + 1, count)
+        self._improve(count - 2, count + 1)
+        for size in [size for size in self.coarse.best.sizes if size <= count][-2:]:
+            self._on_mesh(size)
+            self._shaken(size)
+        return self._cones(self.exact.best.fewest(-1.0, count))
+
+    def curve(self, most: int) -> list[SparseCones]:
+        """Return the best cones found of each number up to `most`, where they have a lower E than fewer."""
+        most = min(most, self.most_cones)
+        self.coarse.climb(0.0, most)
+        self.coarse.descend(1, most)
+        # Upwards and once more down: a set may be best without one of the cones of the next larger.
+        for count in (*range(most + 1), *range(most, -1, -1)):
+            self._on_mesh(count)
+        found: list[SparseCones] = []
+        for count in self.exact.best.sizes:
+            cones = self._cones(self.exact.best[count])
+            if count <= most and (not found or cones.distortion < found[-1].distortion - NOTHING):
+                found.append(cones)
+        return found
+
+    def _survey(self, goal: float, most: int) -> int:
+        """Find good sets of all sizes up to the one that is needed, and a little on, on the coarse model; return it."""
+        self._climb(goal / COARSE_DOUBT, most, most)
+        count = len(self.coarse.best.fewest(goal, most))
+        self._improve(count - 3, count + 1, goal)
+        return len(self.coarse.best.fewest(goal, most))
+
+    def _reach(self, count: int, goal: float, most: int) -> int:
+        """Return a number of cones, from one on, with which E^2 <= goal on the mesh; or beyond which there is no gain.
+
+        Where the coarse model is off, it is off by nearly the same factor for more cones: straight to where that goes.
+        """
+        coarse = self.coarse.best
+        while self._on_mesh(count) > goal and count < most:
+            off = max(self.exact.best.energy(count), NOTHING) / max(coarse.energy(count), NOTHING)
+            off = max(off, 1.0) if off < math.inf else COARSE_DOUBT
+            self.coarse.climb(goal / off, most, count)
+            larger = [size for size in coarse.sizes if size > count]
+            if not larger:
+                break
+            count = next((size for size in larger if coarse.energy(size) * off <= goal), larger[-1])
+            if coarse.energy(count) * off > goal:  # more cones bring nothing
+                break
+        return count
+
+    def _reduce(self, count: int, goal: float, most: int) -> None:
+        """Try one cone less, with all means, as long as it does and may do; one more if need be."""
+        most = min(most, max(self.coarse.best.sizes))
+        while (
+            self.exact.best.energy(count) > goal and self._with_all_means(count, goal) > goal and count < most
+        ):
+            count += 1
+        while self._may_do(count - 1, goal) and self._with_all_means(count - 1, goal) <= goal:
+            count -= 1
+
+    def _may_do(self, count: int, goal: float) -> bool:
+        """Whether so many may do: the larger set without a cone, or by what the coarse model is off for that one."""
+        if count < max(self.limits.fewest, len(self._required)):
+            return False
+        coarse, exact = self.coarse.best, self.exact.best
+        self.exact.descend(count, count + 1)
+        expected = exact.energy(count + 1) * coarse.energy(count)
+        return exact.energy(count) <= NEAR * goal or expected <= NEAR * goal * coarse.energy(count + 1)
+
+    def _climb(self, bound: float, most: int, count: int) -> None:
+        """Find sets on the coarse model, of at most `most` cones; it is an error if none has `count` or fewer."""
+        self.coarse.climb(bound, most)
+        if min(self.coarse.best.sizes, default=count + 1) > count:
+            raise CurvatureError(
+                f"no {count} cones were found that carry a total curvature of {self.limits.total / np.pi:.4g} pi "
+                "within their bounds: allow more of them or other angles, or choose the greedy search "
+                "(--cones greedy), which has no bounds"
+            )
+
+    def _improve(self, least: int, most: int, goal: float | None = None) -> None:
+        """Make the coarse model's sets of some sizes better; only those near the goal, if there is one, are shaken."""
+        model = self.coarse
+        model.descend(least, most)
+        for size in range(most, least - 1, -1):
+            if size in model.best and (
+                goal is None or goal / COARSE_DOUBT < model.best.energy(size) < goal * COARSE_DOUBT
+            ):
+                model.shake(size, SHAKES)
+
+    def _on_mesh(self, count: int) -> float:
+        """Return E^2 of the best set of a size on the mesh, infinite if there is none.
+
+        It starts from the coarse model's set, or from the next larger without a cone if that is better.
+        """
+        self.tell(plural(count, "cone"))
+        exact = self.exact
+        exact.descend(count, count + 1)
+        starts = [exact.best[count].members] if count in exact.best else []
+        if count in self.coarse.best:
+            starts.append(exact.insert(self.places[self.coarse.best[count].members]))
+        if starts:
+            exact.polish(min(starts, key=exact.energy))
+        return exact.best.energy(count)
+
+    def _with_all_means(self, count: int, goal: float) -> float:
+        """Return E^2 of the best set of a size on the mesh, which is shaken if it misses the goal by little."""
+        energy = self._on_mesh(count)
+        return self._shaken(count) if goal < energy <= NEAR * goal else energy
+
+    def _shaken(self, count: int) -> float:
+        """Return E^2 of the best set of a size on the mesh after perturbations of it."""
+        exact = self.exact
+        if count in exact.best and exact.shake(count, SHAKES):
+            exact.polish(exact.best[count].members)
+        return exact.best.energy(count)
+
+    def _cones(self, found: ConeSet) -> SparseCones:
+        """Return the cones of a set on the mesh, those of no curvature left out unless they are required.
+
+        After the required ones, they come in the order of the search's vertices, not in that in which they were found.
+        """
+        unknowns, required = self.exact.unknowns, len(self._required)
+        free = found.members[required:]
+        members = np.concatenate([found.members[:required], free[np.argsort(unknowns[free])]])
+        curvatures = self.exact.fit(members).curvatures
+        keep = np.abs(curvatures) > 1e-9
+        keep[:required] = True
+        kept = curvatures[keep]
+        if self.limits.has_sum and len(kept):
+            # What rounding and those left out have taken from the sum: no metric has another one.
+            kept += (self.limits.total - kept.sum()) / len(kept)
+        return SparseCones(self.solution_of(unknowns[members[keep]], kept), math.sqrt(found.energy))
+
+    def solution_of(self, unknowns: IntArray, curvatures: FloatArray) -> ConeSolution:
+        """Return the solution of given cones and curvatures."""
+        operator = self.operator
+        cones = operator.vertices[unknowns]
+        target = np.zeros(len(self.curvature))
+        target[cones] = curvatures
+        log_scale = np.zeros(len(target))
+        log_scale[operator.vertices] = operator.solve((target - self.curvature)[operator.vertices])
+        absorbed = target_from_log_scale(self._laplacian, self.curvature, log_scale, self.is_boundary)
+        is_zero = np.ones(len(target), dtype=bool)
+        is_zero[operator.vertices] = False
+        inverse = LaplacianInverse(operator.solve_at_vertices, self._laplacian, is_zero, operator.break_even)
+        return ConeSolution(cones, target + absorbed, log_scale, inverse)
+
+
+def required_vertices(required: Iterable[int], is_boundary: BoolArray) -> IntArray:
+    """Return the required cones as an array, checked."""
+    cones = np.array(list(required), dtype=np.int64)
+    bad = cones[(cones < 0) | (cones >= len(is_boundary))]
+    if len(bad):
+        raise OptionError(f"required cones are no vertices of the mesh: {list_some(bad)}")
+    if len(np.unique(cones)) < len(cones):
+        raise OptionError("a required cone is given twice")
+    if is_boundary[cones].any():
+        raise OptionError(f"required cones lie on the boundary: {list_some(cones[is_boundary[cones]])}")
+    return cones
