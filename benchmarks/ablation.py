@@ -90,23 +90,28 @@ def variants() -> dict[str, list[Patch]]:
     search, dense, exact = cone_search, dense_model, exact_model
     found: dict[str, list[Patch]] = {"as it is": []}
     for module, name, values in (
-        (search, "NEAR", (1.0, 1.1, 1.35)),
-        (search, "COARSE_DOUBT", (1.2, 1.6)),
-        (search, "SHAKES", (10, 40)),
-        (search, "VERTICES_PER_UNKNOWN", (8, 30)),
-        (search, "LEAST_SIZE", (400, 800)),
-        (search, "MOST_SIZE", (600, 2000)),
-        (aggregation, "LARGEST_AGGREGATE", (7.0,)),
+        (search, "COARSE_DOUBT", (1.15, 1.2, 1.6)),
+        (search, "NEAR", (1.0, 1.05, 1.15, 1.2)),
+        (search, "SHAKES", (6, 16, 20, 24)),
+        (search, "SEEDS", (0, 1, 6, 8)),
+        (search, "MANY", (20, 80)),
+        (dense, "FITTED", (1, 2, 10)),
+        (exact, "ROUNDS", (4, 100)),
         (exact, "WORTHWHILE", (1e-2, 1e-4)),
-        (exact, "CAUTIONS", ((1.0,), (2.0,))),
+        (exact, "CAUTIONS", ((2.0,), (1.0,), (1.0, 2.0, 4.0))),
+        (search, "VERTICES_PER_UNKNOWN", (8, 30)),
+        (search, "LEAST_SIZE", (200, 600, 800)),
+        (search, "MOST_SIZE", (600, 2000)),
+        (aggregation, "WEAK", (0.0,)),
+        (aggregation, "LARGEST_AGGREGATE", (4.0, 12.0)),
+        (aggregation, "TRIES", (0,)),
     ):
         found |= {f"{name} {value}": [(module, name, value)] for value in values}
-    found["held cones stay"] = [(dense, "MANY", 0)]
-    found["no descent"] = [(dense.DenseModel, "descend", lambda *_: None)]
-    found["no shaking"] = [(dense.DenseModel, "shake", lambda *_: False)]
-    resting = lambda self, count: self.exact.best.energy(count)  # noqa: E731
-    found["no shaking on the mesh"] = [(search.ConeSearch, "_shaken", resting)]
-    found["no start without a cone"] = [(search.ConeSearch, "_on_mesh", on_mesh_from_coarse)]
+    model = dense.DenseModel
+    found["no descent"] = [(model, "descend", lambda *_: None)]
+    found["no shaking"] = [(model, "shake", lambda *_: False)]
+    found["no shrunk start"] = [(search.ConeSearch, "_on_mesh", on_mesh_from_coarse)]
+    found["both starts"] = [(search.ConeSearch, "_on_mesh", on_mesh_both)]
     return found
 
 
@@ -114,6 +119,18 @@ def on_mesh_from_coarse(self: Any, count: int) -> float:
     if count in self.coarse.best:
         self.exact.polish(self.exact.insert(self.places[self.coarse.best[count].members]))
     return float(self.exact.best.energy(count))
+
+
+def on_mesh_both(self: Any, count: int) -> float:
+    exact, starts = self.exact, []
+    if count in self.coarse.best:
+        starts.append(exact.insert(self.places[self.coarse.best[count].members]))
+    if count + 1 in exact.best:
+        shrunk = exact.shrunk(exact.best[count + 1].members)
+        starts += [] if shrunk is None else [shrunk]
+    for start in starts:
+        exact.polish(start)
+    return float(exact.best.energy(count))
 
 
 @contextlib.contextmanager
@@ -128,17 +145,7 @@ def patched(patches: list[Patch]) -> Iterator[None]:
             setattr(owner, name, value)
 
 
-OPENING = (
-    "X800",
-    "X600",
-    "X1200",
-    "VERTICES",
-    "LEAST_SIZE",
-    "MOST_SIZE",
-    "WEAK",
-    "LARGEST_AGGREGATE",
-    "TRIES",
-)
+OPENING = ("VERTICES", "LEAST_SIZE", "MOST_SIZE", "WEAK", "LARGEST_AGGREGATE", "TRIES")
 
 
 def main() -> None:

@@ -12,11 +12,11 @@ import math
 
 import numpy as np
 from common import best_time, meshes
+from coneflat.cones.pursuit import PursuedCones, open_search, pursue
 
 from coneflat import edge_lengths, mollify
 from coneflat.cones import greedy_cones
 from coneflat.cones.choose import Surface
-from coneflat.cones.sparse import ConeSearch, SparseCones
 from coneflat.geometry.ties import tie_key
 from coneflat.solver import factorize
 
@@ -49,15 +49,15 @@ def main() -> None:
         free = np.flatnonzero(~mesh.is_boundary_vertex)
         free = free if mesh.is_boundary_vertex.any() else free[1:]
         inner = surface.laplacian[free][:, free]
-        found: list[SparseCones] = []
+        found: list[PursuedCones] = []
 
         def search() -> None:
-            opened = ConeSearch(
+            opened = open_search(
                 *given,  # noqa: B023
                 tie_key=tie_key(mesh.vertices),  # noqa: B023
                 min_cone_angle=arguments.min_cone_angle * math.pi,
             )
-            found.append(opened.fewest(arguments.distortion))  # noqa: B023
+            found.append(pursue(opened, distortion=arguments.distortion))  # noqa: B023
 
         if name == "sphere":
             search()  # compiles, or loads what was compiled

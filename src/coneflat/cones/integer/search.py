@@ -15,16 +15,14 @@ from ..._arrays import IntArray
 from ...errors import CurvatureError, OptionError
 from ...options import LEAST_QUANTUM
 from ..solution import FULL_TURN, ConeSolution
-from ..sparse.exact_model import WORTHWHILE
-from ..sparse.search import ConeSearch
+from ..sparse.exact_model import ROUNDS, WORTHWHILE
+from ..sparse.search import COARSE_DOUBT, ConeSearch
 from .lattice import Lattice, Quanta
 
 # How far, relative, 2 pi chi may be from a multiple of the quantum: what a quantum typed with seven digits is off by.
 WHOLE = 1e-6
 # Curvature, radians, that stands for "no bound": more than that of any cone worth having.
 UNBOUNDED = 2000 * math.pi
-# How far, as a factor of E^2, the coarse model is trusted: cones within are looked at on the mesh itself.
-COARSE_DOUBT = 1.35
 # The survey ends so many sizes after the goal is met, or after E has ceased to fall: more cones of whole quanta need
 # not be better.
 BEYOND, STALLED = 2, 5
@@ -161,10 +159,15 @@ def polish(search: ConeSearch, lattice: Lattice, exact: Lattice, size: int) -> f
     model, start = search.exact, lattice.best[size]
     members = model.insert(search.places[start.members])
     cones = exact.exchanged(exact.descended(members, start.indices))
-    before = math.inf
-    while cones.energy < before * (1 - WORTHWHILE) and model.approach(
-        cones.members, exact.curvatures(cones), cones.energy
-    ):
-        before, cones = cones.energy, exact.exchanged(exact.descended(cones.members, cones.indices))
+    for _ in range(ROUNDS):
+        known = len(model.unknowns)
+        model.insert(model.targets(cones.members, exact.curvatures(cones), cones.energy))
+        if len(model.unknowns) == known:
+            break
+        moved = exact.exchanged(exact.descended(cones.members, cones.indices))
+        stalled = not moved.energy < cones.energy * (1 - WORTHWHILE)
+        cones = moved
+        if stalled:
+            break
     exact.best.offer(cones)
     return cones.energy

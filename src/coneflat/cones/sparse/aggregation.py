@@ -14,9 +14,8 @@ from scipy.sparse import csr_matrix, diags, identity
 from ..._arrays import FloatArray, IntArray
 from ...compiled import compiled
 
-# Largest factor by which one level shrinks the model, about: half of a vertex and its neighbours. Larger ones take a
-# tenth less to build and leave one cone in a hundred more.
-LARGEST_AGGREGATE = 4.0
+# Largest factor by which one level shrinks the model: an aggregate is a vertex and its neighbours.
+LARGEST_AGGREGATE = 7.0
 # Couplings below this share of the geometric mean of the diagonals do not join vertices (across slivers).
 WEAK = 0.02
 # Damping of the Jacobi step that smooths the aggregates: 4/3 over the largest eigenvalue of D^-1 L, about 2.
@@ -25,6 +24,8 @@ DAMPING = 2 / 3
 ROUNDED = 1e-12
 # Functions that meet at an unknown at most, or it is not smoothed: a hub, which would join all of them to one another.
 MEETING = 100
+# So many unknowns are few enough in any case.
+SMALL = 600
 # The last level has at most so many times the number of functions wanted, if a few tries can do it.
 CLOSE, TRIES = 1.05, 4
 # A level with more than this share of the unknowns of the one before is no progress.
@@ -55,10 +56,12 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
         areas: (n,) vertex areas.
         size: the number of basis functions wanted.
     """
+    functions: csr_matrix | None = (
+        None  # None for the identity, whose products with large matrices take their time
+    )
     level, mass = laplacian, csr_matrix(diags(areas))
-    functions = identity(laplacian.shape[0], format="csr")
     order = np.arange(laplacian.shape[0])
-    while level.shape[0] > 1.2 * size:
+    while level.shape[0] > max(1.2 * size, SMALL):
         level = _without_rounding(level, level.diagonal())
         ratio = level.shape[0] / size
         steps = max(1, round(np.log(ratio) / np.log(LARGEST_AGGREGATE)))
@@ -71,12 +74,18 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
             part = _pieces(np.argsort(order, kind="stable") * size // len(order), size)
         transposed = csr_matrix(part.T)
         level = csr_matrix(transposed @ (level @ part))
-        mass = csr_matrix(transposed @ (mass @ part))
-        functions = csr_matrix(functions @ part)
+        weighted = mass @ part if functions is not None else _with_scaled_rows(part, areas)
+        mass = csr_matrix(transposed @ weighted)
+        functions = part if functions is None else csr_matrix(functions @ part)
         order = _order_of_aggregates(part, order)
-    for matrix in (functions, level, mass):
-        matrix.sort_indices()  # rounding has a say in their order
+    if functions is None:
+        functions = identity(laplacian.shape[0], format="csr")
     return CoarseBasis(functions, level, mass)
+
+
+def _with_scaled_rows(matrix: csr_matrix, factors: FloatArray) -> csr_matrix:
+    data = matrix.data * np.repeat(factors, np.diff(matrix.indptr))
+    return csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def _pieces(labels: IntArray, number: int) -> csr_matrix:
@@ -99,7 +108,7 @@ def _smoothed_aggregates(
     for _ in range(TRIES):
         if most is None or number <= most * CLOSE:
             break
-        # Vertices left over make aggregates smaller than wanted, and another level for that little makes all dense.
+        # Vertices left over make aggregates smaller than wished, and another level for that little makes all dense.
         size *= number / most
         before = number
         labels, number = aggregate(*rows, size, weak)

@@ -3,13 +3,12 @@
 The distortion of cones S with curvatures k is E^2 = constant + 2 slope_S k + k gram_SS k. With the other cones
 refitted freely, candidate t lowers it by (slope_t + gram_tS k + lambda)^2 / h_t, where h_t is what remains of gram_tt
 after projection (orthogonal matching pursuit: Y. Pati, R. Rezaiifar, P. Krishnaprasad 1993). All candidates are
-scored at once; the best is fitted exactly, bounds and all.
+scored at once; the few best are fitted exactly, bounds and all.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,11 +19,12 @@ from .fit_curvatures import fit_members, index_of_least
 from .limits import Limits
 from .scores import addition_scores, gradients, project, swap_table
 
+# How many of the best scored moves are fitted exactly: scores leave out that bounds of other cones may become active,
+# or cease to be.
+FITTED = 5
 # Changes that differ by less, relatively, are equal, and the first in the order of candidates is taken: symmetric
 # surfaces have many that differ by rounding only.
 TIE = 1e-9
-# In sets of more cones than this, those held at a bound are not exchanged, for time.
-MANY = 40
 # So many cones more that bring E^2 down by less than this factor are no use: bounds are in the way.
 STALL, STALLED = 10, 0.99
 
@@ -129,14 +129,19 @@ class DenseModel:
         return np.append(members, left[first_least(self.additions(members)[left])])
 
     def shrunk(self, members: IntArray) -> IntArray | None:
-        """Return the members without the one that costs least while the others are refitted; None if none can go."""
-        fixed = len(self.fixed)
-        if len(members) == fixed:
+        """Return the members without the one that is missed least; None if none can go.
+
+        Those are fitted without that cost least while the others are refitted freely.
+        """
+        places = np.arange(len(self.fixed), len(members))
+        if not len(places):
             return None
         kept = project(self.gram, self.diagonal, members, self.limits.has_sum, True)[2]
-        loss = self.fit(members).curvatures ** 2 / np.maximum(kept, 1e-300)
-        rests = (np.delete(members, fixed + place) for place in np.argsort(loss[fixed:], kind="stable"))
-        return next((rest for rest in rests if self.fit(rest).feasible), None)
+        loss = self.fit(members).curvatures[places] ** 2 / np.maximum(kept[places], 1e-300)
+        places = places[np.argsort(loss, kind="stable")[:FITTED]]
+        energies = np.array([self.energy(np.delete(members, place)) for place in places])
+        chosen = first_least(energies)
+        return np.delete(members, places[chosen]) if np.isfinite(energies[chosen]) else None
 
     def best_swaps(self, members: IntArray, fitted: Fit) -> tuple[FloatArray, IntArray]:
         """Return for each member the change of E^2 by its best replacement, and which that is; infinite if not known.
@@ -171,30 +176,28 @@ class DenseModel:
 
     def exchanged(self, members: IntArray) -> ConeSet:
         """Return the set after members, one at a time, were replaced as long as E^2 falls. The required ones stay."""
-        best = ConeSet(self.energy(members), members)
-        while True:
-            swaps = (ConeSet(self.energy(swapped), swapped) for swapped in self._swaps(best.members))
-            better = next((found for found in swaps if found.energy < best.energy * (1 - GAIN)), None)
-            if better is None:
-                return best
-            best = better
+        fitted: Fit | None = self.fit(members)
+        found = ConeSet(math.inf, members)
+        while fitted is not None:
+            found = ConeSet(fitted.energy, members)
+            members = members.copy()
+            fitted = self._swapped(members, fitted) if fitted.feasible else None
+        return found
 
-    def _swaps(self, members: IntArray) -> Iterator[IntArray]:
-        """Yield the members with the best replacement that the table shows, then with the best for each it leaves out.
-
-        In large sets those stay: each takes as long as the whole table.
-        """
-        fitted = self.fit(members)
-        if not fitted.feasible or not len(members):
-            return
+    def _swapped(self, members: IntArray, fitted: Fit) -> Fit | None:
+        """Make the best swap that the table shows, in place."""
         change, which = self.best_swaps(members, fitted)
-        place = first_least(change)
-        if change[place] <= -GAIN * fitted.energy:
-            yield _with(members, place, which[place])
-        for place in range(len(self.fixed), len(members) if len(members) <= MANY else 0):
-            grown = self.grown(np.delete(members, place)) if np.isinf(change[place]) else None
-            if grown is not None and grown[-1] != members[place]:
-                yield _with(members, place, grown[-1])
+        for _ in range(min(FITTED, len(members))):
+            place = first_least(change)
+            if not change[place] <= -GAIN * fitted.energy:
+                break
+            change[place] = np.inf
+            previous, members[place] = members[place], which[place]
+            found = self.fit(members)
+            if found.energy < fitted.energy * (1 - GAIN):
+                return found
+            members[place] = previous
+        return None
 
     def climb(self, bound: float, most: int, start: int | None = None) -> None:
         """Add cones, to the best set of the size `start` if it is given, until E^2 <= bound, or there are `most`."""
@@ -218,9 +221,9 @@ class DenseModel:
             if shrunk is not None:
                 self.best.offer(self.exchanged(shrunk))
 
-    def shake(self, size: int, tries: int) -> bool:
+    def shake(self, size: int, tries: int, seed: int = 0) -> bool:
         """Take two or three cones of the best set of a size away and refill, over and over; tell if it got better."""
-        random = np.random.default_rng(0)
+        random = np.random.default_rng(seed)
         fixed, found = len(self.fixed), False
         for i in range(tries if size - fixed >= 2 else 0):
             members = self.best[size].members
@@ -233,10 +236,3 @@ class DenseModel:
             if rest is not None:
                 found |= self.best.offer(self.exchanged(rest))
         return found
-
-
-def _with(members: IntArray, place: int, candidate: int) -> IntArray:
-    """Return the members with another one at a place."""
-    swapped = members.copy()
-    swapped[place] = candidate
-    return swapped

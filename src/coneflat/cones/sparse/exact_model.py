@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..._arrays import BoolArray, FloatArray, IntArray
@@ -16,6 +14,8 @@ from .limits import Limits
 
 # A move is tried if it promises to lower E^2 by this share.
 WORTHWHILE = 1e-3
+# Rounds of moves for a set of cones; most come to rest after three or four.
+ROUNDS = 12
 # A cone is tried at the end of a longer and of a more cautious step, as the distances are those of a coarse model.
 CAUTIONS = 1.0, 4.0
 
@@ -85,16 +85,19 @@ class ExactModel(DenseModel):
         """Move cones over the mesh until E comes to rest; return E^2 of the best set of their number."""
         found = self.exchanged(members)
         self.best.offer(found)
-        before = math.inf
-        while found.energy < before * (1 - WORTHWHILE) and self.approach(
-            found.members, self.fit(found.members).curvatures, found.energy
-        ):
-            before, found = found.energy, self.exchanged(found.members)
+        for _ in range(ROUNDS):
+            known, before = len(self.unknowns), found.energy
+            self.insert(self.targets(found.members, self.fit(found.members).curvatures, before))
+            if len(self.unknowns) == known:
+                break
+            found = self.exchanged(found.members)
             self.best.offer(found)
+            if not found.energy < before * (1 - WORTHWHILE):
+                break
         return self.best.energy(len(found))
 
-    def approach(self, members: IntArray, curvatures: FloatArray, energy: float) -> bool:
-        """Add the vertices where cones should move by the score and the coarse model's distances; tell if any is new.
+    def targets(self, members: IntArray, curvatures: FloatArray, energy: float) -> IntArray:
+        """Return where cones should move by the score and the coarse model's distances.
 
         Moving curvature k from s to t changes E^2 by 2 k (q_t - q_s) + k^2 ||g_s - g_t||^2, q the score.
         """
@@ -116,9 +119,7 @@ class ExactModel(DenseModel):
                 best = first_least(change)
                 if change[best] < -WORTHWHILE * energy:
                     targets.append(int(near[best]))
-        known = len(self.unknowns)
-        self.insert(np.unique(np.array(targets, dtype=np.int64)))
-        return len(self.unknowns) > known
+        return np.unique(np.array(targets, dtype=np.int64))
 
     def _score(self, members: IntArray, curvatures: FloatArray) -> FloatArray:
         """Return (f,) half the derivative of E^2 by the curvature of a cone at each vertex."""

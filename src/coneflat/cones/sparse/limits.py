@@ -93,7 +93,7 @@ class Limits:
         return f"{self.least / math.pi:.4g} pi to {self.most / math.pi:.4g} pi"
 
     def check_available(self, usable: BoolArray, required: IntArray) -> None:
-        """Raise CurvatureError if cones at the (n,) usable vertices and the required ones cannot carry the total."""
+        """Raise CurvatureError if cones at (n,) usable vertices and the required ones cannot carry the curvature."""
         if self.fewest > MOST_CONES + len(required):
             raise CurvatureError(
                 f"a total curvature of {self.total / np.pi:.4g} pi needs {self.fewest:,} cones or more within these "

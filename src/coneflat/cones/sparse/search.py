@@ -38,15 +38,16 @@ from .limits import MOST_CONES, Limits
 
 # Unknowns of the coarse model: one for so many vertices, within bounds that keep its dense inverse cheaper than the
 # factorization of the mesh's own Laplacian.
-VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 15, 600, 1200
-# How far, as a factor of E^2, the coarse model is trusted: sets within are made better there.
+VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 15, 400, 1200
+# How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself.
 COARSE_DOUBT = 1.35
-# Sets that miss the goal by less than this factor of E^2, or would by the coarse model, are tried on the mesh, and
-# shaken.
-NEAR = 1.2
-# How often some cones of a set are put elsewhere to see if it gets better; oftener gains little.
-SHAKES = 20
-# E^2, or E, that differs by less does not.
+# Where the best set of a size misses by less than this factor of E^2, by what the coarse model tells of it or on the
+# mesh, more is tried.
+NEAR = 1.1
+# Perturbations of a set of cones at a time, fewer where it is large and each takes long; and how often on the mesh,
+# where next to nothing is missing.
+SHAKES, MANY, SEEDS = 12, 40, 4
+# An E^2 that is lower by less is not.
 NOTHING = 1e-9
 
 
@@ -258,8 +259,7 @@ class ConeSearch:
         """
         coarse = self.coarse.best
         while self._on_mesh(count) > goal and count < most:
-            off = max(self.exact.best.energy(count), NOTHING) / max(coarse.energy(count), NOTHING)
-            off = max(off, 1.0) if off < math.inf else COARSE_DOUBT
+            off = max(self.exact.best.energy(count) / coarse.energy(count), 1.0)
             self.coarse.climb(goal / off, most, count)
             larger = [size for size in coarse.sizes if size > count]
             if not larger:
@@ -280,11 +280,10 @@ class ConeSearch:
             count -= 1
 
     def _may_do(self, count: int, goal: float) -> bool:
-        """Whether so many may do: the larger set without a cone, or by what the coarse model is off for that one."""
+        """Whether so many cones may do, by the sets tried, or as the coarse model is off by what it is for one more."""
         if count < max(self.limits.fewest, len(self._required)):
             return False
         coarse, exact = self.coarse.best, self.exact.best
-        self.exact.descend(count, count + 1)
         expected = exact.energy(count + 1) * coarse.energy(count)
         return exact.energy(count) <= NEAR * goal or expected <= NEAR * goal * coarse.energy(count + 1)
 
@@ -299,14 +298,17 @@ class ConeSearch:
             )
 
     def _improve(self, least: int, most: int, goal: float | None = None) -> None:
-        """Make the coarse model's sets of some sizes better; only those near the goal, if there is one, are shaken."""
+        """Make the coarse model's sets of some sizes better, of those near the goal at least: they decide."""
         model = self.coarse
         model.descend(least, most)
         for size in range(most, least - 1, -1):
             if size in model.best and (
                 goal is None or goal / COARSE_DOUBT < model.best.energy(size) < goal * COARSE_DOUBT
             ):
-                model.shake(size, SHAKES)
+                model.shake(size, self._tries(size))
+
+    def _tries(self, size: int) -> int:
+        return max(4, SHAKES * MANY // max(size, MANY))
 
     def _on_mesh(self, count: int) -> float:
         """Return E^2 of the best set of a size on the mesh, infinite if there is none.
@@ -314,11 +316,12 @@ class ConeSearch:
         It starts from the coarse model's set, or from the next larger without a cone if that is better.
         """
         self.tell(plural(count, "cone"))
-        exact = self.exact
-        exact.descend(count, count + 1)
-        starts = [exact.best[count].members] if count in exact.best else []
+        exact, starts = self.exact, []
         if count in self.coarse.best:
             starts.append(exact.insert(self.places[self.coarse.best[count].members]))
+        if count + 1 in exact.best:
+            shrunk = exact.shrunk(exact.best[count + 1].members)
+            starts += [] if shrunk is None else [shrunk]
         if starts:
             exact.polish(min(starts, key=exact.energy))
         return exact.best.energy(count)
@@ -326,12 +329,15 @@ class ConeSearch:
     def _with_all_means(self, count: int, goal: float) -> float:
         """Return E^2 of the best set of a size on the mesh, which is shaken if it misses the goal by little."""
         energy = self._on_mesh(count)
-        return self._shaken(count) if goal < energy <= NEAR * goal else energy
+        for seed in range(SEEDS):
+            if goal < energy <= NEAR * goal:
+                energy = self._shaken(count, seed)
+        return energy
 
-    def _shaken(self, count: int) -> float:
+    def _shaken(self, count: int, seed: int = 0) -> float:
         """Return E^2 of the best set of a size on the mesh after perturbations of it."""
         exact = self.exact
-        if count in exact.best and exact.shake(count, SHAKES):
+        if count in exact.best and exact.shake(count, self._tries(count), seed):
             exact.polish(exact.best[count].members)
         return exact.best.energy(count)
 
