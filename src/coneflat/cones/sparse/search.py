@@ -38,15 +38,15 @@ from .limits import MOST_CONES, Limits
 
 # Unknowns of the coarse model: one for so many vertices, within bounds that keep its dense inverse cheaper than the
 # factorization of the mesh's own Laplacian.
-VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 15, 400, 1200
+VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 12, 600, 1200
 # How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself.
 COARSE_DOUBT = 1.35
 # Where the best set of a size misses by less than this factor of E^2, by what the coarse model tells of it or on the
 # mesh, more is tried.
-NEAR = 1.1
+NEAR = 1.15
 # Perturbations of a set of cones at a time, fewer where it is large and each takes long; and how often on the mesh,
 # where next to nothing is missing.
-SHAKES, MANY, SEEDS = 12, 40, 4
+SHAKES, MANY, SEEDS = 20, 40, 4
 # An E^2 that is lower by less is not.
 NOTHING = 1e-9
 
