@@ -17,9 +17,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from same import deformed
 
-import coneflat
 from coneflat.cones import choose
 from coneflat.cones.sparse import aggregation, dense_model, exact_model
 from coneflat.cones.sparse import search as cone_search
@@ -35,41 +34,6 @@ DEFORMED = (
 )  # fmt: skip
 WAYS = ("noise", "stretch", "holes", "slivers", "shuffled")
 DISTORTIONS = (0.1, 0.2, 0.3)
-
-
-def deformed(name: str, how: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return a model, deformed in a way that depends on the two names alone."""
-    mesh = coneflat.read_mesh(MODELS / name)
-    points = np.asarray(mesh.vertices, dtype=float).copy()
-    starts, sizes = np.asarray(mesh.offsets[:-1]), np.diff(mesh.offsets)
-    fans = [
-        mesh.corners[
-            np.stack([starts[sizes > k + 1], starts[sizes > k + 1] + k, starts[sizes > k + 1] + k + 1], 1)
-        ]
-        for k in range(1, sizes.max() - 1)
-    ]
-    faces = np.concatenate(fans)
-    random = np.random.default_rng(sum(map(ord, name + how)))
-    sides = np.linalg.norm(points[faces[:, 1]] - points[faces[:, 0]], axis=1)
-    if how == "noise":
-        points += 0.25 * sides.mean() * random.normal(size=points.shape)
-    elif how == "stretch":
-        points *= [4.0, 1.0, 0.7]
-    elif how == "holes":
-        middles = points[faces].mean(axis=1)
-        for centre in middles[random.choice(len(faces), 4)]:
-            away = np.linalg.norm(middles - centre, axis=1)
-            faces = faces[away > 0.04 * np.ptp(points)]
-            middles = points[faces].mean(axis=1)
-    elif how == "slivers":
-        moved = random.choice(len(faces), len(faces) // 40, replace=False)
-        points[faces[moved, 0]] += 0.97 * (points[faces[moved, 1]] - points[faces[moved, 0]])
-    elif how == "shuffled":
-        order = random.permutation(len(points))
-        place = np.empty_like(order)
-        place[order] = np.arange(len(order))
-        points, faces = points[order], place[faces][random.permutation(len(faces))]
-    return points, faces
 
 
 def cases() -> Iterator[tuple[str, tuple[Any, ...]]]:

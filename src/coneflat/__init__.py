@@ -26,6 +26,8 @@ _HOMES = {
     "ConeCurve": "curve",
     "find_cones": "curve",
     "FoundCones": "curve",
+    "ConeSearch": "cones.sparse",
+    "SparseCones": "cones.sparse",
     "TriangleMesh": "mesh",
     "check_mesh": "input.validation",
     "CheckedMesh": "input.validation",
@@ -76,6 +78,7 @@ _HOMES = {
 __all__ = [
     "CheckedMesh",
     "ConeCurve",
+    "ConeSearch",
     "ConeSolution",
     "ConeflatError",
     "CutMesh",
@@ -89,6 +92,7 @@ __all__ = [
     "PAPER",
     "Packed",
     "SeamData",
+    "SparseCones",
     "TriangleMesh",
     "UVMeasures",
     "__version__",
@@ -138,6 +142,7 @@ if TYPE_CHECKING:
     from . import errors
     from .atlas import Packed, overlap_regions, pack_charts
     from .cones import ConeSolution, cones_at, cones_with_curvature, greedy_cones
+    from .cones.sparse import ConeSearch, SparseCones
     from .curve import ConeCurve, FoundCones, cone_curve, find_cones
     from .errors import ConeflatError
     from .files import read_flattening, read_mesh

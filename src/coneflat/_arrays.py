@@ -75,5 +75,5 @@ def as_floats(name: str, values: ArrayLike) -> FloatArray:
         if array.dtype.kind not in "bfiuO":
             raise TypeError(f"their type is {array.dtype}")
         return np.asarray(array, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ArrayShapeError(f"{name} must be an array of numbers: {error}") from error

@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from ...errors import OptionError
 from ...options import PAPER, FindOptions, Options, declarations
-from ...options.declared import ConeOptions, Declaration, MetricOptions
+from ...options.declared import CONES, ConeOptions, Declaration, MetricOptions
 from ...options.kinds import (
     Choice,
     Count,
@@ -220,7 +220,7 @@ def check_combinations(context: click.Context) -> None:
         for what in ("pursuit", "greedy", "exact")
     }
     searched = cones in ("auto", "pursuit")
-    given = not searched and cones not in ("greedy", "none")
+    given = cones not in CONES
     rules = [
         (params["paper"], of_method, "--paper fixes the method"),
         (given, search, "with cones given there is nothing to search"),

@@ -120,10 +120,11 @@ class DenseModel:
         is_open = (self.usable if usable is None else usable).copy()
         is_open[members] = False
         left = np.flatnonzero(is_open)
-        if self.limits.total < 0 and len(members) < self.limits.fewest:
-            # Too few to carry the total: those that can carry some of it.
-            carrying = left[self.least[left] < 0]
-            left = carrying if len(carrying) else left
+        missing = self.limits.total - self.least[members].sum()
+        if self.limits.has_sum and missing < 0:
+            # Too few to carry the total: those that can carry what is missing, or else some of it.
+            carrying = (left[self.least[left] <= missing], left[self.least[left] < 0])
+            left = next((each for each in carrying if len(each)), left)
         if not len(left):
             return None
         return np.append(members, left[first_least(self.additions(members)[left])])
