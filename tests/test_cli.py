@@ -114,7 +114,7 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "--require", "3"], "--required-cones 3"),
         (["model.obj", "--at-cones", "scale"], "there is no option --at-cones any more"),
         (["model.obj", "--lengths", "mean"], "there is no option --lengths any more"),
-        (["model.obj", "--hide-seams", "much"], "not a valid float"),
+        (["model.obj", "--hide-seams", "much"], "'much' is no strength"),
         (["empty.obj"], "empty.obj"),
         (["text.ply"], "text.ply"),
         (["model.xyz"], ".xyz"),

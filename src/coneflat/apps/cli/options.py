@@ -57,6 +57,19 @@ class Angle(click.ParamType):  # type: ignore[type-arg]
             self.fail(str(error), param, ctx)
 
 
+class HowMuch(click.ParamType):  # type: ignore[type-arg]
+    """A strength."""
+
+    name = "strength"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return a number."""
+        try:
+            return float(value)
+        except ValueError:
+            self.fail(f"{value!r} is no strength: write a number after it, 1 say", param, ctx)
+
+
 class Axis(click.ParamType):  # type: ignore[type-arg]
     """A direction in space such as z, -y or 0,0.5,1."""
 
@@ -122,7 +135,7 @@ def _flag(name: str, field: Field[Any], declaration: Declaration) -> Callable[[C
         case Number():
             more = {"type": Angle(), "metavar": "ANGLE"} if kind.is_angle else {"type": float}
         case Strength():
-            more = {"type": float, "is_flag": False, "flag_value": 1.0, "metavar": "STRENGTH"}
+            more = {"type": HowMuch(), "is_flag": False, "flag_value": 1.0, "metavar": "STRENGTH"}
         case Count() | Whole():
             more = {"type": int}
         case Direction():
