@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from same import deformed
+from same import BASES, DEFORMATIONS, MODELS, deformed
 
 from coneflat.cones import choose
 from coneflat.cones.sparse import aggregation, dense_model, exact_model
@@ -27,12 +27,6 @@ from coneflat.options import Options
 from coneflat.progress import Stages
 from coneflat.threads import one_blas_thread
 
-MODELS = Path(__file__).resolve().parents[2] / "shared" / "meshes"
-DEFORMED = (
-    "3holes.off", "knight.off", "elephant.obj", "fandisk.obj", "spot.obj", "plane-holes.obj", "rocker-arm.obj",
-    "hand.obj", "camelhead.off", "face.obj",
-)  # fmt: skip
-WAYS = ("noise", "stretch", "holes", "slivers", "shuffled")
 DISTORTIONS = (0.1, 0.2, 0.3)
 
 
@@ -41,8 +35,8 @@ def cases() -> Iterator[tuple[str, tuple[Any, ...]]]:
     for path in sorted(MODELS.glob("*.*"), key=lambda path: path.stat().st_size):
         if path.suffix != ".md":
             yield path.name, (path,)
-    for i, name in enumerate(DEFORMED):
-        for how in (WAYS[i % 5], WAYS[(i + 2) % 5]):
+    for i, name in enumerate(BASES):
+        for how in (DEFORMATIONS[i % 5], DEFORMATIONS[(i + 2) % 5]):
             yield f"{name} {how}", deformed(name, how)
 
 
@@ -55,16 +49,16 @@ def variants() -> dict[str, list[Patch]]:
     found: dict[str, list[Patch]] = {"as it is": []}
     for module, name, values in (
         (search, "COARSE_DOUBT", (1.15, 1.2, 1.6)),
-        (search, "NEAR", (1.0, 1.05, 1.15, 1.2)),
-        (search, "SHAKES", (6, 16, 20, 24)),
+        (search, "NEAR", (1.0, 1.05, 1.1, 1.2)),
+        (search, "SHAKES", (6, 12, 16, 24)),
         (search, "SEEDS", (0, 1, 6, 8)),
         (search, "MANY", (20, 80)),
         (dense, "FITTED", (1, 2, 10)),
         (exact, "ROUNDS", (4, 100)),
         (exact, "WORTHWHILE", (1e-2, 1e-4)),
         (exact, "CAUTIONS", ((2.0,), (1.0,), (1.0, 2.0, 4.0))),
-        (search, "VERTICES_PER_UNKNOWN", (8, 30)),
-        (search, "LEAST_SIZE", (200, 600, 800)),
+        (search, "VERTICES_PER_UNKNOWN", (8, 15, 30)),
+        (search, "LEAST_SIZE", (200, 400, 800)),
         (search, "MOST_SIZE", (600, 2000)),
         (aggregation, "WEAK", (0.0,)),
         (aggregation, "LARGEST_AGGREGATE", (4.0, 12.0)),

@@ -1,7 +1,7 @@
 """The decorator of the compiled loops.
 
 Only what cannot be written as a handful of array operations is compiled (edge flips, breadth-first searches,
-sums over corners), in files of their own that are imported when first needed: numba takes a while to load.
+sums over corners), beside what uses it, in modules that are imported when first needed: numba takes a while to load.
 """
 
 from __future__ import annotations

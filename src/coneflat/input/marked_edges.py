@@ -6,8 +6,9 @@ import numpy as np
 
 from .._arrays import BoolArray, IntArray
 from ..errors import OptionError
+from ..geometry.charts import point_seams
 from ..geometry.normals import dihedral_angles
-from ..mesh import TriangleMesh, end_corners
+from ..mesh import TriangleMesh
 from ..options import Options
 from ..text import list_some, plural
 from .arrays import InputMesh
@@ -81,12 +82,6 @@ def _seams_of_input(checked: CheckedMesh, given: InputMesh) -> BoolArray:
     if texture is None:
         raise OptionError("the input has no UV coordinates whose seams could be kept")
     mesh = checked.mesh
-    at = turn_corners(checked, texture)
-    inside = ~mesh.is_boundary_edge
-    one, two = mesh.edge_halfedges.T
-    flat = at.ravel()
     marked = np.zeros(len(mesh.edges), dtype=bool)
-    tails, heads = (flat[ends] for ends in end_corners(one[inside]))
-    others, those = (flat[ends] for ends in end_corners(two[inside]))
-    marked[inside] = (tails != those) | (heads != others)
+    marked[point_seams(mesh, turn_corners(checked, texture))] = True
     return marked

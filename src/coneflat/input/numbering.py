@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, unit_exponent
 from ..errors import NonFiniteError
 from ..geometry.lengths import as_lengths, check_lengths
 from ..mesh import TriangleMesh
@@ -44,7 +44,7 @@ def at_unit_size(checked: CheckedMesh) -> CheckedMesh:
     size = float(np.abs(checked.mesh.vertices).max())
     if size < SMALLEST:
         raise NonFiniteError(f"positions of at most {size:.3g} are too small for numbers: scale the mesh")
-    exponent = -int(np.frexp(size)[1])
+    exponent = -unit_exponent(checked.mesh.vertices)
     mesh = TriangleMesh(np.ldexp(checked.mesh.vertices, exponent), checked.mesh.faces)
     return replace(checked, mesh=mesh, exponent=exponent)
 

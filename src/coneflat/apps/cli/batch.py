@@ -91,7 +91,7 @@ def batch(
     if jobs is not None and dask is not None:
         raise click.UsageError("the cluster has its own processes: leave out --jobs", context)
     options = {**keywords(method), **checking(repair)}
-    _fits_any_mesh(context, options)
+    _refuse_vertices(context, options)
     parse_requirements(measures_alone(required), REPORTED)
     read_options(options)  # Says what makes no sense before the work.
     todo = find_jobs(patterns, out.absolute(), f".{ending}", options, weld, required)
@@ -149,7 +149,7 @@ def _slowest(rows: Sequence[dict[str, Any]], elapsed: float) -> Iterator[str]:
         yield f"time {elapsed:.1f} s, {sum(seconds for seconds, _ in took):.1f} s of work; the longest: {longest}"
 
 
-def _fits_any_mesh(context: click.Context, options: dict[str, Any]) -> None:
+def _refuse_vertices(context: click.Context, options: dict[str, Any]) -> None:
     """Refuse what names the vertices of one mesh."""
     for name, what in (
         ("cones", "vertices that are cones fit one mesh"),

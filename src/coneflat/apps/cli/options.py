@@ -11,7 +11,7 @@ import click
 from click.core import ParameterSource
 
 from ...errors import OptionError
-from ...options import PAPER, FindOptions, Options, declarations
+from ...options import PAPER, Options, declarations
 from ...options.declared import CONES, ConeOptions, Declaration, MetricOptions
 from ...options.kinds import (
     Choice,
@@ -26,7 +26,7 @@ from ...options.kinds import (
     Whole,
     WordOrVertices,
 )
-from .values import parse_angle, read_pairs, read_vertex_map, read_vertices, read_weights
+from .values import is_file, parse_angle, read_pairs, read_vertex_map, read_vertices, read_weights
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -106,7 +106,7 @@ def option_flags(group: type, *, one_mesh: bool) -> Callable[[Command], Command]
     chosen = [
         (name, field, declaration)
         for name, (field, declaration) in declarations(group).items()
-        if declaration.flag and name not in OF_INPUT and (one_mesh or _fits_any_mesh(declaration))
+        if declaration.flag and name not in OF_INPUT and (one_mesh or _may_fit_any_mesh(declaration))
     ]
 
     def decorate(command: Command) -> Command:
@@ -117,7 +117,7 @@ def option_flags(group: type, *, one_mesh: bool) -> Callable[[Command], Command]
     return decorate
 
 
-def _fits_any_mesh(declaration: Declaration) -> bool:
+def _may_fit_any_mesh(declaration: Declaration) -> bool:
     """Whether an option has values that make sense for several meshes: words do, vertices do not."""
     return not declaration.one_mesh or bool(getattr(declaration.kind, "words", ()))
 
@@ -194,7 +194,7 @@ def _value(name: str, declaration: Declaration, value: Any) -> Any:
         case Vertices():
             return tuple(dict.fromkeys(v for text in value for v in read_vertices(flag, text)))
         case WordOrVertices():
-            words = [text for text in value if text.replace("-", "").isalpha() and not _names_file(text)]
+            words = [text for text in value if text.replace("-", "").isalpha() and not is_file(text)]
             if words and len(value) > 1:
                 raise OptionError(f"{flag} {words[0]} is one choice, and {value[0]}, {value[1]} are two")
             return words[0] if words else read_vertex_map(flag, kind.noun, value)
@@ -212,12 +212,6 @@ def _edges(flag: str, kind: Edges, texts: Sequence[str]) -> Any:
     if words and len(texts) > 1:
         raise OptionError(f"{flag} {words[0]} is one choice, and {texts[0]}, {texts[1]} are two")
     return words[0] if words else np.concatenate([read_pairs(text) for text in texts])
-
-
-def _names_file(text: str) -> bool:
-    from .values import is_file
-
-    return is_file(text)
 
 
 def check_combinations(context: click.Context) -> None:
@@ -252,8 +246,3 @@ def check_combinations(context: click.Context) -> None:
 def is_given(context: click.Context, name: str) -> bool:
     """Whether an option stands at the command line."""
     return context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-
-
-def find_flags(command: Command) -> Command:
-    """Add the flags of `coneflat.find_cones`."""
-    return option_flags(FindOptions, one_mesh=True)(command)
