@@ -10,6 +10,7 @@ import numpy as np
 from ..._arrays import FloatArray, IntArray
 from ...errors import ArrayShapeError, OptionError
 from ...files.uv_split import split_at_seams
+from ...geometry.charts import point_seams
 from ...geometry.planar import signed_double_areas
 from ...mesh import TriangleMesh, end_corners, label_faces
 from ...quality.checker import cell_side
@@ -139,11 +140,7 @@ def outline_halfedges(mesh: TriangleMesh, uv_faces: IntArray) -> tuple[IntArray,
 
     Seams come first, the two half-edges of each together, then the half-edges of the boundary.
     """
-    inside = mesh.edge_halfedges[~mesh.is_boundary_edge]
-    flat = uv_faces.reshape(-1)
-    starts_one, ends_one = (flat[end] for end in end_corners(inside[:, 0]))
-    starts_two, ends_two = (flat[end] for end in end_corners(inside[:, 1]))
-    seams = inside[(starts_one != ends_two) | (ends_one != starts_two)]
+    seams = mesh.edge_halfedges[point_seams(mesh, uv_faces)]
     boundary = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
     return np.concatenate([seams.reshape(-1), boundary]), len(seams)
 
