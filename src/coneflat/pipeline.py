@@ -14,6 +14,7 @@ from .errors import CurvatureError, MetricError, SeamError
 from .flat import LaidOut
 from .flat.held_cones import unheld_notes, with_held_cones
 from .flat.methods import find_metric, turning_meter
+from .flat.relaxed import relaxed, relaxes
 from .geometry.operators import weighted_areas
 from .input.components import Component, Prepared, prepare
 from .layout.disk import cutting
@@ -76,6 +77,9 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
 
     may_lack_room = pursues(mesh, options) and options.method in UNFOLDED
     layout = with_held_cones(flatten_once, part) if may_lack_room else flatten_once(part)
+    if relaxes(options):
+        with stages("relax", 0.96):
+            layout = relaxed(layout, part, options)
     if options.charts == "atlas":
         with stages("atlas", 1.0):
             layout = without_overlaps(layout, part, options)

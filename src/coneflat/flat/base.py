@@ -180,7 +180,7 @@ def laid_out_at(
         corners=disk.faces,
         cones=solution.cones,
         seams=mesh.edges[seams],
-        log_scale=_log_scale(mesh, before, doubles * factor**2),
+        log_scale=vertex_log_scale(mesh, before, doubles * factor**2),
         # The boundary is free: what comes out there is what was wanted.
         target=np.where(mesh.is_boundary_vertex, curvature, solution.target),
         curvature=curvature,
@@ -189,8 +189,8 @@ def laid_out_at(
     )
 
 
-def _log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return (n,) half the log of the ratio of areas around each vertex."""
+def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) -> FloatArray:
+    """Return (n,) half the log of the ratio of areas around each vertex, after to before, (m,) each."""
     ratio = []
     for areas in (before, after):
         around = np.bincount(mesh.faces.ravel(), np.repeat(areas, 3), minlength=len(mesh.vertices))

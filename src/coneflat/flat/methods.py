@@ -82,6 +82,13 @@ def _exact_choices(
     )
 
 
+def held_boundary(mesh: TriangleMesh, constraints: Constraints, options: Options) -> BoolArray:
+    """Return (n,) the boundary vertices that stay where the metric has them: their shape or lengths are prescribed."""
+    if options.boundary_kind in ("disk", "straight") or len(constraints.corners):
+        return mesh.is_boundary_vertex
+    return _kept_boundary(mesh, constraints, options)
+
+
 def _kept_boundary(mesh: TriangleMesh, constraints: Constraints, options: Options) -> BoolArray:
     """Return (n,) the boundary vertices between which lengths stay: on marked seams, so that both sides are equal."""
     if options.boundary_kind == "lengths":

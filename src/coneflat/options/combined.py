@@ -55,8 +55,14 @@ class Options(RunOptions, AtlasOptions, SeamOptions, MetricOptions, ConeOptions)
             raise OptionError(f"the sharp angle must be between 0 and pi, not {self.sharp_angle:g} radians")
 
     def _check_method(self) -> None:
+        if self.refine and (self.stretch or self.polish == "whole"):
+            raise OptionError("a refinement carries the exact map, which is not relaxed: leave out refine")
         if self.method == "exact":
             return
+        if self.stretch or self.polish == "whole":
+            raise OptionError(
+                f"method {self.method!r} gives layouts as published, unrelaxed: use method 'exact'"
+            )
         if self.boundary_kind != "free":
             raise OptionError(f"method {self.method!r} has a free boundary: use method 'exact'")
         if self.best_effort and self.method not in ITERATIVE:

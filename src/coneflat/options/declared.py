@@ -43,6 +43,8 @@ ITERATIVE = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci", "abf+
 UNFOLDED = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci")
 # Those whose cones have the curvatures that are prescribed; the others lay out what was cut open before.
 CONED = (*UNFOLDED, "linear", "bff", "linear-abf", "abf++")
+#: Which triangles of a flat metric are relaxed.
+POLISHES = ("auto", "off", "whole")
 SOLVERS = ("auto", "pardiso", "cholespy", "scipy", "amg")
 CHARTS = ("atlas", "one")
 BOUNDARIES = ("free", "lengths", "disk", "straight")
@@ -205,6 +207,21 @@ class MetricOptions:
         Flag(),
         "Exact metric: cut the input's triangles along the edges of the flat triangulation, which carries the exact "
         "map; nothing can be inverted there. Polygons and groups are not kept.",
+        only="exact",
+    )
+    polish: str = option(
+        "auto",
+        Choice(POLISHES),
+        "Exact metric: less distortion of triangles, with the same cones, curvatures and seams. auto: those with a "
+        "quasi-conformal distortion above 1.5, beside cones, and two rings around them. whole: all. off: none, so that "
+        "the map is discretely conformal everywhere.",
+        only="exact",
+    )
+    stretch: float = option(
+        0.0,
+        Strength(1.0),
+        "Exact metric: from angles, 0, to areas, 1, which is as near to isometric as the cones allow. More than 0 "
+        "moves all vertices, except on a boundary that is prescribed.",
         only="exact",
     )
     best_effort: bool = option(

@@ -26,10 +26,15 @@ AnyArray: TypeAlias = NDArray[Any]
 POSITIVE_DEFINITE, INDEFINITE = 2, -2
 ANALYSE, FACTORIZE, SOLVE, RELEASE = 11, 22, 33, -1
 # Positions in PARDISO's table of parameters, and what they are set to.
-NO_DEFAULTS, ORDERING, PERMUTATION, FROM_ZERO = 0, 1, 4, 34
-NESTED_DISSECTION, GIVEN, WANTED = 2, 1, 2
+NO_DEFAULTS, ORDERING, SCHEDULE, FROM_ZERO = 0, 1, 23, 34
+# A permutation, given or asked for, switches the factorization on two levels off without a word.
+PARALLEL_NESTED_DISSECTION, ON_TWO_LEVELS = 3, 1
+# In every phase: to solve on fewer threads than were factorized on gives wrong results without an error, and to
+# factorize anew on more than were solved on ends the process. On two levels results are the same, bit for bit, from one
+# run to the next, and two threads are used on any machine.
+THREADS = 2
 # So many right-hand sides are solved faster together than one by one.
-TOGETHER = 8
+TOGETHER = 2
 # MKL's file on each system, and what tells pypardiso of another one.
 RUNTIMES = ("libmkl_rt.", "mkl_rt.")
 LIBRARY_GIVEN = "PYPARDISO_MKL_RT"
@@ -38,7 +43,7 @@ OUT_OF_MEMORY, ZERO_PIVOT = -2, -4
 
 
 class PardisoFactor:
-    """A sparse Cholesky factorization whose ordering serves other matrices of the same size."""
+    """A sparse Cholesky factorization whose analysis serves other matrices of the same pattern."""
 
     break_even = 30
 
@@ -46,7 +51,12 @@ class PardisoFactor:
         n, self._kind = matrix.shape[0], kind
         self._handle = np.zeros(64, dtype=np.int64)
         self._table = np.zeros(64, dtype=np.int32)
-        self._table[[NO_DEFAULTS, ORDERING, PERMUTATION, FROM_ZERO]] = 1, NESTED_DISSECTION, WANTED, 1
+        self._table[[NO_DEFAULTS, ORDERING, SCHEDULE, FROM_ZERO]] = (
+            1,
+            PARALLEL_NESTED_DISSECTION,
+            ON_TWO_LEVELS,
+            1,
+        )
         self._order = np.zeros(n, dtype=np.int32)
         # What is released when this object goes: PARDISO keeps its memory elsewhere.
         self._finalizer = weakref.finalize(self, _release, kind, self._handle, self._table, n)
@@ -62,8 +72,6 @@ class PardisoFactor:
         np.cumsum(np.bincount(columns[self._is_lower], minlength=len(starts) - 1), out=self._starts[1:])
         self._values = _aligned(matrix.data[self._is_lower])
         self._call(ANALYSE)
-        # From now on the order is known.
-        self._table[PERMUTATION] = GIVEN
 
     def _fill(self, matrix: csc_matrix) -> None:
         self._values = _aligned(matrix.data[self._is_lower])
@@ -134,8 +142,7 @@ def _pardiso(
     values, starts, rows, order = matrix
     code = ctypes.c_int32(0)
     pardiso, set_threads = _routines()
-    # On several threads the last digits of a solution depend on who comes first; those of a factorization do not.
-    threads = set_threads(1) if phase == SOLVE else None
+    threads = set_threads(THREADS)
     pardiso(
         _address(handle),
         *map(_number, (1, 1, kind, phase, len(starts) - 1)),
@@ -146,8 +153,7 @@ def _pardiso(
         *map(_address, sides),
         ctypes.byref(code),
     )
-    if threads is not None:
-        set_threads(threads)
+    set_threads(threads)
     return code.value
 
 
@@ -166,6 +172,8 @@ def _routines() -> tuple[Any, Any]:
     pardiso, set_threads = library["pardiso"], library["MKL_Set_Num_Threads_Local"]
     pardiso.restype = None
     set_threads.argtypes, set_threads.restype = [ctypes.c_int], ctypes.c_int
+    # Or else it takes fewer threads than it is told where it thinks that best.
+    library["MKL_Set_Dynamic"](0)
     return pardiso, set_threads
 
 

@@ -1,0 +1,168 @@
+"""Layouts relaxed: the few triangles that cones bend too much, or all of them on the way from angles to areas."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray
+from ..geometry import double_areas
+from ..geometry.operators import LEAST_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
+from ..geometry.planar import signed_double_areas
+from ..input.components import Component
+from ..layout.relax import Distortion, relax
+from ..layout.relax.elements import map_factors
+from ..layout.relax.relax import rest_sides
+from ..mesh import TriangleMesh, label_components
+from ..options import Options
+from .base import LaidOut, laid_out_curvature, vertex_log_scale
+from .methods import held_boundary
+
+# Triangles with more quasi-conformal distortion than this are relaxed, with so many rings around them. Measured:
+# freeing a tenth of the vertices of a fine mesh and half of a coarse one comes within 0.001 of what freeing all does.
+BENT, RINGS = 1.5, 2
+# Part of its energy that a further Newton step must promise, and steps at most: around single triangles, and of the
+# whole mesh.
+LOCAL, WHOLE = (1e-4, 12), (1e-5, 40)
+
+
+def relaxed(laid_out: LaidOut, part: Component, options: Options) -> LaidOut:
+    """Return a layout with less distortion, the same cones and the same seams; see `polish` and `stretch`.
+
+    The boundary stays where its lengths or its shape are prescribed.
+    """
+    if not relaxes(options) or laid_out.mesh is not part.mesh:
+        return laid_out
+    before = _Maps.of(laid_out, part)
+    is_free = ~held_boundary(part.mesh, part.constraints, options)
+    whole = options.stretch > 0 or options.polish == "whole"
+    if not whole:
+        is_free &= _around(part.mesh, before.ratio > BENT)
+    if not is_free.any():
+        return laid_out
+    tolerance, steps = WHOLE if whole else LOCAL
+    found = relax(
+        part.mesh,
+        laid_out.points,
+        laid_out.corners,
+        Distortion(options.stretch),
+        lengths=part.lengths,
+        weights=_face_weights(part),
+        free=is_free,
+        tolerance=tolerance,
+        steps=steps,
+    )
+    moved = replace(laid_out, points=found.points)
+    if not options.stretch:
+        moved = _without_losses(laid_out, moved, before, part, found.moved)
+    return _described(laid_out, moved, before, part, options, found.moved)
+
+
+def relaxes(options: Options) -> bool:
+    """Whether layouts are relaxed at all; those of other methods are what these have published."""
+    return (
+        options.method == "exact" and not options.refine and (options.polish != "off" or options.stretch > 0)
+    )
+
+
+def _face_weights(part: Component) -> FloatArray | None:
+    weights = part.constraints.weights
+    if weights is None:
+        return None
+    at_faces: FloatArray = np.maximum(at_unit_scale(weights), LEAST_WEIGHT)[part.mesh.faces].mean(axis=1)
+    return at_faces
+
+
+@dataclass(frozen=True, eq=False)
+class _Maps:
+    """How triangles are mapped: (m,) ratios of singular values, infinite where turned over; areas in space."""
+
+    ratio: FloatArray
+    areas: FloatArray
+
+    @classmethod
+    def of(cls, laid_out: LaidOut, part: Component) -> _Maps:
+        along, across = map_factors(rest_sides(part.lengths))
+        corners = laid_out.points[laid_out.corners]
+        places = (corners - corners[:, :1]) @ np.array([1.0, 1j])
+        one, two = np.abs((along * places).sum(axis=1)), np.abs((across * places).sum(axis=1))
+        ratio = np.divide(one + two, one - two, out=np.full(len(one), np.inf), where=one > two)
+        return cls(ratio, double_areas(part.lengths) / 2)
+
+    def mean(self) -> float:
+        """The mean ratio by area, over upright triangles."""
+        upright = np.isfinite(self.ratio)
+        return (
+            float(np.average(self.ratio[upright], weights=self.areas[upright])) if upright.any() else np.inf
+        )
+
+    def largest(self) -> float:
+        """The largest ratio of upright triangles."""
+        return float(self.ratio[np.isfinite(self.ratio)].max(initial=1.0))
+
+
+def _around(mesh: TriangleMesh, is_bent: BoolArray) -> BoolArray:
+    """Return (n,) True for the vertices of triangles and of the rings around them."""
+    inside = np.zeros(len(mesh.vertices), dtype=bool)
+    inside[mesh.faces[is_bent]] = True
+    for _ in range(RINGS):
+        inside[mesh.faces[inside[mesh.faces].any(axis=1)]] = True
+    return inside
+
+
+def _without_losses(
+    laid_out: LaidOut, moved: LaidOut, before: _Maps, part: Component, was_free: BoolArray
+) -> LaidOut:
+    """Return the moved layout, but as it was around vertices where its mean or its worst triangle would be worse."""
+    after = _Maps.of(moved, part)
+    mesh, faces = part.mesh, part.mesh.faces
+    edges = mesh.edges[was_free[mesh.edges].all(axis=1)]
+    count, patch = label_components(len(mesh.vertices), edges[:, 0], edges[:, 1])
+    touched = np.flatnonzero(was_free[faces].any(axis=1) & np.isfinite(before.ratio))
+    corner = np.argmax(was_free[faces[touched]], axis=1)
+    of_face = patch[faces[touched, corner]]
+    gained = np.bincount(of_face, (before.ratio - after.ratio)[touched] * before.areas[touched], count)
+    worst = np.zeros(count)
+    np.maximum.at(worst, of_face, after.ratio[touched])
+    is_lost = (gained < 0) | (worst > before.largest())
+    if not is_lost[of_face].any():
+        return moved
+    back = np.zeros(len(moved.points), dtype=bool)
+    back[moved.corners[is_lost[patch][faces] & was_free[faces]]] = True
+    return replace(moved, points=np.where(back[:, None], laid_out.points, moved.points))
+
+
+def _described(
+    laid_out: LaidOut,
+    moved: LaidOut,
+    before: _Maps,
+    part: Component,
+    options: Options,
+    was_free: BoolArray,
+) -> LaidOut:
+    """Return the moved layout with the curvature and the scale that it has, and with what it was before."""
+    mesh = part.mesh
+    corners = moved.points[moved.corners]
+    curvature = laid_out_curvature(mesh, corners)
+    after = np.abs(signed_double_areas(corners)) / 2
+    log_scale = np.where(was_free, vertex_log_scale(mesh, before.areas, after), laid_out.log_scale)
+    areas = weighted_areas(
+        vertex_areas(mesh.faces, part.lengths, len(mesh.vertices)), part.constraints.weights
+    )
+    statistics = replace(
+        laid_out.statistics,
+        relaxed_vertices=int(was_free.sum()),
+        qc_mean_unrelaxed=before.mean(),
+        qc_max_unrelaxed=before.largest(),
+        area_distortion=area_distortion(log_scale, areas),
+    )
+    is_open = mesh.is_boundary_vertex & (not options.prescribes_boundary)
+    return replace(
+        moved,
+        curvature=curvature,
+        # Where the boundary is free, what comes out is what was wanted.
+        target=np.where(is_open, curvature, laid_out.target),
+        log_scale=log_scale,
+        statistics=statistics,
+    )

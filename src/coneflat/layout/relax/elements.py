@@ -1,0 +1,294 @@
+"""Triangles as functions of unknowns: maps, largest steps, gradients and Hessians.
+
+The map of a triangle from the shape it should have to the one in the plane is z -> a z + b conj(z), with singular
+values |a| + |b| and |a| - |b| and the determinant |a|^2 - |b|^2. Both a and b are linear in the places of the corners,
+and so in the unknowns that move these.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix, csc_matrix
+
+from ..._arrays import ComplexArray, FloatArray, IntArray
+from ...compiled import compiled
+from ...mesh import label_components
+from .energies import Energy
+from .motions import Motions
+
+# Part of the step to where a triangle would have no area that is taken at most (Smith and Schaefer 2015).
+SHORT_OF_FLAT = 0.9
+# Part of the largest diagonal entry that is added to it: what nothing holds may turn and shift as a whole.
+RIDGE = 1e-11
+
+
+def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return (f, 3) the derivatives of a and b by the places of the corners.
+
+    rest: (f, 3) sides of the triangles as they should be, column i opposite corner i.
+    """
+    r0, r1 = rest[:, 0], rest[:, 1]
+    area = r0 * np.conj(r1) - np.conj(r0) * r1
+    found = []
+    for c0, c1 in ((np.conj(r1) / area, -np.conj(r0) / area), (-r1 / area, r0 / area)):
+        # Side 0 runs from corner 1 to corner 2, side 1 from corner 2 to corner 0.
+        found.append(np.stack([c1, -c0, c0 - c1], axis=1))
+    return found[0], found[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Maps:
+    """Maps of triangles, or changes of them: a and b, (f,) each."""
+
+    a: ComplexArray
+    b: ComplexArray
+
+    def plus(self, length: FloatArray, step: Maps) -> Maps:
+        """Return the maps after a step, (f,) of it each."""
+        return Maps(self.a + length * step.a, self.b + length * step.b)
+
+    def singular_values(self) -> tuple[FloatArray, FloatArray]:
+        """Return (f,) the larger and the smaller one; the smaller is negative where the map is turned over."""
+        one, two = np.abs(self.a), np.abs(self.b)
+        return one + two, one - two
+
+    def largest_steps(self, step: Maps) -> FloatArray:
+        """Return (f,) how much of a step there may be before a triangle has no area."""
+        constant = np.abs(self.a) ** 2 - np.abs(self.b) ** 2
+        linear = (np.conj(self.a) * step.a - np.conj(self.b) * step.b).real  # half of it
+        square = np.abs(step.a) ** 2 - np.abs(step.b) ** 2
+        inside = linear**2 - square * constant
+        root = np.sqrt(np.maximum(inside, 0.0))
+        # The smallest positive root of constant + 2 linear t + square t^2, without cancellation.
+        below = np.where(linear < 0, root - linear, -(linear + root))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first, second = constant / below, below / square
+        falling = np.where(linear < 0, first, np.where(square < 0, second, np.inf))
+        falling[(inside < 0) | (falling <= 0) | np.isnan(falling)] = np.inf
+        return falling
+
+
+class Elements:
+    """The triangles that unknowns move.
+
+    Attributes:
+        faces: (f,) the triangles.
+        count: the number of unknowns k.
+        parts, part, unknown_part: sets of unknowns that no triangle connects: how many, (f,), (k,) the one of each.
+        weight: (f,) what each triangle's energy counts.
+    """
+
+    def __init__(self, motions: Motions, corners: IntArray, rest: ComplexArray, weight: FloatArray) -> None:
+        moves = np.diff(motions.start) > 0
+        self.faces = np.flatnonzero(moves[corners].any(axis=1))
+        self.count, self.weight = motions.count, weight[self.faces]
+        corners = corners[self.faces]
+        self._corners = corners
+        self._a_of, self._b_of = map_factors(rest[self.faces])
+        # The unknowns of an element are those of its corners, one after the other; the same one may come twice.
+        sizes = np.diff(motions.start)[corners.ravel()]
+        ends = np.cumsum(sizes)
+        self._start = np.concatenate([[0], ends[2::3]])
+        entry = np.arange(len(sizes)).repeat(sizes)
+        at = (
+            motions.start[corners.ravel()].repeat(sizes)
+            + np.arange(int(sizes.sum()))
+            - (ends - sizes).repeat(sizes)
+        )
+        self._unknown = motions.unknown[at]
+        self._alpha = self._a_of.ravel()[entry] * motions.coefficient[at]
+        self._beta = self._b_of.ravel()[entry] * motions.coefficient[at]
+        self._find_pattern()
+
+    def _find_pattern(self) -> None:
+        k, sizes = self.count, np.diff(self._start)
+        squares = np.concatenate([[0], np.cumsum(sizes**2)])
+        rows, columns = np.empty((2, squares[-1]), dtype=np.int32)
+        fill_pairs(self._start, self._unknown, squares, rows, columns)
+        inside = (rows < k) & (columns < k)
+        pattern = coo_matrix(
+            (np.ones(np.count_nonzero(inside), dtype=np.int8), (rows[inside], columns[inside])), shape=(k, k)
+        ).tocsc()
+        pattern.sum_duplicates()
+        # One matrix for all steps: its pattern is analysed once.
+        self._matrix = csc_matrix(pattern, dtype=np.float64)
+        self._indices, self._indptr = self._matrix.indices, self._matrix.indptr
+        self._slots = np.empty(len(rows), dtype=np.int64)
+        find_slots(rows, columns, self._indptr, self._indices, self._slots)
+        self._squares = squares
+        self._diagonal = np.flatnonzero(self._indices == np.arange(k).repeat(np.diff(self._indptr)))
+        self.parts, self.unknown_part = label_components(
+            k, self._indices.astype(np.int64), np.arange(k).repeat(np.diff(self._indptr))
+        )
+        first = self._unknown[self._start[:-1]]
+        self.part = np.where(first < k, self.unknown_part[np.minimum(first, k - 1)], 0)
+
+    def maps(self, points: ComplexArray) -> Maps:
+        """Return the maps at given places of all points."""
+        places = points[self._corners]
+        # Relative to a corner, so that far from the origin no digits are lost.
+        places = places - places[:, :1]
+        return Maps((self._a_of * places).sum(axis=1), (self._b_of * places).sum(axis=1))
+
+    def change(self, step: FloatArray) -> Maps:
+        """Return how the maps change with a step of the unknowns, (k,) or with the offset's share (k + 1,)."""
+        values = step[self._unknown]
+        sums = [np.add.reduceat(factor * values, self._start[:-1]) for factor in (self._alpha, self._beta)]
+        return Maps(sums[0], sums[1])
+
+    def energies(self, energy: Energy, maps: Maps) -> FloatArray:
+        """Return (f,) the energy of each triangle; infinite where it is turned over."""
+        one, two = maps.singular_values()
+        upright = two > 0
+        values = np.full(len(one), np.inf)
+        values[upright] = energy.values(one[upright], two[upright]) * self.weight[upright]
+        return values
+
+    def newton_system(
+        self, energy: Energy, maps: Maps, offset: float
+    ) -> tuple[FloatArray, FloatArray, csc_matrix]:
+        """Return the gradient (k,), what an offset adds to it, and the Hessian, made positive triangle by triangle.
+
+        offset: how much of the last unknown, which is none to be solved for, is going to be added.
+
+        Notes:
+            In the lengths A = |a| and B = |b|, and their directions, a triangle's Hessian falls apart into a block of
+            two by two for the lengths and one number each for the directions, psi_A / A and psi_B / B (in other
+            coordinates: Smith, de Goes, Kim, "Analytic eigensystems for isotropic distortion energies", 2019).
+        """
+        one, two = np.abs(maps.a), np.abs(maps.b)
+        found = energy.derivatives(one + two, one - two)
+        by_a, by_b = found.one + found.two, found.one - found.two
+        first = found.one_one + 2 * found.one_two + found.two_two
+        last = found.one_one - 2 * found.one_two + found.two_two
+        cross = found.one_one - found.two_two
+        unit_a = maps.a / one  # |a| > |b|
+        is_round = two <= 1e-9 * one
+        unit_b = np.where(is_round, 1.0, maps.b / np.where(is_round, 1.0, two))
+        # By symmetry psi_B vanishes with B, and so the quotient is the second derivative there.
+        turn_b = np.where(is_round, last, by_b / np.where(is_round, 1.0, two))
+        turn_a = by_a / one
+        middle, half = (first + last) / 2, (first - last) / 2
+        radius = np.hypot(half, cross)
+        high, low = np.maximum(middle + radius, 0.0), np.maximum(middle - radius, 0.0)
+        share = np.divide((high - low) / 2, radius, out=np.zeros_like(radius), where=radius > 0)
+        bends = (
+            np.stack(
+                [
+                    (high + low) / 2 + share * half,
+                    (high + low) / 2 - share * half,
+                    share * cross,
+                    np.maximum(turn_a, 0.0),
+                    np.maximum(turn_b, 0.0),
+                ],
+                axis=1,
+            )
+            * self.weight[:, None]
+        )
+        slopes = np.stack([by_a, by_b], axis=1) * self.weight[:, None]
+        gradient, pull = np.zeros(self.count + 1), np.zeros(self.count + 1)
+        values = np.zeros(len(self._indices))
+        add_elements(
+            self._start,
+            self._unknown,
+            self._squares,
+            self._slots,
+            self._alpha,
+            self._beta,
+            unit_a,
+            unit_b,
+            slopes,
+            bends,
+            gradient,
+            pull,
+            values,
+        )
+        values[self._diagonal] += RIDGE * values[self._diagonal].max(initial=0.0)
+        self._matrix.data = values
+        return gradient[: self.count], offset * pull[: self.count], self._matrix
+
+
+@compiled
+def fill_pairs(
+    start: IntArray, unknown: IntArray, squares: IntArray, rows: IntArray, columns: IntArray
+) -> None:
+    """Fill the ordered pairs of the unknowns of each element."""
+    for f in range(len(start) - 1):
+        at = squares[f]
+        for i in range(start[f], start[f + 1]):
+            for j in range(start[f], start[f + 1]):
+                rows[at] = unknown[i]
+                columns[at] = unknown[j]
+                at += 1
+
+
+@compiled
+def find_slots(
+    rows: IntArray, columns: IntArray, indptr: IntArray, indices: IntArray, slots: IntArray
+) -> None:
+    """Fill where each entry stands in a matrix of sorted columns; -1 in the column beyond the last."""
+    for p in range(len(rows)):
+        if columns[p] >= len(indptr) - 1 or rows[p] >= len(indptr) - 1:
+            slots[p] = -1
+            continue
+        low, high = indptr[columns[p]], indptr[columns[p] + 1]
+        while high - low > 1:
+            middle = (low + high) // 2
+            if indices[middle] <= rows[p]:
+                low = middle
+            else:
+                high = middle
+        slots[p] = low
+
+
+@compiled
+def add_elements(
+    start: IntArray,
+    unknown: IntArray,
+    squares: IntArray,
+    slots: IntArray,
+    alpha: ComplexArray,
+    beta: ComplexArray,
+    unit_a: ComplexArray,
+    unit_b: ComplexArray,
+    slopes: FloatArray,
+    bends: FloatArray,
+    gradient: FloatArray,
+    pull: FloatArray,
+    values: FloatArray,
+) -> None:
+    """Add up the gradient and the Hessian.
+
+    Args:
+        start: (f + 1,) where the unknowns of each element begin.
+        unknown, alpha, beta: the unknowns, and by how much each of them changes a and b.
+        squares, slots: where the pairs of each element begin, and where in `values` they go.
+        unit_a, unit_b: (f,) directions of a and b.
+        slopes: (f, 2) derivatives by |a| and |b|.
+        bends: (f, 5) second derivatives: by |a|, by |b|, mixed, and across a and b.
+        gradient: (k + 1,) added to.
+        pull: (k + 1,) the column of the Hessian of the last unknown, added to.
+        values: the entries of the Hessian, added to.
+    """
+    last = len(gradient) - 1
+    for f in range(len(start) - 1):
+        at = squares[f]
+        for i in range(start[f], start[f + 1]):
+            p_i, q_i = alpha[i] * unit_a[f].conjugate(), beta[i] * unit_b[f].conjugate()
+            gradient[unknown[i]] += slopes[f, 0] * p_i.real + slopes[f, 1] * q_i.real
+            for j in range(start[f], start[f + 1]):
+                p_j, q_j = alpha[j] * unit_a[f].conjugate(), beta[j] * unit_b[f].conjugate()
+                value = (
+                    bends[f, 0] * p_i.real * p_j.real
+                    + bends[f, 1] * q_i.real * q_j.real
+                    + bends[f, 2] * (p_i.real * q_j.real + q_i.real * p_j.real)
+                    + bends[f, 3] * p_i.imag * p_j.imag
+                    + bends[f, 4] * q_i.imag * q_j.imag
+                )
+                if slots[at] >= 0:
+                    values[slots[at]] += value
+                elif unknown[j] == last:
+                    pull[unknown[i]] += value
+                at += 1

@@ -1,0 +1,287 @@
+"""How the points of a layout move with unknowns, so that seams stay rigid copies and constraints hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from ..._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ...errors import OptionError
+from ...mesh import TriangleMesh
+from .constraints import CheckedConstraints
+from .seam_chains import SeamChains, find_chains
+
+# Relative size below which what elimination leaves of an equation or a coefficient is rounding.
+ROUNDING = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """The shift of each point as a sum of unknowns times complex numbers.
+
+    Attributes:
+        count: the number of unknowns k, all real.
+        start: (u + 1,) where those of each point begin.
+        unknown, coefficient: which they are, and by what they shift the point. The unknown k is none to be solved for:
+            at 1 it takes the points to where the constraints want them.
+        has_offset: whether constraints do not hold as the points are.
+    """
+
+    count: int
+    start: IntArray
+    unknown: IntArray
+    coefficient: ComplexArray
+    has_offset: bool
+
+    def shifts(self, step: FloatArray) -> ComplexArray:
+        """Return (u,) the shifts of the points, with step (k + 1,)."""
+        size = len(self.start) - 1
+        point = np.arange(size).repeat(np.diff(self.start))
+        moved = self.coefficient * step[self.unknown]
+        total: ComplexArray = np.bincount(point, moved.real, size) + 1j * np.bincount(point, moved.imag, size)
+        return total
+
+
+def find_motions(
+    mesh: TriangleMesh,
+    corners: IntArray,
+    points: ComplexArray,
+    is_free: BoolArray,
+    constraints: CheckedConstraints,
+) -> Motions:
+    """Return the motions of points that keep the rotation across every seam, and do what constraints say.
+
+    An ordinary point has two unknowns, its shift. So has a vertex within a seam, whose second point is shifted by the
+    same, turned by the rotation of the seam, plus the change of the seam's translation. These changes, and the shifts
+    of the points where seams end, depend on each other through a small linear system, whose solutions are spanned by
+    further unknowns.
+
+    Args:
+        mesh: the mesh.
+        corners: (m, 3) the point at each triangle corner.
+        points: (u,) of the plane.
+        is_free: (n,) vertices that may move; where a seam has others inside, its translation stays.
+        constraints: what else points must do.
+
+    Raises:
+        SeamError: the sides of a seam are no rigid copies of each other.
+        OptionError: the constraints contradict each other.
+    """
+    vertex = np.zeros(len(points), dtype=np.int64)
+    vertex[corners.ravel()] = mesh.faces.ravel()
+    constrained = np.concatenate([constraints.pinned, constraints.on_line])
+    chains = find_chains(mesh, corners, points, vertex[constrained])
+    return _Builder(points, vertex, is_free, chains, constraints).motions()
+
+
+class _Builder:
+    """The equations between shifts of nodes, changes of translations and of lines, and what follows for all points."""
+
+    def __init__(
+        self,
+        points: ComplexArray,
+        vertex: IntArray,
+        is_free: BoolArray,
+        chains: SeamChains,
+        constraints: CheckedConstraints,
+    ) -> None:
+        self.points, self.vertex, self.chains, self.constraints = points, vertex, chains, constraints
+        self.is_free = is_free[vertex]
+        self.entries: list[tuple[IntArray, IntArray, ComplexArray]] = []
+        on_seam = np.zeros(len(points), dtype=bool)
+        on_seam[chains.left] = on_seam[chains.right] = True
+        twice, times = np.unique(
+            np.concatenate([constraints.pinned, constraints.on_line]), return_counts=True
+        )
+        self.is_special = on_seam & chains.is_node[vertex]
+        self.is_special[twice[times > 1]] = True
+        self.is_special &= self.is_free
+        # Real variables of the small system: two for each special point and each translation, one for each line.
+        self.of_point = np.full(len(points), -1)
+        special = np.flatnonzero(self.is_special)
+        self.of_point[special] = 2 * np.arange(len(special))
+        self.of_chain = np.full(len(chains.rotation), -1)
+        loose = self._loose_chains()
+        self.of_chain[loose] = 2 * (len(special) + np.arange(len(loose)))
+        self.of_line = np.full(len(constraints.directions), -1)
+        shifting = np.flatnonzero(np.isnan(constraints.offsets))
+        self.of_line[shifting] = 2 * (len(special) + len(loose)) + np.arange(len(shifting))
+        self.size = 2 * (len(special) + len(loose)) + len(shifting)
+
+    def _loose_chains(self) -> IntArray:
+        """Return the chains whose translations may change."""
+        chains = self.chains
+        stays = ~self.is_free[chains.left] & ~chains.is_node[chains.vertices]
+        is_loose = np.bincount(chains.chain, stays.any(axis=1), len(chains.rotation)) == 0
+        held = np.sort(self.constraints.held_seams, axis=1)
+        if len(held):
+            n = int(self.vertex.max()) + 1
+            ends = np.sort(chains.vertices, axis=1)
+            is_held = np.isin(ends[:, 0] * n + ends[:, 1], held[:, 0] * n + held[:, 1])
+            is_loose[chains.chain[is_held]] = False
+        return np.flatnonzero(is_loose)
+
+    def motions(self) -> Motions:
+        """Return the motions."""
+        basis = self._solutions()
+        self.count = basis.shape[1] - 1
+        self._basis = basis
+        special = np.flatnonzero(self.is_special)
+        self._add(
+            special, self.of_point[special], np.ones(len(special), dtype=np.complex128), is_complex=True
+        )
+        self._add_seams()
+        self._add_ordinary()
+        point, unknown, coefficient = (np.concatenate(parts) for parts in zip(*self.entries, strict=True))
+        last = unknown < 0  # the offset, whose number is known only now
+        unknown = np.where(last, self.count, unknown)
+        order = np.argsort(point, kind="stable")
+        start = np.searchsorted(point[order], np.arange(len(self.points) + 1))
+        return Motions(
+            self.count, start, unknown[order], coefficient[order], bool(np.any(coefficient[last] != 0))
+        )
+
+    def _add(self, points: IntArray, variables: IntArray, factors: ComplexArray, is_complex: bool) -> None:
+        """Have points shifted by variables of the small system, each times a factor."""
+        rows = self._basis[variables] + (1j * self._basis[variables + 1] if is_complex else 0)
+        row, column = np.nonzero(rows)
+        coefficient = rows[row, column] * factors[row]
+        self.entries.append(
+            (points[row], np.where(column == self._basis.shape[1] - 1, -1, column), coefficient)
+        )
+
+    def _add_unknowns(self, points: IntArray, directions: ComplexArray, unknown: IntArray) -> None:
+        self.entries.append((points, unknown, directions))
+
+    def _add_offset(self, points: IntArray, shifts: ComplexArray) -> None:
+        moved = shifts != 0
+        self.entries.append((points[moved], np.full(int(moved.sum()), -1), shifts[moved]))
+
+    def _add_seams(self) -> None:
+        """Let the vertices within seams move, both points of each together."""
+        chains = self.chains
+        inside = (~chains.is_node[chains.vertices]) & self.is_free[chains.left]
+        left, at = np.unique(chains.left[inside], return_index=True)
+        right = chains.right[inside][at]
+        chain = np.broadcast_to(chains.chain[:, None], chains.left.shape)[inside][at]
+        self.is_special[left] = self.is_special[right] = True
+        turn = chains.rotation[chain]
+        unknown = self.count + 2 * np.arange(len(left))
+        self.count += 2 * len(left)
+        for axis, direction in enumerate((1.0, 1j)):
+            self._add_unknowns(left, np.full(len(left), direction, dtype=np.complex128), unknown + axis)
+            self._add_unknowns(right, direction * turn, unknown + axis)
+        moves = self.of_chain[chain] >= 0
+        self._add(
+            right[moves],
+            self.of_chain[chain[moves]],
+            np.ones(int(moves.sum()), dtype=np.complex128),
+            is_complex=True,
+        )
+
+    def _add_ordinary(self) -> None:
+        """Let all other points move: anywhere, along a line, or to their places."""
+        c = self.constraints
+        rest = self.is_free & ~self.is_special
+        pins = np.flatnonzero(rest[c.pinned])
+        self._add_offset(c.pinned[pins], self._complex(c.places[pins]) - self.points[c.pinned[pins]])
+        rest[c.pinned] = False
+        on = np.flatnonzero(rest[c.on_line])
+        points, line = c.on_line[on], c.line[on]
+        direction = self._complex(c.directions)[line]
+        self._add_unknowns(points, direction, self.count + np.arange(len(points)))
+        self.count += len(points)
+        normal = 1j * direction
+        self._add_offset(points, normal * self._off_line(points, line))
+        shifts = self.of_line[line] >= 0
+        self._add(points[shifts], self.of_line[line[shifts]], normal[shifts], is_complex=False)
+        rest[c.on_line] = False
+        free = np.flatnonzero(rest)
+        for axis, step in enumerate((1.0, 1j)):
+            directions = np.full(len(free), step, dtype=np.complex128)
+            self._add_unknowns(free, directions, self.count + 2 * np.arange(len(free)) + axis)
+        self.count += 2 * len(free)
+
+    def _off_line(self, points: IntArray, line: IntArray) -> FloatArray:
+        """Return (q,) by how much each point has to go to the left to its line; a loose one is where its first is."""
+        c = self.constraints
+        across = (np.conj(1j * self._complex(c.directions)[c.line]) * self.points[c.on_line]).real
+        at = c.offsets.copy()
+        lines, first = np.unique(c.line, return_index=True)
+        loose = np.isnan(at[lines])
+        at[lines[loose]] = across[first[loose]]
+        here: FloatArray = (
+            at[line] - (np.conj(1j * self._complex(c.directions)[line]) * self.points[points]).real
+        )
+        return here
+
+    def _solutions(self) -> FloatArray:
+        """Return (v, k + 1) a basis of the variables' values, and one solution of the equations in the last column."""
+        rows, right = self._equations()
+        if not self.size:
+            return np.zeros((0, 1))
+        if not len(rows):
+            return np.concatenate([np.eye(self.size), np.zeros((self.size, 1))], axis=1)
+        q, r, pivots = scipy.linalg.qr(rows, mode="economic", pivoting=True)
+        diagonal = np.abs(np.diag(r))
+        rank = int((diagonal > ROUNDING * max(diagonal[0], 1e-300)).sum())
+        turned = q.T @ right
+        missed = float(np.abs(right - q[:, :rank] @ turned[:rank]).max())
+        if missed > ROUNDING * max(1.0, float(np.abs(right).max())):
+            raise OptionError(f"constraints contradict each other, or the seams: by {missed:.2g} at least")
+        solved = scipy.linalg.solve_triangular(
+            r[:rank, :rank], np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
+        )
+        basis = np.zeros((self.size, self.size - rank + 1))
+        basis[pivots[:rank]] = np.where(np.abs(solved) > ROUNDING, solved, 0.0)
+        basis[pivots[rank:], np.arange(self.size - rank)] = 1.0
+        return basis
+
+    def _equations(self) -> tuple[FloatArray, FloatArray]:
+        """Return (r, v) equations between the variables, and their right-hand sides (r,)."""
+        rows: list[FloatArray] = []
+        right: list[float] = []
+        chains, c = self.chains, self.constraints
+
+        def add(terms: list[tuple[int, complex]], value: complex) -> None:
+            """Add the sum of complex variables times factors = value as two real equations."""
+            both = np.zeros((2, self.size))
+            for variable, factor in terms:
+                both[0, variable] += factor.real
+                both[0, variable + 1] -= factor.imag
+                both[1, variable] += factor.imag
+                both[1, variable + 1] += factor.real
+            rows.extend(both)
+            right.extend([value.real, value.imag])
+
+        for k, end in np.argwhere(chains.is_node[chains.vertices]).tolist():
+            chain = int(chains.chain[k])
+            terms = [
+                (int(self.of_point[chains.right[k, end]]), 1.0 + 0.0j),
+                (int(self.of_point[chains.left[k, end]]), -complex(chains.rotation[chain])),
+                (int(self.of_chain[chain]), -1.0 + 0.0j),
+            ]
+            terms = [term for term in terms if term[0] >= 0]
+            if terms:
+                add(terms, 0.0)
+        for point, place in zip(c.pinned.tolist(), self._complex(c.places).tolist(), strict=True):
+            if self.of_point[point] >= 0:
+                add([(int(self.of_point[point]), 1.0 + 0.0j)], place - complex(self.points[point]))
+        off = self._off_line(c.on_line, c.line)
+        for point, line, value in zip(c.on_line.tolist(), c.line.tolist(), off.tolist(), strict=True):
+            if self.of_point[point] >= 0:
+                row = np.zeros(self.size)
+                normal = 1j * complex(*c.directions[line])
+                row[self.of_point[point] : self.of_point[point] + 2] = normal.real, normal.imag
+                if self.of_line[line] >= 0:
+                    row[self.of_line[line]] = -1.0
+                rows.append(row)
+                right.append(value)
+        return np.array(rows).reshape(-1, self.size), np.array(right)
+
+    @staticmethod
+    def _complex(places: FloatArray) -> ComplexArray:
+        joined: ComplexArray = places[:, 0] + 1j * places[:, 1]
+        return joined

@@ -1,0 +1,122 @@
+"""Newton's method on the distortion of triangles, none of which is ever turned over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..._arrays import ComplexArray, FloatArray
+from ...errors import MetricError
+from ...solver import Factor, factorize
+from .elements import SHORT_OF_FLAT, Elements
+from .energies import Energy
+from .motions import Motions
+
+# Part of the slope that a step must gain at least, and halvings after which a part is stuck.
+ARMIJO, HALVINGS = 1e-4, 30
+# What is left of the way to where the constraints hold counts as none below this.
+ARRIVED = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """Where Newton's method has come to.
+
+    Attributes:
+        points: (u,) the places.
+        before, after: the energy.
+        steps: Newton steps.
+        remaining: part of the way to where the constraints hold that is left: 0 when they do.
+    """
+
+    points: ComplexArray
+    before: float
+    after: float
+    steps: int
+    remaining: float
+
+
+def descend(
+    points: ComplexArray,
+    motions: Motions,
+    elements: Elements,
+    energy: Energy,
+    tolerance: float,
+    steps: int,
+    tell: Callable[[int, float], bool | None] | None = None,
+) -> Descent:
+    """Return points of less energy, as far as Newton's method comes.
+
+    Parts that no triangle connects take steps of their own lengths. Where constraints do not hold, all take one, which
+    goes as far towards them as triangles allow (an infeasible start: Boyd and Vandenberghe 2004, Section 10.3).
+
+    Args:
+        points: (u,) where no triangle that moves is turned over.
+        motions: how they move.
+        elements: the triangles that do.
+        energy: what is minimised.
+        tolerance: part of its energy that a step must be expected to gain for a part to go on.
+        steps: at most.
+        tell: called with the number of steps and the energy; True ends it.
+
+    Raises:
+        MetricError: the Hessian is singular in double precision.
+    """
+    remaining = 1.0 if motions.has_offset else 0.0
+    together = motions.has_offset
+    maps = elements.maps(points)
+    part = np.zeros_like(elements.part) if together else elements.part
+    parts = 1 if together else elements.parts
+    unknown_part = np.zeros_like(elements.unknown_part) if together else elements.unknown_part
+
+    def sums(values: FloatArray) -> FloatArray:
+        return np.bincount(part, values, parts).astype(np.float64)
+
+    here = sums(elements.energies(energy, maps))
+    before = float(here.sum())
+    total = np.zeros(elements.count + 1)
+    active = np.ones(parts, dtype=bool)
+    factor: Factor | None = None
+    taken = 0
+    while taken < steps and elements.count and (active.any() or remaining > ARRIVED):
+        gradient, pull, matrix = elements.newton_system(energy, maps, remaining)
+        factor = factorize(matrix, used_up=factor, is_noted=False)
+        step = np.append(factor.solve(-gradient - pull), remaining)
+        if not np.isfinite(step).all():
+            raise MetricError(f"relaxation found no finite step of {elements.count:,} unknowns")
+        slope = np.bincount(unknown_part, gradient * step[:-1], parts)
+        if not remaining:
+            active &= -slope > tolerance * here
+            step[:-1][~active[unknown_part]] = 0.0
+            if not active.any():
+                break
+        change = elements.change(step)
+        length = np.full(parts, np.inf)
+        np.minimum.at(length, part, maps.largest_steps(change))
+        length = np.minimum(1.0, SHORT_OF_FLAT * length)
+        taken += 1
+        for _ in range(HALVINGS):
+            trial = maps.plus(length[part], change)
+            there = sums(elements.energies(energy, trial))
+            # On the way to the constraints the energy may have to rise: all that counts is that it is finite.
+            enough = np.isfinite(there) if remaining else there <= here + ARMIJO * length * slope
+            good = ~active | enough
+            if good.all():
+                break
+            length[~good] /= 2
+        length[~good] = 0.0
+        active &= length > 0
+        total[:-1] += length[unknown_part] * step[:-1]
+        total[-1] += length[0] * step[-1] if remaining else 0.0
+        maps = elements.maps(points + motions.shifts(total))
+        here = sums(elements.energies(energy, maps))
+        if remaining:
+            remaining = 1.0 - float(total[-1])
+            remaining = remaining if remaining > ARRIVED else 0.0
+            if not active.any():
+                break
+        if tell is not None and tell(taken, float(here.sum())):
+            break
+    return Descent(points + motions.shifts(total), before, float(here.sum()), taken, remaining)

@@ -1,0 +1,160 @@
+"""Distortion of a layout minimised over all layouts whose seams are rigid copies with the same rotations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._arrays import BoolArray, ComplexArray, FloatArray, as_faces, as_floats, require_finite
+from ...errors import ArrayShapeError, ConvergenceError, OptionError
+from ...geometry import double_areas, edge_lengths
+from ...geometry.lengths import check_lengths
+from ...geometry.planar import signed_double_areas
+from ...geometry.straight import place_triangles
+from ...mesh import TriangleMesh
+from ...text import plural
+from .constraints import Constraints, check_constraints
+from .elements import Elements
+from .energies import Distortion, Energy
+from .motions import find_motions
+from .newton import descend
+
+# Part of the energy that a step must be expected to gain to be taken, and steps at most.
+TOLERANCE, STEPS = 1e-6, 100
+
+
+@dataclass(frozen=True, eq=False)
+class Relaxed:
+    """A relaxed layout.
+
+    Attributes:
+        points: (u, 2) of the plane.
+        energy_before, energy: of the triangles that could move, as the mean over them by weight.
+        steps: Newton steps.
+        moved: (n,) True for vertices that could move.
+    """
+
+    points: FloatArray
+    energy_before: float
+    energy: float
+    steps: int
+    moved: BoolArray
+
+
+def relax(
+    mesh: TriangleMesh,
+    points: ArrayLike,
+    corners: ArrayLike,
+    energy: Energy | None = None,
+    constraints: Constraints | None = None,
+    *,
+    lengths: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+    free: ArrayLike | None = None,
+    tolerance: float = TOLERANCE,
+    steps: int = STEPS,
+    progress: Callable[[int, float], bool | None] | None = None,
+) -> Relaxed:
+    """Return a layout of less distortion, in which no triangle is turned over and seams are what they were.
+
+    A seam is where the triangles on both sides have different points; the one side is a rigid copy of the other.
+    Their rotations stay and their translations may change, so cones keep their angles and the two sides of every seam
+    their equal lengths: the layout remains one of a flat metric with the same cones.
+
+    Args:
+        mesh: the mesh.
+        points: (u, 2) of the plane. Triangles that are turned over there, or have no area, stay as they are.
+        corners: (m, 3) the point at each triangle corner, from 0.
+        energy: what a triangle costs, per area; None: its distortion of angles, `Distortion(0)`.
+        constraints: what points must do; None for nothing.
+        lengths: (m, 3) side lengths of the triangles as they should be, column i opposite corner i; None: those
+            between the positions of the mesh.
+        weights: (m,) what each triangle counts besides its area; None: the same.
+        free: (n,) True for vertices that may move; None: all.
+        tolerance: part of the energy that a step must be expected to gain to be taken.
+        steps: Newton steps at most.
+        progress: called after each step with its number and the energy; what it has found so far is returned where
+            this returns True.
+
+    Raises:
+        ArrayShapeError, FaceIndexError, NonFiniteError: arrays do not fit the mesh, or are not finite.
+        LengthError: the lengths are no metric.
+        OptionError: the constraints make no sense, or contradict each other.
+        SeamError: the two sides of a seam are no rigid copies of each other.
+        ConvergenceError: constraints cannot be reached without turning a triangle over, as far as is known.
+        MetricError: the computation found no finite result.
+
+    Notes:
+        Newton's method with each triangle's Hessian made positive, in closed form (Smith, de Goes, Kim, "Analytic
+        eigensystems for isotropic distortion energies", 2019), by steps that turn no triangle over (Smith and Schaefer,
+        "Bijective parameterization with free boundaries", 2015). Seams are no constraints but eliminated, so the
+        system is symmetric positive definite, and of one pattern for all steps.
+    """
+    energy = Distortion() if energy is None else energy
+    places = as_floats("points", points)
+    if places.ndim != 2 or places.shape[1] != 2:
+        raise ArrayShapeError(f"points must have the shape (u, 2), not {places.shape}")
+    corner = as_faces(corners, len(places))
+    if corner.shape != mesh.faces.shape:
+        raise ArrayShapeError(
+            f"corners must have the shape {mesh.faces.shape}, as the faces, not {corner.shape}"
+        )
+    require_finite(places, corner)
+    own = edge_lengths(mesh.vertices, mesh.faces) if lengths is None else check_lengths(mesh, lengths)
+    if not 0 <= tolerance < 1 or steps < 0:
+        raise OptionError(f"tolerance must be from 0 to 1 and steps from 0, not {tolerance!r} and {steps!r}")
+    checked = check_constraints(Constraints() if constraints is None else constraints, places)
+    is_free = _flags(free, len(mesh.vertices))
+    areas = double_areas(own) / 2
+    share = areas * _weights(weights, len(mesh.faces))
+    doubled = signed_double_areas(places[corner])
+    is_free[mesh.faces[(doubled <= 0) | (areas <= 0)]] = False
+    if not is_free.any():
+        return Relaxed(places, 0.0, 0.0, 0, is_free)
+    unit = float(np.sqrt(np.abs(doubled).sum() / (2 * areas.sum())))
+    z = places[:, 0] + 1j * places[:, 1]
+    motions = find_motions(mesh, corner, z, is_free, checked)
+    elements = Elements(motions, corner, unit * rest_sides(own), share)
+    if not elements.count and not motions.has_offset:
+        return Relaxed(places, 0.0, 0.0, 0, is_free)
+    found = descend(z, motions, elements, energy, tolerance, steps, progress)
+    if found.remaining:
+        raise ConvergenceError(
+            f"constraints cannot be met without turning triangles over: {1 - found.remaining:.1%} of the way to them "
+            f"in {plural(found.steps, 'step')}"
+        )
+    total = float(elements.weight.sum())
+    moved = np.stack([found.points.real, found.points.imag], axis=1)
+    return Relaxed(moved, found.before / total, found.after / total, found.steps, is_free)
+
+
+def rest_sides(lengths: FloatArray) -> ComplexArray:
+    """Return (m, 3) the sides of triangles with given lengths (m, 3), upright in the plane."""
+    sides = np.empty(lengths.size, dtype=np.complex128)
+    place_triangles(np.ascontiguousarray(lengths).ravel(), sides)
+    return sides.reshape(-1, 3)
+
+
+def _flags(free: ArrayLike | None, count: int) -> BoolArray:
+    if free is None:
+        return np.ones(count, dtype=bool)
+    flags = np.asarray(free)
+    if flags.dtype != bool or flags.shape != (count,):
+        raise ArrayShapeError(
+            f"free must be {count:,} flags, one for each vertex, not {flags.dtype} of shape {flags.shape}"
+        )
+    return flags.copy()
+
+
+def _weights(weights: ArrayLike | None, count: int) -> FloatArray:
+    if weights is None:
+        return np.ones(count)
+    values = as_floats("weights", weights)
+    if values.shape != (count,):
+        raise ArrayShapeError(f"weights must have the shape ({count},), not {values.shape}")
+    if not (np.isfinite(values) & (values > 0)).all():
+        raise OptionError(f"weights must be positive: {int((~(values > 0)).sum())} of {count:,} are not")
+    return values

@@ -1,0 +1,123 @@
+"""The seams of a layout as chains of edges whose two sides are moved onto each other by one rigid motion each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ...errors import SeamError
+from ...mesh import NEXT, PREVIOUS, TriangleMesh, label_components
+
+# Radians by which the rotation between the sides of a seam may change at a vertex without it being a cone. Cones have
+# curvatures of 1e-4 at least; lengths of edges of the plane are good to 1e-9 where they are shortest.
+SAME_ROTATION = 1e-5
+# By how much of an edge the sides of a seam may miss being copies of each other.
+RIGID = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class SeamChains:
+    """The seams of a layout, as k edges in c chains.
+
+    Attributes:
+        edges: (k,) the mesh's edges.
+        vertices: (k, 2) the two ends of each.
+        left, right: (k, 2) the points at its ends on either side.
+        chain: (k,) the chain of each.
+        rotation: (c,) unit numbers: turned by it, the left side of a chain is parallel to the right one.
+        is_node: (n,) vertices where chains end: cones, branch points, those on the boundary, and those asked for.
+    """
+
+    edges: IntArray
+    vertices: IntArray
+    left: IntArray
+    right: IntArray
+    chain: IntArray
+    rotation: ComplexArray
+    is_node: BoolArray
+
+
+def find_chains(
+    mesh: TriangleMesh, corners: IntArray, points: ComplexArray, nodes: IntArray | None = None
+) -> SeamChains:
+    """Return the chains of the edges whose sides have different points.
+
+    Args:
+        mesh: the mesh.
+        corners: (m, 3) the point at each triangle corner.
+        points: (u,) of the plane.
+        nodes: vertices that are to be nodes, whether chains end there or not.
+
+    Raises:
+        SeamError: the sides of a seam are no rigid copies of each other.
+    """
+    starts, ends = corners[:, NEXT].ravel(), corners[:, PREVIOUS].ravel()
+    inner = np.flatnonzero(~mesh.is_boundary_edge)
+    h, t = mesh.edge_halfedges[inner].T
+    is_seam = (starts[h] != ends[t]) | (ends[h] != starts[t])
+    edges, h, t = inner[is_seam], h[is_seam], t[is_seam]
+    vertices = np.stack([mesh.tails[h], mesh.heads[h]], axis=1)
+    sides = np.stack([np.stack([starts[h], ends[h]], axis=1), np.stack([ends[t], starts[t]], axis=1)])
+    one, two = (points[side[:, 1]] - points[side[:, 0]] for side in sides)
+    _check_rigid(edges, vertices, one, two)
+    turns = two * np.conj(one)
+    turns /= np.abs(turns)
+
+    count = len(edges)
+    is_node = np.bincount(vertices.ravel(), minlength=len(mesh.vertices)) != 2
+    is_node |= mesh.is_boundary_vertex
+    if nodes is not None:
+        is_node[nodes] = True
+    is_node[_turning(vertices, sides, turns, is_node)] = True
+    # Sides of edges, numbered from 0 on the one hand and from `count` on the other, that meet at a point.
+    point = sides.reshape(-1, 2).ravel()
+    side = np.arange(2 * count).repeat(2)
+    regular = ~is_node[np.concatenate([vertices, vertices]).ravel()]
+    point, side = point[regular], side[regular]
+    order = np.argsort(point, kind="stable")
+    point, side = point[order], side[order]
+    meet = np.flatnonzero(point[1:] == point[:-1])
+    _, label = label_components(2 * count, side[meet], side[meet + 1])
+    first, second = label[:count], label[count:]
+    swapped = second < first
+    left = np.where(swapped[:, None], sides[1], sides[0])
+    right = np.where(swapped[:, None], sides[0], sides[1])
+    _, chain = np.unique(np.minimum(first, second), return_inverse=True)
+    chain = chain.ravel()
+    total = np.zeros(int(chain.max(initial=-1)) + 1, dtype=np.complex128)
+    np.add.at(
+        total,
+        chain,
+        np.where(swapped, two * np.conj(one), 0).conj() + np.where(swapped, 0, two * np.conj(one)),
+    )
+    return SeamChains(edges, vertices, left, right, chain, total / np.abs(total), is_node)
+
+
+def _turning(vertices: IntArray, sides: IntArray, turns: ComplexArray, is_node: BoolArray) -> IntArray:
+    """Return the vertices at which two edges meet and the rotation changes from one to the other."""
+    ends = vertices.ravel()
+    edge = np.arange(len(vertices)).repeat(2)
+    rest = ~is_node[ends]
+    ends, edge, point = ends[rest], edge[rest], sides[0].ravel()[rest]
+    order = np.argsort(ends, kind="stable").reshape(-1, 2)
+    edge, point = edge[order], point[order]
+    # The first sides of both lie on the same hand if they meet at a point.
+    other = np.where(point[:, 0] == point[:, 1], turns[edge[:, 1]], np.conj(turns[edge[:, 1]]))
+    turning: IntArray = ends[order[np.abs(other - turns[edge[:, 0]]) > SAME_ROTATION, 0]]
+    return turning
+
+
+def _check_rigid(edges: IntArray, vertices: IntArray, one: ComplexArray, two: ComplexArray) -> None:
+    lengths: FloatArray = np.abs(one)
+    if not (lengths > 0).all():
+        raise SeamError(f"{int((lengths <= 0).sum())} seam edges have no length in the plane")
+    off = np.abs(np.abs(two) / lengths - 1)
+    if (off > RIGID).any():
+        worst = int(off.argmax())
+        pair = "-".join(str(v) for v in vertices[worst].tolist())
+        raise SeamError(
+            f"the sides of {int((off > RIGID).sum())} of {len(edges)} seam edges are no copies of each other: those of "
+            f"{pair} differ by {off[worst]:.2g} of their length"
+        )
