@@ -58,6 +58,11 @@ _HOMES = {
     "exact_metric": "flat.exact.metric",
     "ExactMetric": "flat.exact.metric",
     "unfold": "layout.unfold",
+    "relax": "layout.relax",
+    "Relaxed": "layout.relax",
+    "StretchEnergy": "layout.relax",
+    "PointConstraints": "layout.relax",
+    "Lines": "layout.relax",
     "FlatTriangles": "geometry.straight",
     "flat_triangles": "geometry.straight",
     "find_overlaps": "geometry.overlap",
@@ -87,12 +92,16 @@ __all__ = [
     "FlatTriangles",
     "Flattening",
     "FoundCones",
+    "Lines",
     "MeshFile",
     "Overlaps",
     "PAPER",
     "Packed",
+    "PointConstraints",
+    "Relaxed",
     "SeamData",
     "SparseCones",
+    "StretchEnergy",
     "TriangleMesh",
     "UVMeasures",
     "__version__",
@@ -131,6 +140,7 @@ __all__ = [
     "pack_together",
     "read_flattening",
     "read_mesh",
+    "relax",
     "sample_path",
     "save_figure",
     "scaled_lengths",
@@ -155,6 +165,7 @@ if TYPE_CHECKING:
     from .input.mesh_file import MeshFile
     from .input.validation import CheckedMesh, check_mesh
     from .layout import least_squares_layout
+    from .layout.relax import Lines, PointConstraints, Relaxed, StretchEnergy, relax
     from .layout.unfold import unfold
     from .mesh import TriangleMesh
     from .options import PAPER

@@ -213,8 +213,8 @@ class MetricOptions:
         "auto",
         Choice(POLISHES),
         "Exact metric: less distortion of triangles, with the same cones, curvatures and seams. auto: those with a "
-        "quasi-conformal distortion above 1.5, beside cones, and two rings around them. whole: all. off: none, so that "
-        "the map is discretely conformal everywhere.",
+        "quasi-conformal distortion above 1.35, beside cones, and three rings around them. whole: all. off: none, so "
+        "that the map is discretely conformal everywhere.",
         only="exact",
     )
     stretch: float = option(

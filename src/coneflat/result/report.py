@@ -125,6 +125,13 @@ def as_rows(result: Flattening) -> list[Row]:
         )
     added = f"; {solve.refined_triangles:,} more by the refinement" if solve.refined_triangles else ""
     of_map = map_rows(d)
+    if solve.relaxed_vertices:
+        relaxed = (
+            f"; before {plural(solve.relaxed_vertices, 'vertex', 'vertices')} moved "
+            f"{number_text(solve.qc_mean_unrelaxed, '.4f')}, worst {number_text(solve.qc_max_unrelaxed, '.4g')}"
+        )
+        name, value, meaning = of_map["QC distortion"]
+        of_map["QC distortion"] = (name, value, meaning + relaxed)
     if untangled:
         of_map["flipped"] = (*of_map["flipped"][:2], untangled)
     return [

@@ -32,7 +32,7 @@ class Lines:
 
 
 @dataclass(frozen=True)
-class Constraints:
+class PointConstraints:
     """What points must do; what does not hold in the beginning does in the end.
 
     Attributes:
@@ -62,7 +62,7 @@ class CheckedConstraints:
     held_seams: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
 
 
-def check_constraints(constraints: Constraints, points: FloatArray) -> CheckedConstraints:
+def check_constraints(constraints: PointConstraints, points: FloatArray) -> CheckedConstraints:
     """Return constraints on (u, 2) points, checked.
 
     Raises:

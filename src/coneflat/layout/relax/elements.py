@@ -123,7 +123,7 @@ class Elements:
             k, self._indices.astype(np.int64), np.arange(k).repeat(np.diff(self._indptr))
         )
         first = self._unknown[self._start[:-1]]
-        self.part = np.where(first < k, self.unknown_part[np.minimum(first, k - 1)], 0)
+        self.part = np.append(self.unknown_part, 0)[first]  # the offset's is any: then all take one step
 
     def maps(self, points: ComplexArray) -> Maps:
         """Return the maps at given places of all points."""

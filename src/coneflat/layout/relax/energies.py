@@ -38,34 +38,37 @@ class Energy(Protocol):
 
 
 @dataclass(frozen=True)
-class Distortion:
-    """Angles against areas: M A^stretch, where M = (s1/s2 + s2/s1) / 2 and A = (s1 s2 + 1/(s1 s2)) / 2.
+class StretchEnergy:
+    """Angles against areas: (M A^stretch)^sharpness, M = (s1/s2 + s2/s1) / 2 and A = (s1 s2 + 1/(s1 s2)) / 2.
 
     Attributes:
         stretch: from 0, where angles alone count (MIPS: Hormann and Greiner 2000), to 1, where it is the symmetric
             Dirichlet energy, least for isometries (Smith and Schaefer 2015). More weighs areas more still.
+        sharpness: 1, or more, where the worst triangles count more.
 
     Raises:
-        OptionError: `stretch` is negative or not finite.
+        OptionError: `stretch` is negative, `sharpness` below 1, or one of them not finite.
 
     Notes:
         P. Degener, J. Meseth, R. Klein, "An adaptable surface parametrization method", 2003.
     """
 
     stretch: float = 0.0
+    sharpness: float = 1.0
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.stretch) and self.stretch >= 0):
             raise OptionError(f"stretch must be a number from 0, not {self.stretch!r}")
+        if not (np.isfinite(self.sharpness) and self.sharpness >= 1):
+            raise OptionError(f"sharpness must be a number from 1, not {self.sharpness!r}")
 
     def values(self, one: FloatArray, two: FloatArray) -> FloatArray:
         """Return (f,) the energy at singular values (f,) each, both positive."""
-        angle = (one / two + two / one) / 2
-        if self.stretch == 0:
-            return angle
-        area = one * two
-        result: FloatArray = angle * ((area + 1 / area) / 2) ** self.stretch
-        return result
+        result: FloatArray = (one / two + two / one) / 2
+        if self.stretch != 0:
+            area = one * two
+            result = result * ((area + 1 / area) / 2) ** self.stretch
+        return result if self.sharpness == 1 else result**self.sharpness
 
     def derivatives(self, one: FloatArray, two: FloatArray) -> Derivatives:
         """Return the energy and its derivatives."""
@@ -78,7 +81,8 @@ class Distortion:
             -(1 / two**2 + 1 / one**2) / 2,
             ratio / two**2,
         )
-        return angle if self.stretch == 0 else _product(angle, self._area(one, two))
+        product = angle if self.stretch == 0 else _product(angle, self._area(one, two))
+        return product if self.sharpness == 1 else _power(product, self.sharpness)
 
     def _area(self, one: FloatArray, two: FloatArray) -> Derivatives:
         """Return A^stretch and its derivatives."""
@@ -101,4 +105,17 @@ def _product(f: Derivatives, g: Derivatives) -> Derivatives:
         f.one_one * g.value + 2 * f.one * g.one + f.value * g.one_one,
         f.one_two * g.value + f.one * g.two + f.two * g.one + f.value * g.one_two,
         f.two_two * g.value + 2 * f.two * g.two + f.value * g.two_two,
+    )
+
+
+def _power(f: Derivatives, exponent: float) -> Derivatives:
+    slope = exponent * f.value ** (exponent - 1)
+    bend = (exponent - 1) * slope / f.value
+    return Derivatives(
+        f.value**exponent,
+        slope * f.one,
+        slope * f.two,
+        slope * f.one_one + bend * f.one**2,
+        slope * f.one_two + bend * f.one * f.two,
+        slope * f.two_two + bend * f.two**2,
     )

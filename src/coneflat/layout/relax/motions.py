@@ -219,9 +219,9 @@ class _Builder:
 
     def _solutions(self) -> FloatArray:
         """Return (v, k + 1) a basis of the variables' values, and one solution of the equations in the last column."""
-        rows, right = self._equations()
         if not self.size:
             return np.zeros((0, 1))
+        rows, right = self._equations()
         if not len(rows):
             return np.concatenate([np.eye(self.size), np.zeros((self.size, 1))], axis=1)
         q, r, pivots = scipy.linalg.qr(rows, mode="economic", pivoting=True)

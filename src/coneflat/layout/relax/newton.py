@@ -16,8 +16,9 @@ from .motions import Motions
 
 # Part of the slope that a step must gain at least, and halvings after which a part is stuck.
 ARMIJO, HALVINGS = 1e-4, 30
-# What is left of the way to where the constraints hold counts as none below this.
-ARRIVED = 1e-12
+# What is left of the way to where the constraints hold counts as none below this, and as out of reach after a step that
+# goes less than this part of it.
+ARRIVED, STUCK = 1e-12, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,7 @@ def descend(
     active = np.ones(parts, dtype=bool)
     factor: Factor | None = None
     taken = 0
-    while taken < steps and elements.count and (active.any() or remaining > ARRIVED):
+    while taken < steps and ((elements.count and active.any()) or remaining > ARRIVED):
         gradient, pull, matrix = elements.newton_system(energy, maps, remaining)
         factor = factorize(matrix, used_up=factor, is_noted=False)
         step = np.append(factor.solve(-gradient - pull), remaining)
@@ -115,7 +116,7 @@ def descend(
         if remaining:
             remaining = 1.0 - float(total[-1])
             remaining = remaining if remaining > ARRIVED else 0.0
-            if not active.any():
+            if length[0] < STUCK:
                 break
         if tell is not None and tell(taken, float(here.sum())):
             break

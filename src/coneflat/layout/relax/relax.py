@@ -1,4 +1,4 @@
-"""Distortion of a layout minimised over all layouts whose seams are rigid copies with the same rotations."""
+"""StretchEnergy of a layout minimised over all layouts whose seams are rigid copies with the same rotations."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ...geometry.planar import signed_double_areas
 from ...geometry.straight import place_triangles
 from ...mesh import TriangleMesh
 from ...text import plural
-from .constraints import Constraints, check_constraints
+from .constraints import PointConstraints, check_constraints
 from .elements import Elements
-from .energies import Distortion, Energy
+from .energies import Energy, StretchEnergy
 from .motions import find_motions
 from .newton import descend
 
@@ -49,7 +49,7 @@ def relax(
     points: ArrayLike,
     corners: ArrayLike,
     energy: Energy | None = None,
-    constraints: Constraints | None = None,
+    constraints: PointConstraints | None = None,
     *,
     lengths: ArrayLike | None = None,
     weights: ArrayLike | None = None,
@@ -68,7 +68,7 @@ def relax(
         mesh: the mesh.
         points: (u, 2) of the plane. Triangles that are turned over there, or have no area, stay as they are.
         corners: (m, 3) the point at each triangle corner, from 0.
-        energy: what a triangle costs, per area; None: its distortion of angles, `Distortion(0)`.
+        energy: what a triangle costs, per area; None: its distortion of angles, `StretchEnergy(0)`.
         constraints: what points must do; None for nothing.
         lengths: (m, 3) side lengths of the triangles as they should be, column i opposite corner i; None: those
             between the positions of the mesh.
@@ -93,7 +93,7 @@ def relax(
         "Bijective parameterization with free boundaries", 2015). Seams are no constraints but eliminated, so the
         system is symmetric positive definite, and of one pattern for all steps.
     """
-    energy = Distortion() if energy is None else energy
+    energy = StretchEnergy() if energy is None else energy
     places = as_floats("points", points)
     if places.ndim != 2 or places.shape[1] != 2:
         raise ArrayShapeError(f"points must have the shape (u, 2), not {places.shape}")
@@ -106,7 +106,7 @@ def relax(
     own = edge_lengths(mesh.vertices, mesh.faces) if lengths is None else check_lengths(mesh, lengths)
     if not 0 <= tolerance < 1 or steps < 0:
         raise OptionError(f"tolerance must be from 0 to 1 and steps from 0, not {tolerance!r} and {steps!r}")
-    checked = check_constraints(Constraints() if constraints is None else constraints, places)
+    checked = check_constraints(PointConstraints() if constraints is None else constraints, places)
     is_free = _flags(free, len(mesh.vertices))
     areas = double_areas(own) / 2
     share = areas * _weights(weights, len(mesh.faces))
