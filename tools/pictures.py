@@ -285,12 +285,61 @@ def tradeoff_figure(measured: Measured) -> Any:
     return figure
 
 
+def relaxed_figure(measured: Measured) -> Any:
+    """Return a figure of the triangles around the most bent one, before and after they are relaxed."""
+    before, after = (coneflat.flatten(measured.path("3holes"), polish=polish) for polish in ("off", "auto"))
+    worst = int(np.nanargmax(before.distortion.qc))
+    figure = new_figure(8.0, 4.15, dpi=DPI)
+    for index, (result, label) in enumerate(((before, "before"), (after, "after"))):
+        axes = figure.add_axes((0.02 + 0.49 * index, 0.02, 0.47, 0.91))
+        _draw_around(axes, result, worst)
+        d = result.distortion
+        axes.set_title(f"{label}: mean {d.qc_mean:.3f}, worst {d.qc_max:.3g}", fontsize=10)
+    return figure
+
+
+def _draw_around(axes: Any, result: coneflat.Flattening, face: int, reach: float = 5.0) -> None:
+    """Draw the layout around a triangle, as far as so many edges; colours are the triangles' distortion, to 3."""
+    from matplotlib.collections import PolyCollection
+
+    corners = result.corner_uv
+    middle = corners[face].mean(axis=0)
+    edge = float(np.median(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)))
+    near = (np.abs(corners.mean(axis=1) - middle) < (reach + 2) * edge).all(axis=1)
+    shown = PolyCollection(
+        list(corners[near]), array=result.distortion.qc[near], cmap="YlOrRd", clim=(1, 3), edgecolor="#555555"
+    )
+    shown.set_linewidth(0.5)
+    axes.add_collection(shown)
+    axes.set_xlim(middle[0] - reach * edge, middle[0] + reach * edge)
+    axes.set_ylim(middle[1] - reach * edge, middle[1] + reach * edge)
+    axes.set_aspect("equal")
+    axes.axis("off")
+
+
+def dial_figure(measured: Measured) -> Any:
+    """Return a figure of a model with a checkerboard, from angles kept to areas kept, and of its layouts."""
+    panels, layouts = [], []
+    for stretch in (0.0, 0.5, 1.0):
+        result = coneflat.flatten(measured.path("bunny"), stretch=stretch)
+        d = result.distortion
+        label = f"stretch {stretch:g}: angles {d.qc_mean:.3f}, areas {d.area_std:.3f}"
+        panels.append(
+            Panel(view_aspect(result.vertices), partial(coneflat.draw_checker, result, dpi=DPI), label)
+        )
+        layout = partial(coneflat.draw_layout, result, edges=False, crop=True)
+        layouts.append(Panel(layout_aspect(result, crop=True), layout))
+    return compose([Row(panels), Row(layouts)], dpi=DPI)
+
+
 #: Name of each picture, the models that it needs, and what draws it.
 PICTURES: dict[str, tuple[tuple[str, ...], Callable[[Measured], Any]]] = {
     "sample": ((), lambda measured: demo_figure(measured.flattening("sample"))),
     "atlas-shapes": ((), shapes_figure),
     "curvature": (("bunny",), curvature_figure),
     "quarters": (("bunny",), quarters_figure),
+    "relaxed": (("3holes",), relaxed_figure),
+    "dial": (("bunny",), dial_figure),
     "steps": (("bunny",), steps_figure),
     **{f"gallery-{model}": ((model,), partial(gallery_figure, model)) for model in GALLERY},
     **{f"{model}-{kind}": ((model,), partial(kind_figure, model, kind)) for model in LOOKS for kind in KINDS},
