@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from .._arrays import FloatArray, IntArray
 from ..geometry.planar import signed_double_areas
 from .charts import Charts, read_charts
-from .orient import mean_rise, orient_charts, straight_angles
+from .orient import border_directions, mean_rise, orient_charts, straight_angles
 from .pack import MOST_TURNS, Packed, pack_charts
 
 # Of a turn: by how much a multiple of a quantum may miss it.
@@ -61,12 +61,15 @@ def whole_turns(quantum: float) -> int:
 def _turned_together(
     charts: Charts, component: IntArray, turns: int, space: FloatArray, up: tuple[float, float, float] | None
 ) -> FloatArray:
-    """Return (m, 3, 2) the charts, the largest of each component straight, and the others turned as far as it.
+    """Return (m, 3, 2) the charts, one of each component straight, and the others turned as far as it.
 
-    With an up direction each chart is then turned by that number of equal turns which brings it up best.
+    It is the largest of those whose border is straight, or of all. With an up direction each chart is then turned by that number of equal turns which brings it up best.
     """
-    angles, areas = straight_angles(charts, charts.outlines()), np.abs(charts.sums(charts.areas))
-    order = np.lexsort((-areas, component))
+    outlines = charts.outlines()
+    directions = border_directions(outlines)
+    angles, areas = straight_angles(charts, outlines, directions), np.abs(charts.sums(charts.areas))
+    is_free = np.array([not len(of_border) for of_border in directions])
+    order = np.lexsort((-areas, is_free, component))
     _, first = np.unique(component[order], return_index=True)
     largest = order[first][np.unique(component, return_inverse=True)[1]]
     if up is not None:
