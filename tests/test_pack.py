@@ -170,6 +170,26 @@ def test_small_charts_go_into_holes():
     assert all(inside)
 
 
+def bars(*boxes):
+    """Triangles of rectangles, each given by its corners (left, bottom, right, top)."""
+    low = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=float)
+    return np.concatenate([low * [r - x, t - y] + [x, y] for x, y, r, t in boxes])
+
+
+def test_a_chart_that_must_keep_to_the_right():
+    """A foot that does not reach the left border, below a block that does: neither may lie lowest and leftmost."""
+    corners, chart = charts_of(bars((1, 0, 3, 1), (3, 0, 4, 4)), bars((0, 0, 2.98, 2.98)))
+    assert pack_charts(corners, chart, rotate="none", padding=0).efficiency > 0.9
+
+
+def test_the_longest_chart_ends_where_the_texture_does():
+    """Not where a cell of a grid ends: beside it there is room for the others."""
+    corners, chart = charts_of(bars((0, 0, np.pi, 0.3)), bars((0, 0, 0.4, 0.5)), star(5, 0.5, 0.3))
+    for rotate in ("quarter", "none"):
+        packed = pack_charts(corners, chart, rotate=rotate, padding=3)
+        assert packed.scale == pytest.approx((1 - 6 / 1024) / np.pi, rel=1e-12)
+
+
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_one_chart_fills_the_smallest_square(seed):
     corners = star(9, 0.3, 1.0, seed)

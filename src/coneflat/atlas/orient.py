@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,9 +31,10 @@ def orient_charts(
 ) -> FloatArray:
     """Return (m, 3, 2) charts that lie straight, each turned about the origin and otherwise as it was.
 
-    Where much of a chart's border is straight, as of boxes, most of it is parallel to the axes; otherwise the rectangle
-    of least area around the chart is. Without an up direction its long side lies along u and the heavier half of the
-    chart below; with one, of the four quarter turns the chart stands in that in which the surface rises the most along v.
+    Where much of a chart's border is straight, as of boxes, most of it is parallel to the axes; otherwise the
+    rectangle of least area around the chart is. Without an up direction its long side lies along u and the heavier
+    half of the chart below; with one, of the four quarter turns the chart stands in that in which the surface rises
+    the most along v.
 
     Args:
         corner_uv: (m, 3, 2) the plane's point of every triangle corner, of any number of meshes.
@@ -54,9 +56,8 @@ def orient_charts(
 
 
 def border_directions(outlines: Outlines) -> list[FloatArray]:
-    """Return for each of k charts the directions in which most of its border is straight, see `straight_directions`."""
-    pairs = zip(outlines.start[:-1], outlines.start[1:], strict=True)
-    return [straight_directions(outlines.sides[start:stop]) for start, stop in pairs]
+    """Return the directions in which most of each chart's border is straight, see `straight_directions`."""
+    return [straight_directions(outlines.sides[start:stop]) for start, stop in pairwise(outlines.start)]
 
 
 def straight_angles(charts: Charts, outlines: Outlines, directions: list[FloatArray]) -> FloatArray:
@@ -94,8 +95,8 @@ def straight_angle(points: ComplexArray, directions: FloatArray) -> float:
 def square_angle(points: ComplexArray, directions: FloatArray) -> float:
     """Return the angle that turns the smallest square around points straight, a side along one of the directions.
 
-    If there are none, it is the smallest of all. Between two angles at which the points that touch its sides change, width and height are cosines, whose larger
-    is smallest at an end, or where they are equal.
+    If there are none, it is the smallest of all. Between two angles at which the points that touch its sides change,
+    width and height are cosines, whose larger is smallest at an end, or where they are equal.
     """
     hull = convex_hull(points)
     if len(directions):

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, FloatArray, IntArray, as_floats
+from .._arrays import FloatArray, IntArray, as_floats
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..text import shown
 from .charts import Charts, Outlines, read_charts
 from .orient import border_directions, square_angle, straight_angles
 from .place import Packing, pack
-from .straight import QUARTER
+from .straight import QUARTER, along_axes
 
 ROTATIONS = ("any", "quarter", "none")
 # Angles that a chart is tried at, for so many charts at most; more than that fill each other's gaps in quarter turns.
@@ -23,8 +23,6 @@ QUARTERS = 4
 # Shapes are made of every chart in every turn.
 MOST_TURNS = 16
 TILES_IN_A_ROW = 10
-# Angles that differ by less are the same but for rounding, radians.
-SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +72,8 @@ def pack_charts(
         margin: texels between charts and the border of the texture, at least; None for as many as `padding`.
         rotate: "any" turns charts so that they fill the texture best, but those straight whose border is, see
             `orient_charts`; "quarter" so that each lies straight, its long side along u or v; "none" leaves them as
-            they are. A whole number turns each by a multiple of that part of a full turn: 4 by quarter turns from how it
-            lies; those whose border is straight only so that it is along the axes, or as near to them as it can be.
+            they are. A whole number turns each by a multiple of that part of a full turn: 4 by quarter turns from how
+            it lies; those whose border is straight only so that it is along the axes, or as near to them as it can be.
             One chart alone is turned by "any" by at most an eighth of a turn, and by a number not at all.
         tiles: number of textures to distribute charts over. A chart is not cut, so the largest limits the scale.
 
@@ -95,7 +93,7 @@ def pack_charts(
     outlines = charts.outlines()
     alone = charts.count == 1
     as_given = rotate == "none" or isinstance(rotate, int) or (alone and rotate == "any")
-    directions = border_directions(outlines)
+    directions = [np.empty(0)] * charts.count if rotate == "none" else border_directions(outlines)
     straight = np.zeros(charts.count) if as_given else straight_angles(charts, outlines, directions)
     frame = density * np.exp(1j * straight)
     outlines = outlines.times(frame)
@@ -106,7 +104,7 @@ def pack_charts(
         area = float(np.abs(charts.sums(charts.areas) * density**2).sum())
         turns = _turns(charts.count, rotate)
         angles = np.tile(np.arange(turns) * (2 * np.pi / turns), (charts.count, 1))
-        allowed = _along_axes(directions, straight, angles)
+        allowed = along_axes(directions, straight, angles)
         gap = padding / resolution / room
         refine = np.full(charts.count, rotate == "any" and turns > QUARTERS) & allowed.all(axis=1)
         packing = pack(outlines, area, angles, allowed, gap, min(tiles, charts.count), refine)
@@ -157,23 +155,6 @@ def _turns(count: int, rotate: str | int) -> int:
     if rotate == "any":
         return next((turns for most, turns in TURNS if count <= most), QUARTERS)
     return QUARTERS if rotate == "quarter" else 1
-
-
-def _along_axes(directions: list[FloatArray], straight: FloatArray, angles: FloatArray) -> BoolArray:
-    """Return (k, t) which angles a chart may be turned by: where its border is straight, only those next to the axes.
-
-    Args:
-        directions: in which the border of each chart is straight.
-        straight: (k,) that charts are turned by before.
-        angles: (k, t) to choose from.
-    """
-    allowed = np.ones(angles.shape, dtype=bool)
-    for c, of_border in enumerate(directions):
-        if len(of_border):
-            turned = of_border + straight[c] + angles[c][:, None]
-            off = np.abs(turned - QUARTER * np.round(turned / QUARTER)).min(axis=1)
-            allowed[c] = off <= off.min() + SAME
-    return allowed
 
 
 def _alone(outlines: Outlines, directions: FloatArray, rotate: str | int) -> Packing:

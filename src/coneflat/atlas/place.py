@@ -17,17 +17,17 @@ from .strips import place_all
 GRIDS = (160, 400, 1000)
 # Cells of all strips together at most, and the columns that so many charts need at least.
 MOST_CELLS, COLUMNS_PER_CHART = 4_000_000, 8.0
-# Tries on each grid, and work that ends them earlier, in comparisons of runs of cells: about half a second.
-TRIES = (500, 120, 30)
-WORK = 20_000_000
+# Tries on each grid, and work that ends them earlier, in comparisons of runs of cells: about a second.
+TRIES = (1000, 240, 60)
+WORK = 40_000_000
 FILLS = 4  # but for so many charts that placing them all once is much of that
 # Of more charts than MANY, those whose sizes differ by less than this factor count as alike.
 MANY, ALIKE = 1000, 1.02
 # The first grid is so much wider than charts without gaps would need, and than the longest of them; no round numbers,
 # so that simple charts do not end where cells do and leave it to rounding which cell is the last.
 ROOMY, LONGER = 1.2347, 1.0123
-# How often, of all changes, charts change places, and keep to the right.
-SWAPS, ASIDE = 0.7, 0.3
+# How often, of all changes, charts change places; and, of so few charts, keep to the right. Of more, that does harm.
+SWAPS, ASIDE, FEW = 0.7, 0.3, 5
 # Cells of all strips together after which the charts, small as they are by then, are not made smaller.
 ROOM = 4 * MOST_CELLS
 
@@ -141,7 +141,16 @@ def pack(
         placed, best, width = _climb(strips, placed, reach, columns, tries, rng)
         if best is not None:
             packing = strips.packing(best, width)
-    return packing
+    return _cropped(packing, outlines)
+
+
+def _cropped(packing: Packing, outlines: Outlines) -> Packing:
+    """Return charts in tiles that end where charts do, and not where cells do."""
+    low, extent = turned_boxes(outlines, packing.angle[:, None])
+    low, high = low[:, 0] + packing.shift, low[:, 0] + extent[:, 0] + packing.shift
+    corner = complex(low.real.min(), low.imag.min())
+    side = max(high.real.max() - corner.real, high.imag.max() - corner.imag)
+    return Packing(min(side, packing.side), packing.angle, packing.shift - corner, packing.tile)
 
 
 def _first(
@@ -197,7 +206,9 @@ def _climb(
             placed = strips.fill(best.order, best.allowed, best.aside, reach, goal, _above(goal))
         if strips.work > end:
             break
-        changed = strips.fill(*_changed(placed, strips.may, rng), reach, goal, min(placed.height, _above(goal)))
+        changed = strips.fill(
+            *_changed(placed, strips.may, rng), reach, goal, min(placed.height, _above(goal))
+        )
         if changed.height <= placed.height:
             placed = changed
     if placed.height <= goal:
@@ -239,7 +250,7 @@ def _changed(
         share = (0.3, 0.6, 1.0)[int(3 * rng.random())]
         shapes = slice(chart * turns, (chart + 1) * turns)
         allowed[shapes] = may[shapes] & (rng.random(turns) < share)
-    if rng.random() < ASIDE:
+    if count <= FEW and rng.random() < ASIDE:
         for chart in (rng.random(1 + int(2 * rng.random())) * count).astype(np.int64):
             aside[chart] = (0.0, rng.random(), 1.0)[int(3 * rng.random())]
     return order, allowed, aside
