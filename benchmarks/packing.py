@@ -34,7 +34,6 @@ from coneflat.geometry.planar import signed_double_areas
 from coneflat.mesh import label_components
 
 RESOLUTION, PADDING, MARGIN = 1024, 2, 0.5
-NOT_TURNING = ("coneflat, not turned", "xatlas, none mirrored")
 Packer = Callable[[np.ndarray, np.ndarray], float]
 
 
@@ -72,18 +71,21 @@ def main() -> None:
 
 
 def all_packers(is_upright: bool) -> dict[str, Packer]:
-    """Return the packers, those that turn charts only if these need not stay upright."""
-    packers = {
-        "coneflat": ours("any"),
-        "coneflat, quarter turns": ours("quarter"),
-        "coneflat, not turned": ours("none"),
-    }
-    if find_spec("xatlas"):
-        packers |= {
-            "xatlas": xatlas(rotate_charts=True),
-            "xatlas, none mirrored": xatlas(rotate_charts=False),
+    """Return the packers; those alone that do not turn charts if these are to stay upright."""
+    if is_upright:
+        packers = {"coneflat, not turned": ours("none")}
+        others = {"xatlas, not turned": xatlas(rotate_charts=False, to_axis=False)}
+    else:
+        packers = {
+            "coneflat": ours("any"),
+            "coneflat, quarter turns": ours("quarter"),
+            "coneflat, not turned": ours("none"),
         }
-    return {name: pack for name, pack in packers.items() if not is_upright or name in NOT_TURNING}
+        others = {
+            "xatlas": xatlas(rotate_charts=True, to_axis=True),
+            "xatlas, none mirrored": xatlas(rotate_charts=False, to_axis=True),
+        }
+    return packers | others if find_spec("xatlas") else packers
 
 
 def row(name: str, charts: str, values: list[float] | np.ndarray) -> str:
@@ -133,14 +135,20 @@ def ours(rotate: str) -> Packer:
     return pack
 
 
-def xatlas(rotate_charts: bool) -> Packer:
-    """Every chart as a mesh with given UVs; twice, since the texture comes out larger than asked for."""
+def xatlas(rotate_charts: bool, to_axis: bool) -> Packer:
+    """Every chart as a mesh with given UVs; twice, since the texture comes out larger than asked for.
+
+    Args:
+        rotate_charts: whether u and v may be swapped.
+        to_axis: whether charts are first turned to lie straight.
+    """
 
     def pack(corner_uv: np.ndarray, chart: np.ndarray) -> float:
         import xatlas
 
         options = xatlas.PackOptions()
-        options.padding, options.resolution, options.rotate_charts = PADDING, RESOLUTION, rotate_charts
+        options.padding, options.resolution = PADDING, RESOLUTION
+        options.rotate_charts, options.rotate_charts_to_axis = rotate_charts, to_axis
         for _ in range(2):
             atlas = xatlas.Atlas()
             for c in range(chart.max() + 1):

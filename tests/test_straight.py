@@ -190,3 +190,16 @@ def arranged(corners, chart, quantum, up):
     component = np.zeros(chart.max() + 1, dtype=int)
     options = {"resolution": 512, "padding": 2, "tiles": 1}
     return arrange_charts(corners, chart, component, space, up=up, quantum=quantum, **options).corner_uv
+
+
+@pytest.mark.parametrize("turn", ANGLES[1:])
+def test_turned_and_renumbered_before_makes_no_difference(turn):
+    places = np.array([(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (0, 2)])
+    parts = [squares(places[: 4 + c], 3, 0.3 * c) * (1 + c % 3) for c in (1, 2, 3)]
+    chart = np.repeat(np.arange(3), [len(part) for part in parts])
+    corners = np.concatenate(parts)
+    packed = pack_charts(corners, chart)
+    order = np.random.default_rng(0).permutation(len(chart))
+    again = pack_charts(turned(corners, turn)[order][:, [1, 2, 0]] * 3 + 5, chart[order])
+    assert 3 * again.scale == pytest.approx(packed.scale, rel=1e-9)
+    np.testing.assert_allclose(again.corner_uv[:, [2, 0, 1]], packed.corner_uv[order], atol=1e-9)
