@@ -9,9 +9,9 @@ of the charts over that of the square. A chart alone that may not be turned, or 
 there all packers come out alike.
 
 Tried in `atlas/place.py` without gain (means over all models): of orders in which charts stand equally high, to
-take only those whose tops are lower, weighted by area or squared (1 to 20 pieces: within a point, up and down); to let charts
-keep to the right where there are more than five (up to 2 points less). Twice the tries give half a point to one, four
-times as many hardly more.
+take only those whose tops are lower, weighted by area or squared (1 to 20 pieces: within a point, up and down); to let
+charts keep to the right where there are more than five (up to 2 points less). Twice the tries give half a point to
+one, four times as many hardly more.
 """
 
 from __future__ import annotations
