@@ -2,9 +2,16 @@
 
 The charts are those of `flatten(charts="atlas")` of the models of `../shared/meshes`, cut along the borders between
 random faces' neighbourhoods into so many pieces, and scaled to the areas that they have in space. All packers leave two
-texels between them in a texture of 1024. xatlas is given these charts, too; it turns charts by swapping u and v, which
-mirrors them, unless that is forbidden, and stretches each to whole texels. Efficiency is the area of the charts over
-that of the square.
+texels between them in a texture of 1024, and half a texel at its border, as xatlas does. xatlas is given these charts,
+too; it turns charts by swapping u and v, which mirrors them, unless that is forbidden, and stretches each to whole
+texels. With `--up` charts stand upright: all packers are given them so, and none may turn them. Efficiency is the area
+of the charts over that of the square. A chart alone that may not be turned, or one as long as the square, bounds it:
+there all packers come out alike.
+
+Tried in `atlas/place.py` without gain (means over all models): of orders in which charts stand equally high, to
+take only those whose tops are lower, weighted by area or squared (1 to 20 pieces: within a point, up and down); to let
+charts keep to the right where there are more than five (up to 2 points less). Twice the tries give half a point to
+one, four times as many hardly more.
 """
 
 from __future__ import annotations
@@ -21,12 +28,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 import coneflat
-from coneflat.atlas import pack_charts
+from coneflat.atlas import orient_charts, pack_charts
 from coneflat.errors import ConeflatError
 from coneflat.geometry.planar import signed_double_areas
 from coneflat.mesh import label_components
 
-RESOLUTION, PADDING = 1024, 2
+RESOLUTION, PADDING, MARGIN = 1024, 2, 0.5
 Packer = Callable[[np.ndarray, np.ndarray], float]
 
 
@@ -34,17 +41,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--models", default="", help="of all, those whose names are given; with commas")
     parser.add_argument("--pieces", default="1,2,3,5,10", help="numbers of charts, at least; with commas")
+    parser.add_argument("--up", help="direction that is up in all models, as 0,1,0")
     arguments = parser.parse_args()
-    packers: dict[str, Packer] = {
-        "coneflat": ours("any"),
-        "coneflat, quarter turns": ours("quarter"),
-        "coneflat, not turned": ours("none"),
-    }
-    if find_spec("xatlas"):
-        packers |= {
-            "xatlas": xatlas(rotate_charts=True),
-            "xatlas, none mirrored": xatlas(rotate_charts=False),
-        }
+    up = [float(word) for word in arguments.up.split(",")] if arguments.up else None
+    packers = all_packers(is_upright=up is not None)
     pieces = [int(word) for word in arguments.pieces.split(",")]
     print("| model | charts | " + " | ".join(f"{name} | s" for name in packers) + " |")
     print("| --- " * (2 + 2 * len(packers)) + "|")
@@ -58,6 +58,8 @@ def main() -> None:
             continue
         for number in pieces:
             corner_uv, chart = cut(result, number)
+            if up is not None:
+                corner_uv = orient_charts(corner_uv, chart, corners=result.vertices[result.faces], up=up)
             values = []
             for pack in packers.values():
                 start = time.perf_counter()
@@ -66,6 +68,24 @@ def main() -> None:
             print(row(path.stem, str(chart.max() + 1), values), flush=True)
     for number, found in means.items():
         print(row(f"mean of {len(found)}", f"{number}+", np.mean(found, axis=0)))
+
+
+def all_packers(is_upright: bool) -> dict[str, Packer]:
+    """Return the packers; those alone that do not turn charts if these are to stay upright."""
+    if is_upright:
+        packers = {"coneflat, not turned": ours("none")}
+        others = {"xatlas, not turned": xatlas(rotate_charts=False, to_axis=False)}
+    else:
+        packers = {
+            "coneflat": ours("any"),
+            "coneflat, quarter turns": ours("quarter"),
+            "coneflat, not turned": ours("none"),
+        }
+        others = {
+            "xatlas": xatlas(rotate_charts=True, to_axis=True),
+            "xatlas, none mirrored": xatlas(rotate_charts=False, to_axis=True),
+        }
+    return packers | others if find_spec("xatlas") else packers
 
 
 def row(name: str, charts: str, values: list[float] | np.ndarray) -> str:
@@ -108,19 +128,27 @@ def neighbourhoods(corner_uv: np.ndarray, points: np.ndarray, chart: np.ndarray,
 
 def ours(rotate: str) -> Packer:
     def pack(corner_uv: np.ndarray, chart: np.ndarray) -> float:
-        return pack_charts(corner_uv, chart, resolution=RESOLUTION, padding=PADDING, rotate=rotate).efficiency
+        return pack_charts(
+            corner_uv, chart, resolution=RESOLUTION, padding=PADDING, margin=MARGIN, rotate=rotate
+        ).efficiency
 
     return pack
 
 
-def xatlas(rotate_charts: bool) -> Packer:
-    """Every chart as a mesh with given UVs; twice, since the texture comes out larger than asked for."""
+def xatlas(rotate_charts: bool, to_axis: bool) -> Packer:
+    """Every chart as a mesh with given UVs; twice, since the texture comes out larger than asked for.
+
+    Args:
+        rotate_charts: whether u and v may be swapped.
+        to_axis: whether charts are first turned to lie straight.
+    """
 
     def pack(corner_uv: np.ndarray, chart: np.ndarray) -> float:
         import xatlas
 
         options = xatlas.PackOptions()
-        options.padding, options.resolution, options.rotate_charts = PADDING, RESOLUTION, rotate_charts
+        options.padding, options.resolution = PADDING, RESOLUTION
+        options.rotate_charts, options.rotate_charts_to_axis = rotate_charts, to_axis
         for _ in range(2):
             atlas = xatlas.Atlas()
             for c in range(chart.max() + 1):

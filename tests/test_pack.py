@@ -12,6 +12,8 @@ from coneflat.atlas.charts import read_charts
 from coneflat.atlas.orient import square_angle, straight_angle
 from coneflat.errors import ArrayShapeError, NonFiniteError, OptionError
 
+NONE = np.empty(0)  # directions of a border that is not straight
+
 
 def cross(u, v):
     return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
@@ -168,6 +170,26 @@ def test_small_charts_go_into_holes():
     assert all(inside)
 
 
+def bars(*boxes):
+    """Triangles of rectangles, each given by its corners (left, bottom, right, top)."""
+    low = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=float)
+    return np.concatenate([low * [r - x, t - y] + [x, y] for x, y, r, t in boxes])
+
+
+def test_a_chart_that_must_keep_to_the_right():
+    """A foot that does not reach the left border, below a block that does: neither may lie lowest and leftmost."""
+    corners, chart = charts_of(bars((1, 0, 3, 1), (3, 0, 4, 4)), bars((0, 0, 2.98, 2.98)))
+    assert pack_charts(corners, chart, rotate="none", padding=0).efficiency > 0.9
+
+
+def test_the_longest_chart_ends_where_the_texture_does():
+    """Not where a cell of a grid ends: beside it there is room for the others."""
+    corners, chart = charts_of(bars((0, 0, np.pi, 0.3)), bars((0, 0, 0.4, 0.5)), star(5, 0.5, 0.3))
+    for rotate in ("quarter", "none"):
+        packed = pack_charts(corners, chart, rotate=rotate, padding=3)
+        assert packed.scale == pytest.approx((1 - 6 / 1024) / np.pi, rel=1e-12)
+
+
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_one_chart_fills_the_smallest_square(seed):
     corners = star(9, 0.3, 1.0, seed)
@@ -194,9 +216,9 @@ def test_a_square_on_its_corner_and_a_triangle_alone():
 def test_straight_charts(angle):
     rectangle = letter_l(1.0)[:2] * [3, 1]
     points = as_complex(rectangle).ravel() * np.exp(1j * angle)
-    turned = points * np.exp(1j * straight_angle(points))
+    turned = points * np.exp(1j * straight_angle(points, NONE))
     np.testing.assert_allclose([np.ptp(turned.real), np.ptp(turned.imag)], [3, 1], rtol=1e-12)
-    square = points * np.exp(1j * square_angle(points))
+    square = points * np.exp(1j * square_angle(points, NONE))
     assert max(np.ptp(square.real), np.ptp(square.imag)) == pytest.approx(4 / 2**0.5, rel=1e-12)
 
 
@@ -204,7 +226,7 @@ def test_straight_charts_have_the_least_rectangle():
     points = as_complex(star(8, 0.5, 1.0, 3)).ravel()
     turned = points * np.exp(1j * np.linspace(0, np.pi, 20001))[:, None]
     least = (np.ptp(turned.real, axis=1) * np.ptp(turned.imag, axis=1)).min()
-    straight = points * np.exp(1j * straight_angle(points))
+    straight = points * np.exp(1j * straight_angle(points, NONE))
     assert np.ptp(straight.real) * np.ptp(straight.imag) <= least * (1 + 1e-12)
     assert np.ptp(straight.real) >= np.ptp(straight.imag)
 

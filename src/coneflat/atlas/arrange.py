@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray
 from ..geometry.planar import signed_double_areas
 from .charts import Charts, read_charts
-from .orient import mean_rise, orient_charts, straight_angles
-from .pack import MOST_TURNS, Packed, pack_charts
+from .orient import border_directions, mean_rise, orient_charts, straight_angles
+from .pack import MOST_TURNS, QUARTERS, Packed, pack_charts
+from .straight import along_axes
 
 # Of a turn: by how much a multiple of a quantum may miss it.
 WHOLE = 1e-9
@@ -61,26 +62,33 @@ def whole_turns(quantum: float) -> int:
 def _turned_together(
     charts: Charts, component: IntArray, turns: int, space: FloatArray, up: tuple[float, float, float] | None
 ) -> FloatArray:
-    """Return (m, 3, 2) the charts, the largest of each component straight, and the others turned as far as it.
+    """Return (m, 3, 2) the charts, one of each component straight, and the others turned as far as it.
 
-    With an up direction each chart is then turned by that number of equal turns which brings it up best.
+    It is the largest of those whose border is straight, or of all. With an up direction each chart is then turned by
+    that number of equal turns which brings it up best; where its border is straight, along the axes.
     """
-    angles, areas = straight_angles(charts, charts.outlines()), np.abs(charts.sums(charts.areas))
-    order = np.lexsort((-areas, component))
+    outlines = charts.outlines()
+    directions = border_directions(outlines)
+    angles, areas = straight_angles(charts, outlines, directions), np.abs(charts.sums(charts.areas))
+    is_free = np.array([not len(of_border) for of_border in directions])
+    order = np.lexsort((-areas, is_free, component))
     _, first = np.unique(component[order], return_index=True)
     largest = order[first][np.unique(component, return_inverse=True)[1]]
     if up is not None:
         rise = mean_rise(charts, space, up)
-        angles += _nearest(rise * np.exp(1j * angles), 4)
+        angles += _best_turn(rise * np.exp(1j * angles), np.ones((charts.count, QUARTERS), dtype=bool))
         angles = angles[largest]
-        return charts.moved(np.exp(1j * (angles + _nearest(rise * np.exp(1j * angles), turns))))
+        choices = np.tile(2 * np.pi / turns * np.arange(turns), (charts.count, 1))
+        angles = angles + _best_turn(rise * np.exp(1j * angles), along_axes(directions, angles, choices))
+        return charts.moved(np.exp(1j * angles))
     return charts.moved(np.exp(1j * angles[largest]))
 
 
-def _nearest(rise: NDArray[np.complex128], turns: int) -> FloatArray:
-    """Return (k,) the multiple of a part of a turn that brings each direction next to v."""
-    step = 2 * np.pi / turns
-    angles: FloatArray = step * np.round((np.pi / 2 - np.angle(rise)) / step)
+def _best_turn(rise: NDArray[np.complex128], allowed: BoolArray) -> FloatArray:
+    """Return (k,) which of t equal parts of a turn, of those allowed, brings each direction next to v, as an angle."""
+    turns = 2 * np.pi / allowed.shape[1] * np.arange(allowed.shape[1])
+    height = np.where(allowed, (rise[:, None] * np.exp(1j * turns)).imag, -np.inf)
+    angles: FloatArray = turns[height.argmax(axis=1)]
     return angles
 
 

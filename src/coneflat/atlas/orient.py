@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,12 +12,12 @@ from .._arrays import FloatArray, IntArray
 from ..compiled import compiled
 from ..errors import OptionError
 from .charts import Charts, Outlines, read_charts
+from .straight import QUARTER, straight_directions
 
 if TYPE_CHECKING:
     ComplexArray = NDArray[np.complex128]
 
 
-QUARTER = np.pi / 2
 # Areas that differ by so little, relatively, are the same but for rounding.
 SAME = 1e-9
 
@@ -30,9 +31,10 @@ def orient_charts(
 ) -> FloatArray:
     """Return (m, 3, 2) charts that lie straight, each turned about the origin and otherwise as it was.
 
-    The rectangle of least area around a chart is parallel to the axes. Without an up direction its long side
-    lies along u and the heavier half of the chart below; with one, of the four quarter turns the chart stands in that
-    in which the surface rises the most along v.
+    Where much of a chart's border is straight, as of boxes, most of it is parallel to the axes; otherwise the
+    rectangle of least area around the chart is. Without an up direction its long side lies along u and the heavier
+    half of the chart below; with one, of the four quarter turns the chart stands in that in which the surface rises
+    the most along v.
 
     Args:
         corner_uv: (m, 3, 2) the plane's point of every triangle corner, of any number of meshes.
@@ -45,16 +47,27 @@ def orient_charts(
         OptionError: a chart is mirrored, or `up` is no direction, or is given without `corners`.
     """
     charts = read_charts(corner_uv, chart_of_triangle)
-    angles = straight_angles(charts, charts.outlines())
+    outlines = charts.outlines()
+    angles = straight_angles(charts, outlines, border_directions(outlines))
     if up is not None:
         rise = mean_rise(charts, corners, up) * np.exp(1j * angles)
         angles += QUARTER * np.round((QUARTER - np.angle(rise)) / QUARTER)
     return charts.moved(np.exp(1j * angles))
 
 
-def straight_angles(charts: Charts, outlines: Outlines) -> FloatArray:
-    """Return (k,) the angle that lays each chart straight, its heavier half below."""
-    angles = np.array([straight_angle(outlines.points(c)) for c in range(charts.count)])
+def border_directions(outlines: Outlines) -> list[FloatArray]:
+    """Return the directions in which most of each chart's border is straight, see `straight_directions`."""
+    return [straight_directions(outlines.sides[start:stop]) for start, stop in pairwise(outlines.start)]
+
+
+def straight_angles(charts: Charts, outlines: Outlines, directions: list[FloatArray]) -> FloatArray:
+    """Return (k,) the angle that lays each chart straight, its heavier half below.
+
+    Args:
+        charts, outlines: k of them.
+        directions: those of their borders.
+    """
+    angles = np.array([straight_angle(outlines.points(c), directions[c]) for c in range(charts.count)])
     turned = outlines.times(np.exp(1j * angles)).sides.imag.ravel()
     start = 2 * outlines.start[:-1]
     middle = (np.minimum.reduceat(turned, start) + np.maximum.reduceat(turned, start)) / 2
@@ -63,13 +76,15 @@ def straight_angles(charts: Charts, outlines: Outlines) -> FloatArray:
     return angles + np.where(top_heavy, np.pi, 0.0)
 
 
-def straight_angle(points: ComplexArray) -> float:
+def straight_angle(points: ComplexArray, directions: FloatArray) -> float:
     """Return the angle that turns the rectangle of least area around points straight, its long side along u.
 
-    One side of it lies along a side of the convex hull (Freeman and Shapira 1975).
+    One side of it lies along one of the directions; if there are none, along a side of the convex hull, as that of
+    the least of all does (Freeman and Shapira 1975).
     """
     hull = convex_hull(points)
-    directions = np.angle(np.roll(hull, -1) - hull)
+    if not len(directions):
+        directions = np.angle(np.roll(hull, -1) - hull)
     width, height = _extents(hull, directions)
     area, longer = width * height, np.maximum(width, height)
     # Of rectangles of equal area, as around many quadrilaterals, the longest.
@@ -77,13 +92,16 @@ def straight_angle(points: ComplexArray) -> float:
     return float(-directions[best] + (QUARTER if height[best] > width[best] else 0.0))
 
 
-def square_angle(points: ComplexArray) -> float:
-    """Return the angle that turns the smallest square around points straight.
+def square_angle(points: ComplexArray, directions: FloatArray) -> float:
+    """Return the angle that turns the smallest square around points straight, a side along one of the directions.
 
-    Between two angles at which the points that touch its sides change, width and height are cosines, whose larger
-    is smallest at an end, or where they are equal.
+    If there are none, it is the smallest of all. Between two angles at which the points that touch its sides change,
+    width and height are cosines, whose larger is smallest at an end, or where they are equal.
     """
     hull = convex_hull(points)
+    if len(directions):
+        width, height = _extents(hull, directions)
+        return float(-directions[np.maximum(width, height).argmin()])
     ends = np.unique(np.mod(np.angle(np.roll(hull, -1) - hull), QUARTER))
     middle = (ends + np.append(ends[1:], ends[0] + QUARTER)) / 2
     across, along = _spans(hull, middle), _spans(hull, middle + QUARTER)

@@ -12,8 +12,9 @@ from .._arrays import FloatArray, IntArray, as_floats
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..text import shown
 from .charts import Charts, Outlines, read_charts
-from .orient import square_angle, straight_angles
+from .orient import border_directions, square_angle, straight_angles
 from .place import Packing, pack
+from .straight import QUARTER, along_axes
 
 ROTATIONS = ("any", "quarter", "none")
 # Angles that a chart is tried at, for so many charts at most; more than that fill each other's gaps in quarter turns.
@@ -69,10 +70,11 @@ def pack_charts(
         resolution: texels along a side of the texture.
         padding: texels between charts, at least.
         margin: texels between charts and the border of the texture, at least; None for as many as `padding`.
-        rotate: "any" turns charts so that they fill the texture best, "quarter" so that each lies straight, its
-            long side along u or v, "none" leaves them as they are, see `orient_charts`. A whole number turns each
-            by a multiple of that part of a full turn: 4 by quarter turns from how it lies. One chart alone is
-            turned by "any" by at most an eighth of a turn, and by a number not at all.
+        rotate: "any" turns charts so that they fill the texture best, but those straight whose border is, see
+            `orient_charts`; "quarter" so that each lies straight, its long side along u or v; "none" leaves them as
+            they are. A whole number turns each by a multiple of that part of a full turn: 4 by quarter turns from how
+            it lies; those whose border is straight only so that it is along the axes, or as near to them as it can be.
+            One chart alone is turned by "any" by at most an eighth of a turn, and by a number not at all.
         tiles: number of textures to distribute charts over. A chart is not cut, so the largest limits the scale.
 
     Raises:
@@ -91,18 +93,21 @@ def pack_charts(
     outlines = charts.outlines()
     alone = charts.count == 1
     as_given = rotate == "none" or isinstance(rotate, int) or (alone and rotate == "any")
-    frame = density * (1.0 if as_given else np.exp(1j * straight_angles(charts, outlines)))
+    directions = [np.empty(0)] * charts.count if rotate == "none" else border_directions(outlines)
+    straight = np.zeros(charts.count) if as_given else straight_angles(charts, outlines, directions)
+    frame = density * np.exp(1j * straight)
     outlines = outlines.times(frame)
     room = 1.0 - 2.0 * margin / resolution
     if alone:
-        packing = _alone(outlines, rotate)
+        packing = _alone(outlines, directions[0], rotate)
     else:
         area = float(np.abs(charts.sums(charts.areas) * density**2).sum())
         turns = _turns(charts.count, rotate)
         angles = np.tile(np.arange(turns) * (2 * np.pi / turns), (charts.count, 1))
+        allowed = along_axes(directions, straight, angles)
         gap = padding / resolution / room
-        refine = rotate == "any" and turns > QUARTERS
-        packing = pack(outlines, area, angles, gap, min(tiles, charts.count), refine)
+        refine = np.full(charts.count, rotate == "any" and turns > QUARTERS) & allowed.all(axis=1)
+        packing = pack(outlines, area, angles, allowed, gap, min(tiles, charts.count), refine)
 
     scale = room / (packing.side or 1.0)
     factors = scale * frame * np.exp(1j * packing.angle)
@@ -152,10 +157,10 @@ def _turns(count: int, rotate: str | int) -> int:
     return QUARTERS if rotate == "quarter" else 1
 
 
-def _alone(outlines: Outlines, rotate: str | int) -> Packing:
+def _alone(outlines: Outlines, directions: FloatArray, rotate: str | int) -> Packing:
     """Return one chart in the middle of the smallest square around it, turned no more than it must be for that."""
-    angle = square_angle(outlines.points(0)) if rotate == "any" else 0.0
-    angle -= math.pi / 2 * round(angle / (math.pi / 2))
+    angle = square_angle(outlines.points(0), directions) if rotate == "any" else 0.0
+    angle -= QUARTER * round(angle / QUARTER)
     points = outlines.points(0) * np.exp(1j * angle)
     low, high = (complex(pick(points.real), pick(points.imag)) for pick in (np.min, np.max))
     side = max((high - low).real, (high - low).imag)

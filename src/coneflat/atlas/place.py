@@ -8,24 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import BoolArray, FloatArray, IntArray
-from ..compiled import compiled
 from ..errors import OptionError
 from .charts import Outlines
 from .masks import Masks, cover_charts, turned_boxes
+from .strips import place_all
 
 # Columns of the grids, from coarse to fine: the coarse one finds who goes where, the fine one closes the gaps.
 GRIDS = (160, 400, 1000)
 # Cells of all strips together at most, and the columns that so many charts need at least.
 MOST_CELLS, COLUMNS_PER_CHART = 4_000_000, 8.0
-# Tries on each grid, and work that ends them earlier, in comparisons of runs of cells: about half a second.
-TRIES = (500, 120, 30)
-WORK = 20_000_000
+# Tries on each grid, and work that ends them earlier, in comparisons of runs of cells: about a second.
+TRIES = (1000, 240, 60)
+WORK = 40_000_000
 FILLS = 4  # but for so many charts that placing them all once is much of that
 # Of more charts than MANY, those whose sizes differ by less than this factor count as alike.
 MANY, ALIKE = 1000, 1.02
 # The first grid is so much wider than charts without gaps would need, and than the longest of them; no round numbers,
 # so that simple charts do not end where cells do and leave it to rounding which cell is the last.
 ROOMY, LONGER = 1.2347, 1.0123
+# How often, of all changes, charts change places; and, of so few charts, keep to the right. Of more, that does harm.
+SWAPS, ASIDE, FEW = 0.7, 0.3, 5
 # Cells of all strips together after which the charts, small as they are by then, are not made smaller.
 ROOM = 4 * MOST_CELLS
 
@@ -53,6 +55,7 @@ class _Placed:
 
     order: IntArray
     allowed: BoolArray
+    aside: FloatArray
     height: int
     work: int
     chosen: IntArray
@@ -60,24 +63,26 @@ class _Placed:
 
 
 class _Strips:
-    """Charts on a grid, to be placed in strips; counts its work."""
+    """Charts on a grid, to be placed in strips, as the shapes that they may be; counts its work."""
 
-    def __init__(self, masks: Masks, tiles: int) -> None:
-        self.masks, self.tiles, self.work = masks, tiles, 0
+    def __init__(self, masks: Masks, may: BoolArray, tiles: int) -> None:
+        self.masks, self.may, self.tiles, self.work = masks, may, tiles, 0
         self.group = np.arange(len(masks.size) // masks.turns)
         if len(self.group) > MANY:
             _, self.group = np.unique(np.log(masks.cells) // np.log(ALIKE), return_inverse=True)
 
-    def fill(self, order: IntArray, allowed: BoolArray, reach: IntArray, width: int, limit: int) -> _Placed:
+    def fill(
+        self, order: IntArray, allowed: BoolArray, aside: FloatArray, reach: IntArray, width: int, limit: int
+    ) -> _Placed:
         """Return charts placed in strips so wide; higher than the limit if not all found a place below it."""
         masks = self.masks
         chosen, place = np.empty(len(order), dtype=np.int64), np.empty((len(order), 3), dtype=np.int64)
         height, work = place_all(
-            order, self.group, masks.turns, allowed, masks.size, masks.runs, masks.first, masks.widest,
-            reach, self.tiles, width, limit, chosen, place,
+            order, self.group, masks.turns, allowed, aside, masks.size, masks.runs, masks.first,
+            masks.widest, reach, self.tiles, width, limit, chosen, place,
         )  # fmt: skip
         self.work += work
-        return _Placed(order, allowed, height, work, chosen, place)
+        return _Placed(order, allowed, aside, height, work, chosen, place)
 
     def packing(self, placed: _Placed, width: int) -> Packing:
         """Return the packing in strips as high as wide."""
@@ -87,7 +92,13 @@ class _Strips:
 
 
 def pack(
-    outlines: Outlines, area: float, angles: FloatArray, gap: float, tiles: int = 1, refine: bool = True
+    outlines: Outlines,
+    area: float,
+    angles: FloatArray,
+    allowed: BoolArray,
+    gap: float,
+    tiles: int,
+    refine: BoolArray,
 ) -> Packing:
     """Return a tight packing of charts, none mirrored or scaled, in square tiles.
 
@@ -99,10 +110,11 @@ def pack(
     Args:
         outlines: of k charts.
         area: of all charts, about.
-        angles: (k, t) radians, that charts may be turned by.
+        angles: (k, t) radians, that charts are turned by.
+        allowed: (k, t) which of these angles a chart may be turned by, one at least.
         gap: between charts, in units of the side of a tile, without its margins.
         tiles: number of tiles.
-        refine: whether angles between the given ones may be taken.
+        refine: (k,) whether a chart may be turned by angles between the given ones.
 
     Raises:
         OptionError: the gap is too wide for so many charts.
@@ -110,7 +122,7 @@ def pack(
     rng = np.random.default_rng(0)
     most = int((MOST_CELLS / tiles) ** 0.5)
     coarse = min(max(GRIDS[0], int(COLUMNS_PER_CHART * (len(outlines) / tiles) ** 0.5)), most)
-    strips, width, placed = _first(outlines, area, angles, gap, tiles, coarse)
+    strips, width, placed = _first(outlines, area, angles, allowed, gap, tiles, coarse)
     placed, best, width = _climb(strips, placed, _reach(gap * width), width, TRIES[0], rng)
     packing = strips.packing(best or placed, width)
     step = np.pi / angles.shape[1]
@@ -119,31 +131,47 @@ def pack(
         if columns < 1.5 * coarse:
             continue
         coarse = columns
-        angles = packing.angle[:, None]
-        if refine:
-            step /= 2
-            angles = angles + np.array([0.0, -step, step])
-        strips = _Strips(cover_charts(outlines, angles, packing.side / columns), tiles)
-        reach, allowed = _reach(gap * columns), np.ones(angles.size, dtype=bool)
-        placed = strips.fill(placed.order, allowed, reach, columns, _above(columns))
+        step /= 2
+        offsets = np.array([0.0, -step, step]) if refine.any() else np.zeros(1)
+        angles = packing.angle[:, None] + offsets
+        may = (refine[:, None] | (offsets == 0)).ravel()
+        strips = _Strips(cover_charts(outlines, angles, packing.side / columns), may, tiles)
+        reach = _reach(gap * columns)
+        placed = strips.fill(placed.order, may, placed.aside, reach, columns, _above(columns))
         placed, best, width = _climb(strips, placed, reach, columns, tries, rng)
         if best is not None:
             packing = strips.packing(best, width)
-    return packing
+    return _cropped(packing, outlines)
+
+
+def _cropped(packing: Packing, outlines: Outlines) -> Packing:
+    """Return charts in tiles that end where charts do, and not where cells do."""
+    low, extent = turned_boxes(outlines, packing.angle[:, None])
+    low, high = low[:, 0] + packing.shift, low[:, 0] + extent[:, 0] + packing.shift
+    corner = complex(low.real.min(), low.imag.min())
+    side = max(high.real.max() - corner.real, high.imag.max() - corner.imag)
+    return Packing(min(side, packing.side), packing.angle, packing.shift - corner, packing.tile)
 
 
 def _first(
-    outlines: Outlines, area: float, angles: FloatArray, gap: float, tiles: int, columns: int
+    outlines: Outlines,
+    area: float,
+    angles: FloatArray,
+    allowed: BoolArray,
+    gap: float,
+    tiles: int,
+    columns: int,
 ) -> tuple[_Strips, int, _Placed]:
     """Return strips of cells, about so many columns, in which charts stand no higher than wide; the width, and how."""
     _, extent = turned_boxes(outlines, angles)
+    extent = np.where(allowed, extent, complex(np.inf, np.inf))
     longest = float(np.maximum(extent.real, extent.imag).min(axis=1).max())
     side = max(ROOMY * (area / tiles) ** 0.5, LONGER * longest)
-    strips = _Strips(cover_charts(outlines, angles, (side or 1.0) / columns), tiles)
+    strips = _Strips(cover_charts(outlines, angles, (side or 1.0) / columns), allowed.ravel(), tiles)
     order = np.argsort(-(extent.real + extent.imag).min(axis=1), kind="stable")
-    allowed, width = np.ones(angles.size, dtype=bool), columns
+    width = columns
     while tiles * width**2 <= ROOM:
-        placed = strips.fill(order, allowed, _reach(gap * width), width, width)
+        placed = strips.fill(order, strips.may, np.zeros(len(order)), _reach(gap * width), width, width)
         if placed.height <= width:
             return strips, width, placed
         width += width // 12 + 1
@@ -175,11 +203,12 @@ def _climb(
         if placed.height <= goal:
             best, width = _narrow(strips, placed, reach, goal, end)
             goal = width - 1
-            placed = strips.fill(best.order, best.allowed, reach, goal, _above(goal))
+            placed = strips.fill(best.order, best.allowed, best.aside, reach, goal, _above(goal))
         if strips.work > end:
             break
-        order, allowed = _changed(placed, strips.masks.turns, rng)
-        changed = strips.fill(order, allowed, reach, goal, min(placed.height, _above(goal)))
+        changed = strips.fill(
+            *_changed(placed, strips.may, rng), reach, goal, min(placed.height, _above(goal))
+        )
         if changed.height <= placed.height:
             placed = changed
     if placed.height <= goal:
@@ -195,7 +224,7 @@ def _narrow(strips: _Strips, placed: _Placed, reach: IntArray, width: int, end: 
     step = max(width // 64 + 1, (width - placed.height) // 2)
     while step and strips.work < end:
         step = min(step, width - 1)
-        narrower = strips.fill(placed.order, placed.allowed, reach, width - step, width - step)
+        narrower = strips.fill(placed.order, placed.allowed, placed.aside, reach, width - step, width - step)
         if narrower.height <= width - step:
             width, placed = width - step, narrower
             step = max(step, (width - placed.height) // 2)
@@ -204,17 +233,27 @@ def _narrow(strips: _Strips, placed: _Placed, reach: IntArray, width: int, end: 
     return placed, width
 
 
-def _changed(placed: _Placed, turns: int, rng: np.random.Generator) -> tuple[IntArray, BoolArray]:
-    """Return another order, one or two pairs of charts having changed places, and other shapes for one or two."""
-    order, allowed = placed.order.copy(), placed.allowed.copy()
+def _changed(
+    placed: _Placed, may: BoolArray, rng: np.random.Generator
+) -> tuple[IntArray, BoolArray, FloatArray]:
+    """Return another order, one or two pairs of charts having changed places, and other shapes for one or two.
+
+    Or one or two keep to the right, by another part of the room there is.
+    """
+    order, allowed, aside = placed.order.copy(), placed.allowed.copy(), placed.aside.copy()
     count = len(order)
-    if rng.random() < 0.7:
+    turns = len(may) // count
+    if rng.random() < SWAPS:
         for one, two in (rng.random((1 + int(2 * rng.random()), 2)) * count).astype(np.int64):
             order[[one, two]] = order[[two, one]]
     for chart in (rng.random(1 + int(2 * rng.random())) * count).astype(np.int64):
         share = (0.3, 0.6, 1.0)[int(3 * rng.random())]
-        allowed[chart * turns : (chart + 1) * turns] = rng.random(turns) < share
-    return order, allowed
+        shapes = slice(chart * turns, (chart + 1) * turns)
+        allowed[shapes] = may[shapes] & (rng.random(turns) < share)
+    if count <= FEW and rng.random() < ASIDE:
+        for chart in (rng.random(1 + int(2 * rng.random())) * count).astype(np.int64):
+            aside[chart] = (0.0, rng.random(), 1.0)[int(3 * rng.random())]
+    return order, allowed, aside
 
 
 def _above(width: int) -> int:
@@ -230,170 +269,3 @@ def _reach(gap: float) -> IntArray:
     rows = np.arange(int(np.ceil(gap)) + 1)
     across = np.sqrt(np.maximum(gap**2 - np.maximum(rows - 1, 0) ** 2, 0.0))
     return np.ceil(across).astype(np.int64)
-
-
-# Cells that are cleared in the time of a comparison.
-CELLS_PER_WORK = 50
-
-
-@compiled
-def place_all(
-    order: IntArray,
-    group: IntArray,
-    turns: int,
-    allowed: BoolArray,
-    size: IntArray,
-    runs: IntArray,
-    first: IntArray,
-    widest: IntArray,
-    reach: IntArray,
-    strips: int,
-    width: int,
-    limit: int,
-    chosen: IntArray,
-    place: IntArray,
-) -> tuple[int, int]:
-    """Fill strips of cells from below: each chart goes where its top is lowest, and leftmost there.
-
-    Args:
-        order: (k,) charts in the order in which they are placed.
-        group: (k,) charts of a group are so much alike that none is tried below where the one before was placed.
-        turns: how many shapes a chart has: its cells at so many angles, those of chart 0 first.
-        allowed: (j,) which shapes may be used.
-        size: (j, 2) columns and rows of each shape.
-        runs, first: the cells of each shape, see `masks.cover`.
-        widest: (j,) the longest run of each shape.
-        reach: (d,) a cell is too near to another chart's if they are less than d rows apart, and `reach` of the
-            number of rows or fewer columns.
-        strips, width, limit: number of strips, their columns, and the rows that may be used.
-        chosen: (k,) filled: the shape of each chart.
-        place: (k, 3) filled: its strip, and the column and row of its lower left cell.
-
-    Returns:
-        The rows used, limit + 1 if a chart has no place; and the work done, in comparisons of runs of cells.
-    """
-    # For each cell the next taken one, itself included, and the last of the taken ones in a row from there.
-    taken = np.full((strips, limit, width), width, dtype=np.int16)
-    last = np.empty((strips, limit, width), dtype=np.int16)
-    longest_gap = np.full((strips, limit), width, dtype=np.int64)
-    floor = np.zeros((strips, group.max() + 1), dtype=np.int64)
-    top, work = 0, strips * limit * width // CELLS_PER_WORK
-    for c in order:
-        best, shape, strip, column, row = limit + 1, -1, 0, 0, 0
-        for j in range(c * turns, (c + 1) * turns):
-            if not allowed[j] or size[j, 0] > width:
-                continue
-            for s in range(strips):
-                x, y, steps = _lowest(
-                    taken[s], last[s], longest_gap[s], runs[first[j] : first[j + 1]], widest[j] - first[j],
-                    width - size[j, 0], floor[s, group[c]], best - size[j, 1],
-                )  # fmt: skip
-                work += steps
-                if y >= 0:
-                    best, shape, strip, column, row = y + size[j, 1], j, s, x, y
-        if shape < 0:
-            return limit + 1, work
-        chosen[c] = shape
-        floor[strip, group[c]] = row
-        place[c, 0], place[c, 1], place[c, 2] = strip, column, row
-        top = max(top, best)
-        work += _take(
-            taken[strip],
-            last[strip],
-            longest_gap[strip],
-            runs[first[shape] : first[shape + 1]],
-            column,
-            row,
-            reach,
-        )
-    return top, work
-
-
-@compiled
-def _lowest(
-    taken: IntArray,
-    last: IntArray,
-    longest_gap: IntArray,
-    runs: IntArray,
-    widest: int,
-    right: int,
-    low: int,
-    above: int,
-) -> tuple[int, int, int]:
-    """Return the lowest place where a shape fits, and the work.
-
-    The row is from `low` to below `above`, -1 if there is none, the column at most `right`.
-    """
-    count, work = len(runs), 0
-    need = runs[widest, 2] - runs[widest, 1] + 1
-    probe = widest
-    for y in range(low, above):
-        work += 1
-        if longest_gap[y + runs[widest, 0]] < need:
-            continue
-        x, free, k = 0, 0, probe
-        while x <= right and free < count:
-            work += 1
-            row = y + runs[k, 0]
-            hit = taken[row, x + runs[k, 1]]
-            if hit <= x + runs[k, 2]:
-                # Every place up to where this run has passed what it hit is out. Look here first in the next row, too.
-                x = last[row, hit] + 1 - runs[k, 1]
-                free, probe = 0, k
-            else:
-                free += 1
-                k = k + 1 if k + 1 < count else 0
-        if x <= right:
-            return x, y, work
-    return 0, -1, work
-
-
-@compiled
-def _take(
-    taken: IntArray, last: IntArray, longest_gap: IntArray, runs: IntArray, x: int, y: int, reach: IntArray
-) -> int:
-    """Take the cells of a shape and those too near to it, and return the work."""
-    rows, width = taken.shape
-    far = len(reach) - 1
-    near = np.zeros(width, dtype=np.bool_)
-    work = 0
-    begin = 0  # the first run that reaches the row
-    for row in range(max(y + runs[0, 0] - far, 0), min(y + runs[-1, 0] + far, rows - 1) + 1):
-        while begin < len(runs) and y + runs[begin, 0] < row - far:
-            begin += 1
-        left, right, k = width, -1, begin
-        while k < len(runs) and y + runs[k, 0] <= row + far:
-            out = reach[abs(row - y - runs[k, 0])]
-            start, stop = max(x + runs[k, 1] - out, 0), min(x + runs[k, 2] + out, width - 1)
-            near[start : stop + 1] = True
-            left, right = min(left, start), max(right, stop)
-            work += 1 + (stop - start) // CELLS_PER_WORK
-            k += 1
-        if right < 0:
-            continue
-        _take_in_row(taken[row], last[row], near, left, right)
-        near[left : right + 1] = False
-        column, longest = 0, 0
-        while column < width:
-            longest = max(longest, taken[row, column] - column)
-            column = last[row, taken[row, column]] + 1 if taken[row, column] < width else width
-        longest_gap[row] = longest
-    return work
-
-
-@compiled
-def _take_in_row(taken: IntArray, last: IntArray, near: BoolArray, left: int, right: int) -> None:
-    """Take the near cells of a row, which lie from `left` to `right`, both near themselves."""
-    following = taken[right + 1] if right + 1 < len(taken) else len(taken)
-    end = last[following] if following == right + 1 and right + 1 < len(taken) else right
-    column = right
-    while column >= 0:
-        if taken[column] == column or (column >= left and near[column]):
-            if following != column + 1:
-                if column < left:
-                    return
-                end = column
-            following = column
-            last[column] = end
-        taken[column] = following
-        column -= 1
