@@ -2,7 +2,8 @@
 
 Every model of `../shared/meshes` that is a manifold, and a bumpy sphere, by coneflat with its default cones and with
 more of them, and by what can be installed with pip: xatlas and uvunwrap with their defaults. All are measured by
-`coneflat.measure` on the UV points that come out; the seam length is over the square root of the area.
+`coneflat.measure` on the UV points that come out; the seam length is over the square root of the area. With `--matched`
+areas vary as little in ours as in theirs: `stretch` is turned, with the fewest cones that get there.
 """
 
 from __future__ import annotations
@@ -20,12 +21,19 @@ from coneflat.errors import ConeflatError
 from coneflat.mesh import TriangleMesh
 from coneflat.quality.distortion import Distortion
 
+# Area distortions allowed, one after the other, and halvings of the interval in which the stretch is sought.
+ALLOWED = (0.2, 0.14, 0.1, 0.07, 0.05, 0.035, 0.025)
+ROUNDS = 4
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--models", default="", help="of all, those whose names are given; with commas")
     parser.add_argument("--more", type=float, default=0.05, help="distortion allowed with more cones")
     parser.add_argument("--largest", type=int, default=120_000, help="triangles")
+    parser.add_argument(
+        "--matched", action="store_true", help="ours at the area distortion of each other one"
+    )
     arguments = parser.parse_args()
     print(
         "| model | triangles | method | charts | seam length | QC | area std | flipped | overlaps | packed | s |"
@@ -34,7 +42,9 @@ def main() -> None:
     flatten(*shapes.sphere(2), charts="atlas")
     sums: dict[str, list[tuple[float, ...]]] = {}
     for name, mesh in models([word for word in arguments.models.split(",") if word], arguments.largest):
-        for method, result, seconds in flattened(mesh, arguments.more):
+        for method, result, seconds in (
+            matched(mesh) if arguments.matched else flattened(mesh, arguments.more)
+        ):
             found, packed = result.distortion, result.packing_efficiency
             sums.setdefault(method, []).append(
                 (found.charts, found.seam_length, found.qc_mean, found.area_std, packed)
@@ -79,6 +89,38 @@ def flattened(mesh: TriangleMesh, more: float) -> Iterator[tuple[str, Flattening
         if name in installed_peers():
             theirs = run_peer(name, ours)
             yield name, theirs.flattening, theirs.seconds
+
+
+def matched(mesh: TriangleMesh) -> Iterator[tuple[str, Flattening, float]]:
+    """Yield what others make of a mesh, and ours at the same area distortion."""
+    default = flatten(mesh.vertices, mesh.faces, charts="atlas")
+    for name in ("xatlas", "uvunwrap"):
+        if name not in installed_peers():
+            continue
+        theirs = run_peer(name, default)
+        yield name, theirs.flattening, theirs.seconds
+        start = time.perf_counter()
+        ours = at_area_std(mesh, theirs.flattening.distortion.area_std)
+        if ours is not None:
+            yield f"coneflat as {name}, {len(ours.cones)} cones", ours, time.perf_counter() - start
+
+
+def at_area_std(mesh: TriangleMesh, std: float) -> Flattening | None:
+    """Return a flattening whose areas vary by at most so much: the fewest cones, and the least stretch with them."""
+    for allowed in ALLOWED:
+        found = flatten(mesh.vertices, mesh.faces, distortion=allowed, stretch=1.0)
+        if found.distortion.area_std > std:
+            continue
+        low, high = 0.0, 1.0
+        for _ in range(ROUNDS):
+            middle = (low + high) / 2
+            tried = flatten(mesh.vertices, mesh.faces, distortion=allowed, stretch=middle)
+            if tried.distortion.area_std <= std:
+                found, high = tried, middle
+            else:
+                low = middle
+        return found
+    return None
 
 
 if __name__ == "__main__":
