@@ -87,8 +87,7 @@ def flattened(mesh: TriangleMesh, more: float) -> Iterator[tuple[str, Flattening
         yield method, ours, time.perf_counter() - start
     for name in ("xatlas", "uvunwrap"):
         if name in installed_peers():
-            theirs = run_peer(name, ours)
-            yield name, theirs.flattening, theirs.seconds
+            yield name, *run_peer(name, ours)
 
 
 def matched(mesh: TriangleMesh) -> Iterator[tuple[str, Flattening, float]]:
@@ -97,10 +96,10 @@ def matched(mesh: TriangleMesh) -> Iterator[tuple[str, Flattening, float]]:
     for name in ("xatlas", "uvunwrap"):
         if name not in installed_peers():
             continue
-        theirs = run_peer(name, default)
-        yield name, theirs.flattening, theirs.seconds
+        theirs, seconds = run_peer(name, default)
+        yield name, theirs, seconds
         start = time.perf_counter()
-        ours = at_area_std(mesh, theirs.flattening.distortion.area_std)
+        ours = at_area_std(mesh, theirs.distortion.area_std)
         if ours is not None:
             yield f"coneflat as {name}, {len(ours.cones)} cones", ours, time.perf_counter() - start
 

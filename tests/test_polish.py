@@ -158,3 +158,30 @@ def test_models(shared, name, mean, worst):
     assert d.qc_mean < mean
     assert d.qc_max < worst
     assert d.flipped == 0
+
+
+class TestQuality:
+    def test_a_few_more_cones_reach_it(self):
+        plain = flatten(*SHAPES["sphere"])
+        wanted = 1 + 0.9 * (plain.distortion.qc_mean - 1)
+        better = flatten(*SHAPES["sphere"], quality=wanted)
+        assert better.distortion.qc_mean <= wanted
+        assert len(plain.cones) < len(better.cones) <= max(len(plain.cones) + 1, 1.2 * len(plain.cones))
+        assert not better.notes
+
+    def test_what_is_reached_anyway_changes_nothing(self):
+        plain, better = flatten(*SHAPES["hill"]), flatten(*SHAPES["hill"], quality=2.0)
+        assert np.array_equal(plain.corner_uv, better.corner_uv)
+
+    def test_what_cannot_be_reached_is_told(self):
+        result = flatten(*SHAPES["genus2"], quality=1.0001)
+        assert any("1.0001 as wanted" in note for note in result.notes)
+        assert result.distortion.qc_mean <= flatten(*SHAPES["genus2"]).distortion.qc_mean
+
+    @pytest.mark.parametrize(
+        "options",
+        [{"quality": 1.0}, {"quality": 1.1, "cones": "greedy"}, {"quality": 1.1, "method": "linear"}],
+    )
+    def test_what_makes_no_sense_is_refused(self, options):
+        with pytest.raises(errors.OptionError):
+            flatten(*SHAPES["hill"], **options)

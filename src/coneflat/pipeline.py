@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -14,6 +15,7 @@ from .errors import CurvatureError, MetricError, SeamError
 from .flat import LaidOut
 from .flat.held_cones import unheld_notes, with_held_cones
 from .flat.methods import find_metric, turning_meter
+from .flat.more_cones import with_quality
 from .flat.relaxed import relaxed, relaxes
 from .geometry.operators import weighted_areas
 from .input.components import Component, Prepared, prepare
@@ -62,7 +64,7 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     with stages("cones", 0.1):
         surface = Surface.of(mesh, part.lengths)
 
-    def flatten_once(part: Component) -> LaidOut:
+    def flatten_once(part: Component, options: Options) -> LaidOut:
         with stages("cones", 0.4):
             turned = turning_meter(surface, part.constraints, options)
             cones = choose_cones(surface, part.constraints, options, stages, turned)
@@ -75,11 +77,16 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
             areas = weighted_areas(surface.areas, part.constraints.weights)
             return metric.lay_out(disk.mesh, disk.seams).with_area_distortion(cones.log_scale, areas)
 
-    may_lack_room = pursues(mesh, options) and options.method in UNFOLDED
-    layout = with_held_cones(flatten_once, part) if may_lack_room else flatten_once(part)
-    if relaxes(options):
+    def flatten_by(options: Options) -> LaidOut:
+        once = partial(flatten_once, options=options)
+        may_lack_room = pursues(mesh, options) and options.method in UNFOLDED
+        layout = with_held_cones(once, part) if may_lack_room else once(part)
+        if not relaxes(options):
+            return layout
         with stages("relax", 0.96):
-            layout = relaxed(layout, part, options)
+            return relaxed(layout, part, options)
+
+    layout = with_quality(flatten_by, part, options)
     if options.charts == "atlas":
         with stages("atlas", 1.0):
             layout = without_overlaps(layout, part, options)

@@ -96,6 +96,11 @@ def _face_weights(part: Component, before: _Maps) -> FloatArray:
     return besides * np.maximum(at_unit_scale(weights), LEAST_WEIGHT)[part.mesh.faces].mean(axis=1)
 
 
+def mean_ratio(laid_out: LaidOut, part: Component) -> float:
+    """Return the mean quasi-conformal distortion of a layout, by area."""
+    return _Maps.of(laid_out, part).mean()
+
+
 @dataclass(frozen=True, eq=False)
 class _Maps:
     """How triangles are mapped: (m,) ratios of singular values, infinite where turned over; areas in space."""

@@ -27,6 +27,7 @@ ASKING = (
     "forbidden_cones",
     "allowed_cones",
     "quantise",
+    "quality",
 )
 
 
@@ -91,6 +92,10 @@ class Options(RunOptions, AtlasOptions, SeamOptions, MetricOptions, ConeOptions)
             raise OptionError(f"{given} is an option of cones 'pursuit', not of cones {self.cone_choice!r}")
         if self.boundary_kind == "straight" and not self.searches_cones:
             raise OptionError("a straight boundary gets its corners from the search: use cones 'pursuit'")
+        if self.quality is not None and not self.quality > 1:
+            raise OptionError(f"quality must be above 1, which is conformal, not {self.quality:g}")
+        if self.quality is not None and self.method != "exact":
+            raise OptionError("quality is reached by more cones and relaxing: use method 'exact'")
         if self.quantise is None:
             if self.correct_handles:
                 raise OptionError(

@@ -163,6 +163,13 @@ class ConeOptions(ConeBounds, ConeNumber):
         "prescribed, the corners of a polyhedron that has few, and greedy where handles need over a hundred.",
     )
     max_cones: int | None = option(None, Count(), "Searches stop at so many cones per component.")
+    quality: float | None = option(
+        None,
+        Number(optional=True),
+        "The mean quasi-conformal distortion wanted, 1.05 say: all triangles are relaxed, and there are up to a fifth "
+        "more cones, as few as reach it. A note says where they do not.",
+        only="pursuit",
+    )
     quantise: float | None = option(
         None,
         Number(is_angle=True, optional=True),
