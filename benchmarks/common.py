@@ -16,7 +16,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import shapes  # noqa: E402
 
-from coneflat import check_mesh, read_mesh  # noqa: E402
+from coneflat import Flattening, check_mesh, flatten, read_mesh  # noqa: E402
 from coneflat.mesh import TriangleMesh  # noqa: E402
 
 
@@ -53,6 +53,16 @@ def model(name: str, rounds: int) -> tuple[np.ndarray, np.ndarray]:
     for _ in range(rounds):
         vertices, faces = shapes.subdivide(vertices, faces)
     return vertices, faces
+
+
+def with_cones_for(vertices: np.ndarray, faces: np.ndarray, std: float) -> Flattening:
+    """Return a flattening with so many cones that its areas vary by at most so much."""
+    allowed = std
+    while True:
+        result = flatten(vertices, faces, distortion=allowed)
+        if result.distortion.area_std <= 1.01 * std:
+            return result
+        allowed *= min(0.97, std / result.distortion.area_std)
 
 
 def peak_memory() -> float:

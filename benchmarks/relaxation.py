@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
-from common import MODELS
+from common import MODELS, with_cones_for
 
 import coneflat
 from coneflat.errors import ConeflatError
@@ -76,22 +76,12 @@ def dial(names: list[str]) -> None:
         for stretch in DIALS:
             result, seconds = flattened(vertices, faces, stretch=stretch)
             d = result.distortion
-            instead = cones_for(vertices, faces, d.area_std) if stretch else len(result.cones)
+            instead = len((with_cones_for(vertices, faces, d.area_std) if stretch else result).cones)
             print(
                 f"| {name} | {stretch:g} | {d.qc_mean:.3f} | {d.qc_max:.3g} | {d.area_std:.3f} | "
                 f"{d.density_spread:.2f} | {len(result.cones)} | {instead} | {seconds:.2f} |",
                 flush=True,
             )
-
-
-def cones_for(vertices: np.ndarray, faces: np.ndarray, std: float) -> int:
-    """Return the number of cones of a flattening whose areas vary by at most so much."""
-    allowed = std
-    while True:
-        result, _ = flattened(vertices, faces, distortion=allowed)
-        if result.distortion.area_std <= 1.01 * std:
-            return len(result.cones)
-        allowed *= min(0.97, std / result.distortion.area_std)
 
 
 def flattened(vertices: np.ndarray, faces: np.ndarray, **options: Any) -> tuple[coneflat.Flattening, float]:
