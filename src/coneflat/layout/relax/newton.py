@@ -16,6 +16,8 @@ from .motions import Motions
 
 # Part of the slope that a step must gain at least, and halvings after which a part is stuck.
 ARMIJO, HALVINGS = 1e-4, 30
+# Part of the energy that is lost in its sum.
+ROUNDING = 1e-14
 # What is left of the way to where the constraints hold counts as none below this, and as out of reach after a step that
 # goes less than this part of it.
 ARRIVED, STUCK = 1e-12, 1e-3
@@ -58,7 +60,7 @@ def descend(
         motions: how they move.
         elements: the triangles that do.
         energy: what is minimised.
-        tolerance: part of its energy that a step must be expected to gain for a part to go on.
+        tolerance: part of all that a part of the layout has gained that a further step must promise for it to go on.
         steps: at most.
         tell: called with the number of steps and the energy; True ends it.
 
@@ -76,7 +78,7 @@ def descend(
         return np.bincount(part, values, parts).astype(np.float64)
 
     here = sums(elements.energies(energy, maps))
-    before = float(here.sum())
+    first, before = here, float(here.sum())
     total = np.zeros(elements.count + 1)
     active = np.ones(parts, dtype=bool)
     factor: Factor | None = None
@@ -89,7 +91,8 @@ def descend(
             raise MetricError(f"relaxation found no finite step of {elements.count:,} unknowns")
         slope = np.bincount(unknown_part, gradient * step[:-1], parts)
         if not remaining:
-            active &= -slope > tolerance * here
+            # The least energy is not known, so what a step promises is compared with what was gained.
+            active &= -slope > np.maximum(tolerance * (first - here - slope), ROUNDING * here)
             step[:-1][~active[unknown_part]] = 0.0
             if not active.any():
                 break
