@@ -84,7 +84,7 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
         if not relaxes(options):
             return layout
         with stages("relax", 0.96):
-            return relaxed(layout, part, options)
+            return relaxed(layout, part, options, stages.tell)
 
     layout = with_quality(flatten_by, part, options)
     if options.charts == "atlas":

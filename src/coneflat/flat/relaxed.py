@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,10 +35,12 @@ BESIDES = 0.1
 SHARP = 2.0
 
 
-def relaxed(laid_out: LaidOut, part: Component, options: Options) -> LaidOut:
+def relaxed(laid_out: LaidOut, part: Component, options: Options, tell: Callable[[str], None]) -> LaidOut:
     """Return a layout with less distortion, the same cones and the same seams; see `polish` and `stretch`.
 
     The boundary stays where its lengths or its shape are prescribed.
+
+    tell: called before each step with what is being done.
     """
     if not relaxes(options) or laid_out.mesh is not part.mesh:
         return laid_out
@@ -49,13 +52,19 @@ def relaxed(laid_out: LaidOut, part: Component, options: Options) -> LaidOut:
     if not is_free.any():
         return _described(laid_out, laid_out, before, part, options, is_free)
     try:
-        return _relaxed(laid_out, part, options, is_free, whole, before)
+        return _relaxed(laid_out, part, options, is_free, whole, before, tell)
     except SeamError as error:  # a metric that did not converge
         return replace(laid_out, notes=(*laid_out.notes, f"Not relaxed: {error}.")) if whole else laid_out
 
 
 def _relaxed(
-    laid_out: LaidOut, part: Component, options: Options, is_free: BoolArray, whole: bool, before: _Maps
+    laid_out: LaidOut,
+    part: Component,
+    options: Options,
+    is_free: BoolArray,
+    whole: bool,
+    before: _Maps,
+    tell: Callable[[str], None],
 ) -> LaidOut:
     moved, was_free = laid_out, is_free
     for sharpness in (1.0, SHARP):
@@ -69,6 +78,7 @@ def _relaxed(
             free=is_free,
             tolerance=(WHOLE if whole else LOCAL)[0],
             steps=(WHOLE if whole else LOCAL)[1],
+            progress=lambda step, _: tell(f"step {step}"),
         )
         tried = replace(moved, points=found.points)
         if options.stretch:
