@@ -16,6 +16,7 @@ from .flat.held_cones import unheld_notes, with_held_cones
 from .flat.methods import find_metric, turning_meter
 from .geometry.operators import weighted_areas
 from .input.components import Component, Prepared, prepare
+from .input.symmetry import SymmetryUse, are_mirrored, find_symmetry
 from .layout.disk import cutting
 from .options import UNFOLDED, Options, read_options, takes
 from .progress import Stages
@@ -60,19 +61,23 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     mesh = part.mesh
     with stages("cones", 0.1):
         surface = Surface.of(mesh, part.lengths)
+        symmetry = find_symmetry(part, options)
 
     def flatten_once(part: Component) -> LaidOut:
         with stages("cones", 0.4):
             turned = turning_meter(surface, part.constraints, options)
-            cones = choose_cones(surface, part.constraints, options, stages, turned)
-        with cutting(part, cones, options) as being_cut:
+            cones = choose_cones(surface, part.constraints, options, stages, turned, symmetry)
+            is_mirrored = symmetry is not None and are_mirrored(symmetry, cones.cones, cones.curvatures)
+        with cutting(part, cones, options, symmetry if is_mirrored else None) as being_cut:
             with stages("metric", 0.75):
                 metric = find_metric(surface, cones, part.constraints, options)
             with stages("cut", 0.85):
                 disk = being_cut.result()
         with stages("layout", 0.95):
             areas = weighted_areas(surface.areas, part.constraints.weights)
-            return metric.lay_out(disk.mesh, disk.seams).with_area_distortion(cones.log_scale, areas)
+            laid_out = metric.lay_out(disk.mesh, disk.seams).with_area_distortion(cones.log_scale, areas)
+            use = None if symmetry is None else SymmetryUse(symmetry, is_mirrored, disk.is_symmetric)
+            return replace(laid_out, symmetry=use)
 
     may_lack_room = pursues(mesh, options) and options.method in UNFOLDED
     layout = with_held_cones(flatten_once, part) if may_lack_room else flatten_once(part)

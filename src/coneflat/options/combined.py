@@ -16,6 +16,7 @@ from .declared import (
     MetricOptions,
     RunOptions,
     SeamOptions,
+    SymmetryOptions,
 )
 
 # What asks for cones by the pursuit, and it alone.
@@ -31,7 +32,7 @@ ASKING = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RunOptions, AtlasOptions, SeamOptions, MetricOptions, ConeOptions):
+class Options(RunOptions, AtlasOptions, SymmetryOptions, SeamOptions, MetricOptions, ConeOptions):
     """Options of `coneflat.flatten`; `read_options` makes them from what a user gives, so that they are parsed.
 
     Raises:

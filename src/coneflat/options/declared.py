@@ -46,6 +46,8 @@ CONED = (*UNFOLDED, "linear", "bff", "linear-abf", "abf++")
 SOLVERS = ("auto", "pardiso", "cholespy", "scipy", "amg")
 CHARTS = ("atlas", "one")
 BOUNDARIES = ("free", "lengths", "disk", "straight")
+SYMMETRIES = ("auto", "x", "y", "z", "off")
+MIRRORED = ("apart", "overlap")
 
 # Radians: finer quanta than this restrict nothing that could be told from none, as multiples are known to 1e-6.
 LEAST_QUANTUM = 1e-4
@@ -250,6 +252,24 @@ class SeamOptions:
         None,
         Weights(),
         "By how much seams are dearer at each vertex: numbers, or the name of a property in the file.",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SymmetryOptions:
+    """Symmetry."""
+
+    symmetric: str = option(
+        "auto",
+        Choice(SYMMETRIES),
+        "Cones, seams and charts are mirror symmetric. auto: where the model is, to a few thousandths of its size, if "
+        "that takes little more cones and seams. x, y, z: about the plane of that normal that fits best, also where "
+        "the model is so by halves only. off: never.",
+    )
+    mirrored: str = option(
+        "apart",
+        Choice(MIRRORED),
+        "overlap: both sides of a symmetric model lie on each other in the texture and share its texels.",
     )
 
 

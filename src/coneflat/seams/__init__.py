@@ -3,5 +3,6 @@
 from .costs import edge_costs
 from .cut import CutMesh, cut_open, open_along
 from .find import find_seams
+from .mirrored import mirrored_seams
 
-__all__ = ["CutMesh", "cut_open", "edge_costs", "find_seams", "open_along"]
+__all__ = ["CutMesh", "cut_open", "edge_costs", "find_seams", "mirrored_seams", "open_along"]
