@@ -9,6 +9,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from .atlas.injective import without_overlaps
+from .atlas.overlaid import overlaid
 from .cones.choose import Surface, choose_cones, cone_notes, pursues
 from .errors import CurvatureError, MetricError, SeamError
 from .flat import LaidOut
@@ -83,7 +84,8 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     layout = with_held_cones(flatten_once, part) if may_lack_room else flatten_once(part)
     if options.charts == "atlas":
         with stages("atlas", 1.0):
-            layout = without_overlaps(layout, part, options)
+            part_charts = overlaid if options.mirrored == "overlap" else without_overlaps
+            layout = part_charts(layout, part, options)
     reached = layout.statistics.area_distortion_linear
     notes = cone_notes(mesh, len(layout.cones), reached, options)
     if options.method in UNFOLDED:

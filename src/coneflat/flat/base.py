@@ -42,6 +42,7 @@ class LaidOut:
         statistics: how it was found.
         notes: what falls short, one sentence each.
         symmetry: the symmetry that was found, and what it was used for; None if there is none.
+        lies_on: (c,) the point that each is to lie on, itself for most: both sides of a model in one place; or None.
     """
 
     mesh: TriangleMesh
@@ -57,6 +58,7 @@ class LaidOut:
     chart: IntArray | None = None
     notes: tuple[str, ...] = ()
     symmetry: SymmetryUse | None = None
+    lies_on: IntArray | None = None
 
     @property
     def area(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .._arrays import BoolArray, FloatArray, IntArray, dots
-from ..mesh import TriangleMesh
+from ..mesh import TriangleMesh, end_corners
 from .operators import vertex_areas
 from .ties import own_axes, tie_key
 
@@ -294,3 +294,31 @@ def _section_length(mesh: TriangleMesh, points: FloatArray, normal: FloatArray, 
         t = height[apex] / np.where(height[apex] == height[other], 1.0, height[apex] - height[other])
         ends.append(points[apex] + np.clip(t, 0, 1)[:, None] * (points[other] - points[apex]))
     return float(np.linalg.norm(ends[0] - ends[1], axis=1).sum())
+
+
+def mirrored_edges(mesh: TriangleMesh, partner: IntArray) -> IntArray:
+    """Return (e,) the mirror image of each edge, -1 where there is none."""
+    size = len(mesh.vertices)
+    keys = mesh.edges @ np.array([size, 1])
+    wanted = np.sort(partner[mesh.edges], axis=1) @ np.array([size, 1])
+    place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+    return np.where(keys[place] == wanted, place, -1)
+
+
+def mirrored_corners(mesh: TriangleMesh, partner: IntArray, is_left: BoolArray) -> IntArray:
+    """Return (3m,) for the corners of faces on the right those on the left that they are images of, -1 for others.
+
+    Faces need no images of their own: where diagonals of quads run otherwise, a corner is that beside the same edge.
+    """
+    found = np.full(3 * len(mesh.faces), -1, dtype=np.int64)
+    sides = np.flatnonzero(~np.repeat(is_left, 3))
+    edge = mirrored_edges(mesh, partner)[mesh.halfedge_edges[sides]]
+    pairs = mesh.edge_halfedges[edge]
+    on_left = (pairs >= 0) & is_left[pairs // 3] & (edge >= 0)[:, None]
+    known = on_left.any(axis=1)
+    source = np.where(on_left[:, 0], pairs[:, 0], pairs[:, 1])[known]
+    # A mirror image runs the other way.
+    (tail, head), (from_tail, from_head) = end_corners(sides[known]), end_corners(source)
+    found[tail] = from_head
+    found[head] = from_tail
+    return found

@@ -16,7 +16,7 @@ from ..input.components import Component, seam_costs
 from ..input.symmetry import Symmetry
 from ..mesh import TriangleMesh
 from ..options import Options
-from ..seams import cut_open, find_seams, mirrored_seams
+from ..seams import cut_open, detail_factors, find_seams, mirrored_seams
 from ..threads import meanwhile
 
 # A log scale that varies by less is constant.
@@ -59,7 +59,9 @@ def cut_to_disk(
     options = replace(options, creases=1.0) if is_polyhedron and not options.creases else options
     costs, avoided, forbidden = seam_costs(part, options)
     given = part.mesh, solution.cones, costs, avoided, np.flatnonzero(forbidden)
-    mirrored = None if symmetry is None else _mirrored(symmetry, *given)
+    mirrored = (
+        None if symmetry is None else _mirrored(symmetry, part, solution.cones, costs, avoided, forbidden)
+    )
     if mirrored is not None and symmetry is not None and symmetry.is_named:
         return mirrored
     seams = find_seams(*given[:-1], forbidden=given[-1])
@@ -70,17 +72,20 @@ def cut_to_disk(
 
 def _mirrored(
     symmetry: Symmetry,
-    mesh: TriangleMesh,
+    part: Component,
     cones: IntArray,
     costs: FloatArray,
     avoided: BoolArray,
-    forbidden: IntArray,
+    forbidden: BoolArray,
 ) -> Disk | None:
     """Return a mesh cut open symmetrically, None if it cannot be."""
     if symmetry.is_left is None:
         return None
+    mesh, barred = part.mesh, np.flatnonzero(forbidden)
+    on_plane = symmetry.on_plane[mesh.edges].all(axis=1)
+    costs = np.where(on_plane, costs * detail_factors(mesh, part.lengths), costs)
     try:
-        seams = mirrored_seams(mesh, symmetry.mirror, symmetry.is_left, cones, costs, avoided, forbidden)
+        seams = mirrored_seams(mesh, symmetry.mirror, symmetry.is_left, cones, costs, avoided, barred)
         if seams is None:
             return None
         opened = cut_open(mesh, seams)

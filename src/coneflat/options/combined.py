@@ -52,6 +52,11 @@ class Options(RunOptions, AtlasOptions, SymmetryOptions, SeamOptions, MetricOpti
                 "a refinement has triangles of its own, between positions, which given lengths do not tell: leave out "
                 "refine"
             )
+        if self.mirrored == "overlap" and (self.symmetric == "off" or self.charts != "atlas"):
+            raise OptionError(
+                "mirrored 'overlap' lays the sides of a symmetric model on each other: it needs an atlas and a symmetry, "
+                f"not charts {self.charts!r} and symmetric {self.symmetric!r}"
+            )
         if self.sharp_angle is not None and not 0 < self.sharp_angle < math.pi:
             raise OptionError(f"the sharp angle must be between 0 and pi, not {self.sharp_angle:g} radians")
 

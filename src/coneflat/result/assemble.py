@@ -12,6 +12,8 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..atlas import part_touching
 from ..atlas.arrange import arrange_charts
+from ..atlas.mirrored import mirror_charts, no_mirrors
+from ..geometry.planar import sides_between
 from ..input.numbering import result_numbering, turn_corners
 from ..input.polygons import Polygons
 from ..layout.convex import make_convex
@@ -29,6 +31,9 @@ if TYPE_CHECKING:
     from ..input.components import Prepared
 
 
+# Of the longest side in the plane: how far one side of a model is off the other that it lies on, so that readers who
+# join what is within a millionth of a side see two charts, not one that is folded.
+APART = 4e-6
 POLYGONS_LOST = (
     "The refinement has triangles of its own: polygons, groups and materials of the file are not kept."
 )
@@ -137,7 +142,9 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     curvature = _curvature(prepared, laid_out, numbering, options)
     cones = numbering.renumber([one.cones for one in laid_out])
     with stages("measure"):
-        layout, distortion = _measure(prepared, numbering, triangles, layout, curvature, cones, options)
+        layout, distortion = _measure(
+            prepared, laid_out, numbering, triangles, layout, curvature, cones, options
+        )
         rotations = _rotations(laid_out, layout.uv[layout.own], options)
     result = Flattening(
         vertices=numbering.positions,
@@ -204,21 +211,30 @@ def _pack(
     laid_out: Sequence[LaidOut], triangles: _Triangles, corners_in_space: FloatArray, options: Options
 ) -> _Layout:
     """Return the charts of all components, packed."""
-    points, own, chart, component = _all_charts(laid_out)
+    points, own, chart, component, lies_on = _all_charts(laid_out)
     corners = own[triangles.order]
+    mirrors = [
+        mirror_charts(one) if one.lies_on is None else no_mirrors(_chart_count(one)) for one in laid_out
+    ]
+    # What lies on other points is not packed.
+    below = (lies_on[corners] == corners).all(axis=1)
+    of_all, of_below = np.unique(chart[triangles.order][below], return_inverse=True)
     packed = arrange_charts(
-        points[corners],
-        chart[triangles.order],
-        component,
-        corners_in_space,
+        points[corners[below]],
+        of_below,
+        component[of_all],
+        corners_in_space[below],
         resolution=options.resolution,
         padding=options.padding,
         tiles=options.tiles,
         up=options.up,
         quantum=options.quantise,
+        mirrors=mirrors if below.all() else (),
     )
     uv = np.empty_like(points)
-    uv[corners] = packed.corner_uv
+    uv[corners[below]] = packed.corner_uv
+    if not below.all():
+        uv = uv[lies_on] + APART * _longest_side(packed.corner_uv) * (lies_on != np.arange(len(uv)))[:, None]
     return _Layout(uv, corners, own, packed.scale, packed.efficiency)
 
 
@@ -235,6 +251,7 @@ def _curvature(
 
 def _measure(
     prepared: Prepared,
+    laid_out: Sequence[LaidOut],
     numbering: _Numbering,
     triangles: _Triangles,
     layout: _Layout,
@@ -253,7 +270,8 @@ def _measure(
         lengths=prepared.own_lengths,
     )
     distortion = measured(layout.uv[layout.corners])
-    if options.charts == "atlas" and distortion.overlapping_pairs:
+    is_meant = any(one.lies_on is not None for one in laid_out)
+    if options.charts == "atlas" and distortion.overlapping_pairs and not is_meant:
         parted, overlaps = part_touching(layout.uv, layout.corners)
         if len(overlaps.pairs) < distortion.overlapping_pairs:
             return replace(layout, uv=parted), measured(parted[layout.corners], overlaps=overlaps)
@@ -293,17 +311,28 @@ def _distinct_notes(laid_out: Sequence[LaidOut]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(note for one in laid_out for note in one.notes))
 
 
-def _all_charts(laid_out: Sequence[LaidOut]) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
+def _all_charts(laid_out: Sequence[LaidOut]) -> tuple[FloatArray, IntArray, IntArray, IntArray, IntArray]:
     """Return the points, corners and charts of all components, numbered one after the other.
 
-    And (k,) the component of each chart.
+    And (k,) the component of each chart, and the point that each lies on.
     """
     corners, charts, component, points, count = [], [], [], 0, 0
+    lies_on = []
     for i, one in enumerate(laid_out):
         chart = np.zeros(len(one.corners), dtype=np.int64) if one.chart is None else one.chart
         corners.append(one.corners + points)
+        lies_on.append(points + (np.arange(len(one.points)) if one.lies_on is None else one.lies_on))
         charts.append(chart + count)
         component += [i] * (int(chart.max()) + 1)
         points, count = points + len(one.points), count + int(chart.max()) + 1
     every = np.concatenate([one.points for one in laid_out])
-    return every, np.concatenate(corners), np.concatenate(charts), np.array(component, dtype=np.int64)
+    of_charts = np.array(component, dtype=np.int64)
+    return every, np.concatenate(corners), np.concatenate(charts), of_charts, np.concatenate(lies_on)
+
+
+def _chart_count(one: LaidOut) -> int:
+    return 1 if one.chart is None else int(one.chart.max()) + 1
+
+
+def _longest_side(corner_uv: FloatArray) -> float:
+    return float(np.abs(sides_between(corner_uv)).max())

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from .._arrays import BoolArray, FloatArray, IntArray
-from ..geometry.mirror import Mirror
+from ..geometry.mirror import Mirror, mirrored_edges
 from ..mesh import TriangleMesh, label_components
 from .cut import open_along
 from .find import find_seams
@@ -26,6 +28,9 @@ FOLLOWED, ASTRAY = 0.05, 3.0
 GAPS, LARGE = 3, 50_000
 # Relative: what is gained must be more than rounding makes.
 LEAST_GAIN = 1e-6
+
+
+Found = TypeVar("Found", IntArray, IntArray | None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +88,8 @@ def mirrored_seams(
     if not work.are_halves:
         return None
     tries = GAPS if len(mesh.faces) <= LARGE else 1
-    found = min((work.shortened(start) for start in work.whole_curve(tries)), key=lambda each: each.cost)
+    starts = work.whole_curve(tries) + work.between_cones(tries)
+    found = min((work.shortened(start) for start in starts), key=lambda each: each.cost)
     seams = np.concatenate([found.along, found.branches])
     return None if work.is_forbidden[seams].any() else np.sort(seams)
 
@@ -127,22 +133,38 @@ class _Cutting:
         dearest = np.argsort(-np.bincount(stretch, costs), kind="stable")[:tries]
         return [self._seams(self.curve[stretch != gap], branches) for gap in dearest]
 
+    def between_cones(self, tries: int) -> list[_Symmetric]:
+        """Return seams along all of the plane but one of the dearest stretches between cones and boundaries there.
+
+        Branches that would end on it end elsewhere.
+        """
+        if not self.is_simple:
+            return []
+        stretch = self._stretches(self.curve, self.curve[:0])
+        dearest = np.argsort(-np.bincount(stretch, self.costs[self.curve]), kind="stable")[:tries]
+        whole = _Symmetric(self.curve, self.curve[:0], np.inf)
+        found = [self._without(whole, self.curve[stretch == gap]) for gap in dearest]
+        return [each for each in found if each is not None]
+
+    @cached_property
+    def is_simple(self) -> bool:
+        """Whether the halves are disks that meet in one curve."""
+        mesh, ends = self.mesh, self.mesh.edges[self.curve]
+        if mesh.genus() or mesh.boundary_loops[0] > 1:
+            return False
+        return len(np.unique(label_components(len(mesh.vertices), *ends.T)[1][ends[:, 0]])) == 1
+
     def shortened(self, found: _Symmetric) -> _Symmetric:
         """Return seams of which less runs in the plane, branches ending at what is left, as long as they get shorter."""
-        mesh = self.mesh
-        ends = mesh.edges[self.curve]
-        if mesh.genus() or mesh.boundary_loops[0] > 1:
-            return found
-        if len(np.unique(label_components(len(mesh.vertices), *ends.T)[1][ends[:, 0]])) > 1:
-            return found
-        while True:
+        while self.is_simple:
             tries = [self._without(found, stretch) for stretch in self._end_stretches(found)]
             best = min(
                 (each for each in tries if each is not None), key=lambda each: each.cost, default=found
             )
             if not best.cost < found.cost * (1 - LEAST_GAIN):
-                return found
+                break
             found = best
+        return found
 
     def _stretches(self, along: IntArray, branches: IntArray) -> IntArray:
         """Return the stretch between cones, branches, boundaries and ends of the curve that each edge of it belongs to."""
@@ -168,10 +190,8 @@ class _Cutting:
         """Return seams without a stretch of the plane; None if that does not open the mesh."""
         mesh = self.mesh
         along = np.setdiff1d(found.along, stretch)
-        on_curve, kept = np.zeros((2, len(mesh.vertices)), dtype=bool)
-        on_curve[mesh.edges[self.curve]] = True
-        kept[mesh.edges[along]] = True
-        closed = on_curve & ~kept & ~mesh.is_boundary_vertex
+        closed = _marked(len(mesh.vertices), mesh.edges[self.curve].ravel())
+        closed &= ~_marked(len(closed), mesh.edges[along].ravel()) & ~mesh.is_boundary_vertex
         if closed[self.cones].any() or not (len(along) or mesh.is_boundary_vertex.any()):
             return None
         on_left = self._open_beside(0, along, closed, self.costs)
@@ -192,9 +212,8 @@ class _Cutting:
         """
         mesh = self.mesh
         half = self.halves[side]
-        inside = np.zeros(len(mesh.vertices), dtype=bool)
-        inside[half.vertices] = True
-        is_open = (inside & ~closed)[mesh.edges].all(axis=1)
+        inside = _marked(len(mesh.vertices), half.vertices)
+        is_open: BoolArray = (inside & ~closed)[mesh.edges].all(axis=1)
         is_open[self.curve] = False
         on_curve = np.isin(self.cones, mesh.edges[self.curve])
         seams = find_seams(
@@ -236,21 +255,12 @@ class _Cutting:
         given = half.mesh, np.flatnonzero(inner), costs[half.edges], avoided
         return half.edges[find_seams(*given, forbidden=np.flatnonzero(dear))]
 
-    def _mirrored(self, on_left: IntArray, find: Callable[[FloatArray], IntArray]) -> IntArray:
+    def _mirrored(self, on_left: IntArray, find: Callable[[FloatArray], Found]) -> IntArray | Found:
         """Return the mirror image of seams, or what is found near it if edges have none."""
         image = self.image[on_left]
         if (image >= 0).all() and np.isin(image, self.halves[1].edges).all():
             return image
         return find(self.costs * _astray(self.mesh, self.mirror, on_left))
-
-
-def mirrored_edges(mesh: TriangleMesh, partner: IntArray) -> IntArray:
-    """Return (e,) the mirror image of each edge, -1 where there is none."""
-    size = len(mesh.vertices)
-    keys = mesh.edges @ np.array([size, 1])
-    wanted = np.sort(partner[mesh.edges], axis=1) @ np.array([size, 1])
-    place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    return np.where(keys[place] == wanted, place, -1)
 
 
 def _marked(count: int, some: IntArray) -> BoolArray:
