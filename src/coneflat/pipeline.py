@@ -17,7 +17,7 @@ from .flat.held_cones import unheld_notes, with_held_cones
 from .flat.methods import find_metric, turning_meter
 from .geometry.operators import weighted_areas
 from .input.components import Component, Prepared, prepare
-from .input.symmetry import SymmetryUse, are_mirrored, find_symmetry
+from .input.symmetry import SymmetryUse, are_mirrored, check_symmetry, find_symmetry
 from .layout.disk import cutting
 from .options import UNFOLDED, Options, read_options, takes
 from .progress import Stages
@@ -52,6 +52,7 @@ def flatten_as(mesh: Any, faces: ArrayLike | None, options: Options) -> Flatteni
     stages = Stages(options.progress)
     with stages("check"):
         prepared = prepare(mesh, faces, options)
+        check_symmetry(prepared.components, options)
     with one_blas_thread(), solving(options.solver) as solvers:
         flat = list(_flat_components(prepared, options, stages))
     return replace(assemble(prepared, flat, options, stages), solvers=tuple(solvers.used))

@@ -71,7 +71,9 @@ def _joined_in_plane(mesh: TriangleMesh, whole: Layout, chart: IntArray, pairs: 
     inside = np.flatnonzero(~mesh.is_boundary_edge)
     sides = chart[mesh.edge_faces[inside]]
     apart = point_seams(mesh, whole.corners)
-    meet = np.sort(sides[~np.isin(inside, apart) & (np.abs(sides[:, 0] - sides[:, 1]) == (chart.max() + 1) // 2)])
+    meet = np.sort(
+        sides[~np.isin(inside, apart) & (np.abs(sides[:, 0] - sides[:, 1]) == (chart.max() + 1) // 2)]
+    )
     over = np.sort(chart[pairs], axis=1)
     size = int(chart.max()) + 1
     meet = meet[~np.isin(meet @ [size, 1], over @ [size, 1])]

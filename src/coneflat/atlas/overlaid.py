@@ -17,8 +17,8 @@ from .chart_seams import Layout, Seams
 from .injective import cut_costs, injective_charts, without_overlaps
 
 NOT_OVERLAID = (
-    "The two sides are laid out apart: they lie on each other only where cut and cones are symmetric, and every vertex "
-    "has a mirror image."
+    "Both sides of a component are laid out apart: they lie on each other only where cones and cut are symmetric, and "
+    "every vertex has a mirror image."
 )
 
 
@@ -57,7 +57,7 @@ def overlaid(laid_out: LaidOut, part: Component, options: Options) -> LaidOut:
 
 
 def _sources(laid_out: LaidOut) -> IntArray | None:
-    """Return (m, 3) for faces on the right the corners on the left that they lie on, -1 on the left; None if not known."""
+    """Return (m, 3) for faces on the right the corners on the left that they lie on, -1 on the left; None if not."""
     use = laid_out.symmetry
     if use is None or not use.seams or use.symmetry.is_left is None or not use.symmetry.mirror.is_paired:
         return None

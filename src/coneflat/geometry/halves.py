@@ -75,7 +75,7 @@ def _sides(mesh: TriangleMesh, is_left: BoolArray) -> tuple[int, IntArray]:
 
 
 def _without_islands(mesh: TriangleMesh, is_left: BoolArray) -> BoolArray:
-    """Return sides, of which what hangs together with neither the most of the left nor that of the right has changed."""
+    """Return sides of which what hangs together neither with most of the left nor with most of the right changed."""
     count, part = _sides(mesh, is_left)
     if count <= 2:
         return is_left

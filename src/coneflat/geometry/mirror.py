@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -22,11 +21,13 @@ STEPS, FINISH = 25, 6
 SAME = 1e-6
 # Farthest vertices, and how many of them on either end, that are taken for images of each other.
 FARTHEST, RIVALS = 1e-3, 6
+# Of the shortest edge around: how far the image of a vertex may be from the vertex that it is the image of.
+PAIRED = 0.05
 # Candidates that are fitted, the best before.
 FITTED = 6
 # Cosine of the angle by which a plane may be off the normal that was given, 10 degrees.
 NEARLY = float(np.cos(np.radians(10)))
-# Parts of the area on either side of a plane of symmetry, at least: a flat surface lies in its own plane.
+# Of the area off a plane of symmetry, what is on either side at least: a flat surface lies in its own plane.
 HALF = 0.3
 
 
@@ -40,6 +41,7 @@ class Mirror:
         height: (n,) distance of each vertex from the plane, negative on the right, over the square root of the area.
         partner: (n,) the vertex nearest to the mirror image of each.
         face_partner: (m,) the mirror image of each face where the mesh, not its shape alone, is symmetric; else None.
+        is_paired: whether vertices are images of each other, two and two or on the plane, though edges may not be.
         deviation: how far the surface is from symmetric: the root mean square of the distance of mirrored vertices
             from it, over the square root of its area.
     """
@@ -49,17 +51,13 @@ class Mirror:
     height: FloatArray
     partner: IntArray
     face_partner: IntArray | None
+    is_paired: bool
     deviation: float
 
     @property
     def is_exact(self) -> bool:
         """Whether every face has a mirror image."""
         return self.face_partner is not None
-
-    @cached_property
-    def is_paired(self) -> bool:
-        """Whether vertices are mirror images of each other, two and two or on the plane, though edges may not be."""
-        return bool((self.partner[self.partner] == np.arange(len(self.partner))).all())
 
     @property
     def own(self) -> BoolArray:
@@ -124,23 +122,28 @@ def _as_mirror(
     size: float,
 ) -> Mirror:
     normal, offset = plane
-    partner = tree.query(_mirrored(points, normal, offset))[1].astype(np.int64)
-    faces = _face_partner(mesh, partner)
-    own = np.arange(len(partner))
-    if (partner[partner] == own).all():
+    distance, partner = tree.query(_mirrored(points, normal, offset))
+    own, partner = np.arange(len(partner)), partner.astype(np.int64)
+    ends = points[mesh.edges]
+    shortest = np.full(len(points), np.inf)
+    sides = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    np.minimum.at(shortest, mesh.edges.ravel(), np.repeat(sides, 2))
+    is_paired = bool((partner[partner] == own).all() and (distance <= PAIRED * shortest).all())
+    faces = _face_partner(mesh, partner) if is_paired else None
+    if is_paired:
         normal, offset = _best_plane(points, points[partner], np.full(len(points), 1 / len(points)))
         if normal @ plane[0] < 0:
             normal, offset = -normal, -offset
     height = points @ normal - offset
-    if (partner[partner] == own).all():
+    if is_paired:
         height[partner == own] = 0.0
-    return Mirror(normal, float(offset * size + normal @ centre), height, partner, faces, deviation)
+    return Mirror(
+        normal, float(offset * size + normal @ centre), height, partner, faces, is_paired, deviation
+    )
 
 
 def _face_partner(mesh: TriangleMesh, partner: IntArray) -> IntArray | None:
-    """Return (m,) the mirror image of each face, None if one has none, or vertices are not those of each other."""
-    if (partner[partner] != np.arange(len(partner))).any():
-        return None
+    """Return (m,) the mirror image of each face, None if one has none."""
     keys, images = np.sort(mesh.faces, axis=1), np.sort(partner[mesh.faces], axis=1)
     order, ranks = np.lexsort(keys.T[::-1]), np.lexsort(images.T[::-1])
     if not np.array_equal(keys[order], images[ranks]):
@@ -179,7 +182,8 @@ def _candidates(points: FloatArray, share: FloatArray) -> Iterator[FloatArray]:
 def _has_sides(points: FloatArray, share: FloatArray, normal: FloatArray, offset: float) -> bool:
     """Whether there is surface on both sides of a plane."""
     height = points @ normal - offset
-    return bool(min(share[height > SAME].sum(), share[height < -SAME].sum()) > HALF)
+    left, right = share[height > SAME].sum(), share[height < -SAME].sum()
+    return bool(min(left, right) > HALF * (left + right))
 
 
 def _mirrored(points: FloatArray, normal: FloatArray, offset: float) -> FloatArray:
@@ -314,10 +318,11 @@ def mirrored_corners(mesh: TriangleMesh, partner: IntArray, is_left: BoolArray) 
     sides = np.flatnonzero(~np.repeat(is_left, 3))
     edge = mirrored_edges(mesh, partner)[mesh.halfedge_edges[sides]]
     pairs = mesh.edge_halfedges[edge]
-    on_left = (pairs >= 0) & is_left[pairs // 3] & (edge >= 0)[:, None]
+    # A mirror image runs the other way.
+    runs_back = mesh.tails[pairs] == partner[mesh.heads[sides]][:, None]
+    on_left = (pairs >= 0) & is_left[pairs // 3] & (edge >= 0)[:, None] & runs_back
     known = on_left.any(axis=1)
     source = np.where(on_left[:, 0], pairs[:, 0], pairs[:, 1])[known]
-    # A mirror image runs the other way.
     (tail, head), (from_tail, from_head) = end_corners(sides[known]), end_corners(source)
     found[tail] = from_head
     found[head] = from_tail

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,11 +54,7 @@ class SymmetryUse:
 
 
 def find_symmetry(part: Component, options: Options) -> Symmetry | None:
-    """Return the symmetry of a component that the options ask for; None if there is none.
-
-    Raises:
-        OptionError: a plane is named about which the component is not symmetric.
-    """
+    """Return the symmetry of a component that the options ask for; None if there is none."""
     # A metric of one's own is not that of the positions.
     if options.symmetric == "off" or options.lengths is not None:
         return None
@@ -66,8 +63,6 @@ def find_symmetry(part: Component, options: Options) -> Symmetry | None:
     tolerance = AUTO if normal is None else NAMED
     mirror = find_mirror(part.mesh, part.lengths, tolerance, normal)
     if mirror is None:
-        if normal is not None:
-            raise _asymmetric(part, options.symmetric, normal)
         return None
     from ..geometry.halves import part_halves
 
@@ -94,12 +89,22 @@ def are_mirrored(symmetry: Symmetry, cones: IntArray, curvatures: FloatArray) ->
     return bool((off | np.isin(cones, paired) | np.isin(cones, partner[paired])).all())
 
 
-def _asymmetric(part: Component, axis: str, normal: FloatArray) -> OptionError:
+def check_symmetry(parts: Sequence[Component], options: Options) -> None:
+    """Raise OptionError if a plane is named about which no component is symmetric."""
+    axis = AXES.get(options.symmetric)
+    if axis is None or options.lengths is not None:
+        return
+    normal = np.array(axis)
+    if any(find_mirror(part.mesh, part.lengths, NAMED, normal) is not None for part in parts):
+        return
+    part = max(parts, key=lambda part: len(part.faces))
     nearest = find_mirror(part.mesh, part.lengths, np.inf, normal)
-    where = f"the component of vertex {part.constraints.names[0]}"
-    if nearest is None:
-        return OptionError(f"{where} does not lie on both sides of a plane of normal {axis}")
-    return OptionError(
-        f"{where} is not symmetric about a plane of normal {axis}: its mirror image is off by {nearest.deviation:.2g} of "
-        f"its size, {NAMED:g} at most is allowed"
+    off = (
+        "lies in one"
+        if nearest is None
+        else f"is off its mirror image by {nearest.deviation:.2g} of its size"
+    )
+    raise OptionError(
+        f"the model is not symmetric about a plane of normal {options.symmetric}: it {off}, and {NAMED:g} at most is "
+        "allowed"
     )

@@ -22,7 +22,7 @@ from ..threads import meanwhile
 # A log scale that varies by less is constant.
 FLAT = 1e-9
 # How much longer than others symmetric seams may be, unless they were asked for.
-LONGER = 1.2
+LONGER = 1.15
 
 
 @dataclass(frozen=True, eq=False)

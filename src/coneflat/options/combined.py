@@ -54,7 +54,7 @@ class Options(RunOptions, AtlasOptions, SymmetryOptions, SeamOptions, MetricOpti
             )
         if self.mirrored == "overlap" and (self.symmetric == "off" or self.charts != "atlas"):
             raise OptionError(
-                "mirrored 'overlap' lays the sides of a symmetric model on each other: it needs an atlas and a symmetry, "
+                "mirrored 'overlap' lays the sides of a symmetric model on each other: it needs an atlas and symmetry, "
                 f"not charts {self.charts!r} and symmetric {self.symmetric!r}"
             )
         if self.sharp_angle is not None and not 0 < self.sharp_angle < math.pi:

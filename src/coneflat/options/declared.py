@@ -260,11 +260,11 @@ class SymmetryOptions:
     """Symmetry."""
 
     symmetric: str = option(
-        "auto",
+        "off",
         Choice(SYMMETRIES),
-        "Cones, seams and charts are mirror symmetric. auto: where the model is, to a few thousandths of its size, if "
-        "that takes little more cones and seams. x, y, z: about the plane of that normal that fits best, also where "
-        "the model is so by halves only. off: never.",
+        "Cones, seams and charts are mirror symmetric. auto: where the model is, to three thousandths of its size, if "
+        "cones and seams become little more. x, y, z: about the plane of about that normal that fits best, to three "
+        "hundredths.",
     )
     mirrored: str = option(
         "apart",

@@ -12,7 +12,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..atlas import part_touching
 from ..atlas.arrange import arrange_charts
-from ..atlas.mirrored import mirror_charts, no_mirrors
+from ..atlas.mirrored import ChartMirrors, mirror_charts, no_mirrors
 from ..geometry.planar import sides_between
 from ..input.numbering import result_numbering, turn_corners
 from ..input.polygons import Polygons
@@ -25,6 +25,7 @@ from ..quality.rotations import Rotations, measure_rotations
 from ..quality.statistics import SolveStatistics
 from .flattening import Flattening
 from .promises import broken_promises
+from .symmetry import mirror_symmetry
 
 if TYPE_CHECKING:
     from ..flat import LaidOut
@@ -33,7 +34,8 @@ if TYPE_CHECKING:
 
 # Of the longest side in the plane: how far one side of a model is off the other that it lies on, so that readers who
 # join what is within a millionth of a side see two charts, not one that is folded.
-APART = 4e-6
+# And at least so much of the texture, far above the rounding of 32-bit numbers, far below a texel.
+APART, LEAST_APART = 4e-6, 1e-6
 POLYGONS_LOST = (
     "The refinement has triangles of its own: polygons, groups and materials of the file are not kept."
 )
@@ -129,7 +131,10 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     triangles = _sort_triangles(prepared, laid_out, numbering)
     corners_in_space = numbering.positions[triangles.faces]
     with stages("pack"):
-        layout = _pack(laid_out, triangles, corners_in_space, options)
+        mirrors = [
+            mirror_charts(one) if one.lies_on is None else no_mirrors(_chart_count(one)) for one in laid_out
+        ]
+        layout = _pack(laid_out, mirrors, triangles, corners_in_space, options)
     refined = any(one.statistics.refined_triangles for one in laid_out)
     face_corners = (
         None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
@@ -174,6 +179,11 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
             [one.statistics for one in laid_out], [one.area if len(laid_out) > 1 else 1.0 for one in laid_out]
         ),
         rotations=rotations,
+        symmetry=tuple(
+            found
+            for one, charts in zip(laid_out, mirrors, strict=True)
+            if (found := mirror_symmetry(one, charts.off, checked.exponent)) is not None
+        ),
         vertex_origin=numbering.vertex_origin,
         face_origin=triangles.face_origin,
         face_corners=face_corners,
@@ -208,14 +218,15 @@ def _sort_triangles(prepared: Prepared, laid_out: Sequence[LaidOut], numbering: 
 
 
 def _pack(
-    laid_out: Sequence[LaidOut], triangles: _Triangles, corners_in_space: FloatArray, options: Options
+    laid_out: Sequence[LaidOut],
+    mirrors: Sequence[ChartMirrors],
+    triangles: _Triangles,
+    corners_in_space: FloatArray,
+    options: Options,
 ) -> _Layout:
     """Return the charts of all components, packed."""
     points, own, chart, component, lies_on = _all_charts(laid_out)
     corners = own[triangles.order]
-    mirrors = [
-        mirror_charts(one) if one.lies_on is None else no_mirrors(_chart_count(one)) for one in laid_out
-    ]
     # What lies on other points is not packed.
     below = (lies_on[corners] == corners).all(axis=1)
     of_all, of_below = np.unique(chart[triangles.order][below], return_inverse=True)
@@ -234,7 +245,7 @@ def _pack(
     uv = np.empty_like(points)
     uv[corners[below]] = packed.corner_uv
     if not below.all():
-        uv = uv[lies_on] + APART * _longest_side(packed.corner_uv) * (lies_on != np.arange(len(uv)))[:, None]
+        uv = _laid_on(uv, lies_on, max(APART * _longest_side(packed.corner_uv), LEAST_APART))
     return _Layout(uv, corners, own, packed.scale, packed.efficiency)
 
 
@@ -328,6 +339,13 @@ def _all_charts(laid_out: Sequence[LaidOut]) -> tuple[FloatArray, IntArray, IntA
     every = np.concatenate([one.points for one in laid_out])
     of_charts = np.array(component, dtype=np.int64)
     return every, np.concatenate(corners), np.concatenate(charts), of_charts, np.concatenate(lies_on)
+
+
+def _laid_on(uv: FloatArray, lies_on: IntArray, apart: float) -> FloatArray:
+    """Return points (u, 2) of which some lie on others, but for a little, inside the texture."""
+    placed = uv[lies_on]
+    inside = apart if placed.max() + apart <= np.ceil(placed.max()) else -apart
+    return np.asarray(placed + inside * (lies_on != np.arange(len(uv)))[:, None])
 
 
 def _chart_count(one: LaidOut) -> int:

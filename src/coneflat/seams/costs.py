@@ -82,12 +82,11 @@ def detail_factors(mesh: TriangleMesh, lengths: FloatArray) -> FloatArray:
     areas = vertex_areas(mesh.faces, lengths, count)
     size = np.sqrt(areas.sum())
     degree = np.bincount(mesh.edges.ravel(), minlength=count)
+    both = np.stack([bending, areas])
     for _ in range(DETAIL_ROUNDS):
-        bending, areas = (
-            (each + np.bincount(mesh.edges.ravel(), (each / degree)[mesh.edges[:, ::-1]].ravel(), count)) / 2
-            for each in (bending, areas)
-        )
-    detail = bending / areas * size / DETAILED
+        shared = (both / degree)[:, mesh.edges[:, ::-1]].reshape(2, -1)
+        both = (both + [np.bincount(mesh.edges.ravel(), each, count) for each in shared]) / 2
+    detail = both[0] / both[1] * size / DETAILED
     factors: FloatArray = 1 + DETAIL * np.clip(detail[mesh.edges].mean(axis=1), 0.0, 1.0)
     return factors
 

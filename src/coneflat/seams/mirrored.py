@@ -155,7 +155,7 @@ class _Cutting:
         return len(np.unique(label_components(len(mesh.vertices), *ends.T)[1][ends[:, 0]])) == 1
 
     def shortened(self, found: _Symmetric) -> _Symmetric:
-        """Return seams of which less runs in the plane, branches ending at what is left, as long as they get shorter."""
+        """Return seams less of which runs in the plane, branches ending at the rest, as long as they get shorter."""
         while self.is_simple:
             tries = [self._without(found, stretch) for stretch in self._end_stretches(found)]
             best = min(
@@ -167,7 +167,7 @@ class _Cutting:
         return found
 
     def _stretches(self, along: IntArray, branches: IntArray) -> IntArray:
-        """Return the stretch between cones, branches, boundaries and ends of the curve that each edge of it belongs to."""
+        """Return the stretch, between cones, branches, boundaries and ends of the curve, that edges of it belong to."""
         mesh = self.mesh
         degree = np.bincount(mesh.edges[self.curve].ravel(), minlength=len(mesh.vertices))
         is_node = mesh.is_boundary_vertex | (degree > 2)
@@ -213,7 +213,7 @@ class _Cutting:
         mesh = self.mesh
         half = self.halves[side]
         inside = _marked(len(mesh.vertices), half.vertices)
-        is_open: BoolArray = (inside & ~closed)[mesh.edges].all(axis=1)
+        is_open = np.asarray((inside & ~closed)[mesh.edges].all(axis=1))
         is_open[self.curve] = False
         on_curve = np.isin(self.cones, mesh.edges[self.curve])
         seams = find_seams(

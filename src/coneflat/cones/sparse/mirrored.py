@@ -144,7 +144,7 @@ class MirroredSearch:
         return np.concatenate([pairs, np.stack([single, single], axis=1)])
 
     def _orbits(self, unknowns: IntArray) -> IntArray:
-        """Return (m, 2) unknowns, each once, with their images; those that can be neither pair nor single are left out."""
+        """Return (m, 2) unknowns, each once, with their images, without those that can be neither pair nor single."""
         unknowns = unknowns[self._pair[unknowns] | self._single[unknowns]]
         own = np.sort(np.stack([unknowns, self._image[unknowns]], axis=1), axis=1)
         return np.unique(own, axis=0)
