@@ -16,7 +16,7 @@ from ..mesh import TriangleMesh
 from ..options import Options
 from .chart_seams import Layout, Seams
 from .glue import glue_charts
-from .mirrored import split_alike
+from .mirrored import mirror_charts, split_alike
 from .split import split_overlaps
 
 # Parts of the area that charts should have at least. Where the cheapest cuts leave several charts, dearer ones that
@@ -73,11 +73,19 @@ def injective_charts(
         if rank[1] == 1 or (not rank[0] and len(corners) > LARGE):
             break
     (slivers, count, _), _, best = min(found, key=lambda one: one[:2])
-    if symmetry is not None and count > 1:
-        alike = split_alike(mesh, whole, lengths, np.abs(areas), pairs, symmetry)
-        if alike is not None:
-            rank = _rank(mesh, alike, np.abs(areas), lengths)
-            return alike if rank[0] <= slivers and rank[1] <= count + MORE_ALIKE else best
+    if symmetry is not None:
+        # Whatever is most alike on both sides.
+        partner = symmetry.mirror.partner
+        off = mirror_charts(mesh, best, partner).off
+        for part in LEAST_PARTS:
+            least = part * float(np.abs(areas).sum())
+            alike = split_alike(mesh, whole, lengths, np.abs(areas), pairs, symmetry, least)
+            if alike is None:
+                continue
+            more_slivers, more, _ = _rank(mesh, alike, np.abs(areas), lengths)
+            alike_off = mirror_charts(mesh, alike, partner).off
+            if more_slivers <= slivers and more <= count + MORE_ALIKE and alike_off < off:
+                best, off = alike, alike_off
     return best
 
 

@@ -10,7 +10,8 @@ import numpy as np
 from .._arrays import ComplexArray, FloatArray, IntArray
 from ..flat import LaidOut
 from ..geometry.charts import point_seams
-from ..geometry.mirror import mirrored_corners
+from ..geometry.mirror import mirrored_corners, mirrored_edges
+from ..geometry.planar import signed_double_areas
 from ..input.symmetry import Symmetry
 from ..mesh import TriangleMesh
 from .chart_seams import Layout
@@ -30,6 +31,7 @@ def split_alike(
     areas: FloatArray,
     pairs: IntArray,
     symmetry: Symmetry,
+    least: float = 0.0,
 ) -> Layout | None:
     """Return a layout split so that nothing overlaps, on the right as on the left; None where that is not known.
 
@@ -40,30 +42,31 @@ def split_alike(
         areas: (m,) of the triangles in the plane.
         pairs: (k, 2) of triangles that overlap.
         symmetry: of mesh and cut.
+        least: the area that a chart should have at least.
     """
     is_left = symmetry.is_left
-    if is_left is None or not symmetry.mirror.is_paired:
+    if is_left is None or not symmetry.is_alike:
         return None
-    source = mirrored_corners(mesh, symmetry.mirror.partner, is_left).reshape(-1, 3).max(axis=1) // 3
-    if (source[~is_left] < 0).any():
+    image = mirrored_corners(mesh, symmetry.mirror.partner, is_left).reshape(-1, 3) // 3
+    if (image[~is_left] < 0).any():
         return None
-    own = np.flatnonzero(is_left)
-    # What overlaps on the right is split on the left, too.
-    image = np.where(is_left, np.arange(len(is_left)), source)
-    among = pairs[is_left[pairs[:, 0]] == is_left[pairs[:, 1]]]
-    among = np.sort(np.searchsorted(own, image[among]), axis=1)
-    among = np.unique(among[among[:, 0] != among[:, 1]], axis=0)
+    image[is_left] = np.flatnonzero(is_left)[:, None]
+    own, source = np.flatnonzero(is_left), image.max(axis=1)
     sides = costs[mesh.halfedge_edges].reshape(-1, 3)[own].ravel()
-    charts = split_overlaps(whole.points, whole.corners[own], sides, areas[own], among)
+    # What overlaps on the right is split on the left, too; where diagonals run otherwise, both halves of the quads.
+    apart = image[pairs[is_left[pairs[:, 0]] == is_left[pairs[:, 1]]]]
+    apart = np.stack([np.repeat(apart[:, 0], 3, axis=1), np.tile(apart[:, 1], 3)], axis=-1).reshape(-1, 2)
+    apart = np.sort(np.searchsorted(own, apart), axis=1)
+    apart = np.unique(apart[apart[:, 0] != apart[:, 1]], axis=0)
+    charts = split_overlaps(whole.points, whole.corners[own], sides, areas[own], apart, least)
     if charts is None:
         return None
-    chart = np.empty(len(is_left), dtype=np.int64)
-    chart[own] = charts
-    chart[~is_left] = chart[source[~is_left]] + charts.max() + 1
+    chart = charts[np.searchsorted(own, source)] + np.where(is_left, 0, charts.max() + 1)
     chart = _joined_in_plane(mesh, whole, chart, pairs)
     if (chart[pairs[:, 0]] == chart[pairs[:, 1]]).any():
         return None
-    return glue_charts(mesh, whole.split(chart), costs).numbered_anew()
+    image = mirrored_edges(mesh, symmetry.mirror.partner)
+    return glue_charts(mesh, whole.split(chart), costs, image).numbered_anew()
 
 
 def _joined_in_plane(mesh: TriangleMesh, whole: Layout, chart: IntArray, pairs: IntArray) -> IntArray:
@@ -103,51 +106,57 @@ def no_mirrors(count: int) -> ChartMirrors:
     return ChartMirrors(np.full(count, -1), np.ones(count, dtype=np.complex128), np.nan)
 
 
-def mirror_charts(one: LaidOut) -> ChartMirrors:
+def mirrors_of(one: LaidOut) -> ChartMirrors:
     """Return the mirror images of a component's charts."""
     chart = np.zeros(len(one.corners), dtype=np.int64) if one.chart is None else one.chart
-    count = int(chart.max()) + 1
+    if one.symmetry is None or not one.symmetry.seams or one.lies_on is not None:
+        return no_mirrors(int(chart.max()) + 1)
+    layout = Layout(one.points, one.corners, chart)
+    return mirror_charts(one.mesh, layout, one.symmetry.symmetry.mirror.partner)
+
+
+def mirror_charts(mesh: TriangleMesh, layout: Layout, partner: IntArray) -> ChartMirrors:
+    """Return which charts of a layout are mirror images of each other.
+
+    partner: (n,) the mirror image of each vertex; a refinement has more vertices, of which nothing is known.
+    """
+    count = int(layout.chart.max()) + 1
     found = no_mirrors(count)
-    if one.symmetry is None or not one.symmetry.seams:
-        return found
-    partner = one.symmetry.symmetry.mirror.partner
-    point, of_chart = _single_points(one, chart, len(partner))
+    point, of_chart = _single_points(mesh, layout, len(partner))
     both = np.flatnonzero((point >= 0) & (point[partner] >= 0))
     here, there = of_chart[both], of_chart[partner[both]]
-    table = np.zeros((count, count))
-    np.add.at(table, (here, there), 1)
-    places = one.points @ np.array([1, 1j])
+    table = np.bincount(here * count + there, minlength=count * count).reshape(count, count)
     squares = 0.0
-    for c in range(count):
-        other = int(np.argmax(table[c]))
-        if table[c, other] == 0 or table[c, other] < MOSTLY * table[c].sum():
-            squares = np.inf
-            continue
+    for c, other in enumerate(np.argmax(table, axis=1).tolist()):
         some = both[(here == c) & (there == other)]
-        z, image = places[point[some]], places[point[partner[some]]]
-        z, image = z - z.mean(), image - image.mean()
-        total = (image * z).sum()
-        if not abs(total) > 0:
-            squares = np.inf
-            continue
-        factor = total / abs(total)
-        off = np.abs(image - factor * np.conj(z)) ** 2
-        if off.mean() <= ALIKE**2 * np.abs(z).max() ** 2:
+        z, image = layout.places[point[some]], layout.places[point[partner[some]]]
+        factor, off = _reflection(z, image)
+        is_image = len(some) > MOSTLY * table[c].sum() and off <= ALIKE * np.abs(z - z.mean()).max()
+        squares += len(some) * off**2 if is_image else np.inf
+        if is_image:
             found.partner[c], found.factor[c] = other, factor
-            squares += float(off.sum())
-        else:
-            squares = np.inf
-    return replace(found, off=float(np.sqrt(squares / max(len(both), 1) / one.area)))
+    area = float(np.abs(signed_double_areas(layout.points[layout.corners])).sum()) / 2
+    return replace(found, off=float(np.sqrt(squares / max(len(both), 1) / area)))
 
 
-def _single_points(one: LaidOut, chart: IntArray, count: int) -> tuple[IntArray, IntArray]:
+def _reflection(points: ComplexArray, images: ComplexArray) -> tuple[complex, float]:
+    """Return the factor of the reflection, of modulus 1, that brings points next to images, and how far off they are."""
+    if not len(points):
+        return 1.0, np.inf
+    points, images = points - points.mean(), images - images.mean()
+    total = (images * points).sum()
+    factor = total / abs(total) if abs(total) > 0 else 1.0
+    return factor, float(np.sqrt(np.mean(np.abs(images - factor * np.conj(points)) ** 2)))
+
+
+def _single_points(mesh: TriangleMesh, layout: Layout, count: int) -> tuple[IntArray, IntArray]:
     """Return (n,) the point of each vertex that has one only, -1 for others, and the chart that it is in."""
-    vertex, corner = one.mesh.faces.ravel(), one.corners.ravel()
-    low, high = np.full(len(one.mesh.vertices), len(one.points)), np.full(len(one.mesh.vertices), -1)
+    vertex, corner = mesh.faces.ravel(), layout.corners.ravel()
+    low, high = np.full(len(mesh.vertices), len(layout.points)), np.full(len(mesh.vertices), -1)
     np.minimum.at(low, vertex, corner)
     np.maximum.at(high, vertex, corner)
     of_chart = np.zeros(len(low), dtype=np.int64)
-    of_chart[vertex] = np.repeat(chart, 3)
+    of_chart[vertex] = np.repeat(layout.chart, 3)
     return np.where(low == high, low, -1)[:count], of_chart[:count]
 
 

@@ -59,7 +59,7 @@ def overlaid(laid_out: LaidOut, part: Component, options: Options) -> LaidOut:
 def _sources(laid_out: LaidOut) -> IntArray | None:
     """Return (m, 3) for faces on the right the corners on the left that they lie on, -1 on the left; None if not."""
     use = laid_out.symmetry
-    if use is None or not use.seams or use.symmetry.is_left is None or not use.symmetry.mirror.is_paired:
+    if use is None or not use.seams or use.symmetry.is_left is None or not use.symmetry.is_alike:
         return None
     is_left = use.symmetry.is_left
     if len(is_left) != len(laid_out.mesh.faces):  # a refinement has faces of its own

@@ -22,7 +22,8 @@ SAME = 1e-6
 # Farthest vertices, and how many of them on either end, that are taken for images of each other.
 FARTHEST, RIVALS = 1e-3, 6
 # Of the shortest edge around: how far the image of a vertex may be from the vertex that it is the image of.
-PAIRED = 0.05
+# Nearly all are as near as that, and none is farther than this.
+PAIRED, HARDLY, MOSTLY = 0.05, 0.45, 0.95
 # Candidates that are fitted, the best before.
 FITTED = 6
 # Cosine of the angle by which a plane may be off the normal that was given, 10 degrees.
@@ -128,7 +129,9 @@ def _as_mirror(
     shortest = np.full(len(points), np.inf)
     sides = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     np.minimum.at(shortest, mesh.edges.ravel(), np.repeat(sides, 2))
-    is_paired = bool((partner[partner] == own).all() and (distance <= PAIRED * shortest).all())
+    is_near = distance <= PAIRED * shortest
+    is_paired = (partner[partner] == own).all() and is_near.mean() > MOSTLY
+    is_paired = bool(is_paired and (distance <= HARDLY * shortest).all())
     faces = _face_partner(mesh, partner) if is_paired else None
     if is_paired:
         normal, offset = _best_plane(points, points[partner], np.full(len(points), 1 / len(points)))

@@ -37,6 +37,13 @@ class Symmetry:
     on_plane: BoolArray
     is_named: bool
 
+    @property
+    def is_alike(self) -> bool:
+        """Whether each side is the mirror image of the other, vertex for vertex."""
+        return bool(
+            self.is_left is not None and self.mirror.is_paired and self.mirror.own[self.on_plane].all()
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class SymmetryUse:

@@ -12,7 +12,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..atlas import part_touching
 from ..atlas.arrange import arrange_charts
-from ..atlas.mirrored import ChartMirrors, mirror_charts, no_mirrors
+from ..atlas.mirrored import ChartMirrors, mirrors_of
 from ..geometry.planar import sides_between
 from ..input.numbering import result_numbering, turn_corners
 from ..input.polygons import Polygons
@@ -131,9 +131,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     triangles = _sort_triangles(prepared, laid_out, numbering)
     corners_in_space = numbering.positions[triangles.faces]
     with stages("pack"):
-        mirrors = [
-            mirror_charts(one) if one.lies_on is None else no_mirrors(_chart_count(one)) for one in laid_out
-        ]
+        mirrors = [mirrors_of(one) for one in laid_out]
         layout = _pack(laid_out, mirrors, triangles, corners_in_space, options)
     refined = any(one.statistics.refined_triangles for one in laid_out)
     face_corners = (
@@ -346,10 +344,6 @@ def _laid_on(uv: FloatArray, lies_on: IntArray, apart: float) -> FloatArray:
     placed = uv[lies_on]
     inside = apart if placed.max() + apart <= np.ceil(placed.max()) else -apart
     return np.asarray(placed + inside * (lies_on != np.arange(len(uv)))[:, None])
-
-
-def _chart_count(one: LaidOut) -> int:
-    return 1 if one.chart is None else int(one.chart.max()) + 1
 
 
 def _longest_side(corner_uv: FloatArray) -> float:

@@ -120,8 +120,9 @@ class _Cutting:
         self.image = mirrored_edges(mesh, mirror.partner)
         self.is_forbidden = _marked(len(mesh.edges), forbidden)
         # Seams without a mirror image, or with one that is forbidden, are none.
-        alone = (self.image < 0) & mirror.is_paired
-        self.is_dear = self.is_forbidden | (mirror.is_paired & ~alone & self.is_forbidden[self.image])
+        self.are_images = bool(mirror.is_paired and mirror.own[mesh.edges[self.curve]].all())
+        alone = (self.image < 0) & self.are_images
+        self.is_dear = self.is_forbidden | (self.are_images & ~alone & self.is_forbidden[self.image])
         self.is_avoided = is_avoided | alone
 
     def whole_curve(self, tries: int) -> list[_Symmetric]:
@@ -258,7 +259,7 @@ class _Cutting:
     def _mirrored(self, on_left: IntArray, find: Callable[[FloatArray], Found]) -> IntArray | Found:
         """Return the mirror image of seams, or what is found near it if edges have none."""
         image = self.image[on_left]
-        if (image >= 0).all() and np.isin(image, self.halves[1].edges).all():
+        if self.are_images and (image >= 0).all():
             return image
         return find(self.costs * _astray(self.mesh, self.mirror, on_left))
 
