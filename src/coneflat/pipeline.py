@@ -17,7 +17,7 @@ from .flat.held_cones import unheld_notes, with_held_cones
 from .flat.methods import find_metric, turning_meter
 from .geometry.operators import weighted_areas
 from .input.components import Component, Prepared, prepare
-from .input.symmetry import SymmetryUse, are_mirrored, check_symmetry, find_symmetry
+from .input.symmetry import SymmetryUse, are_mirrored, check_symmetry, find_symmetry, symmetry_notes
 from .layout.disk import cutting
 from .options import UNFOLDED, Options, read_options, takes
 from .progress import Stages
@@ -88,7 +88,7 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
             part_charts = overlaid if options.mirrored == "overlap" else without_overlaps
             layout = part_charts(layout, part, options)
     reached = layout.statistics.area_distortion_linear
-    notes = cone_notes(mesh, len(layout.cones), reached, options)
+    notes = cone_notes(mesh, len(layout.cones), reached, options) + symmetry_notes(layout.symmetry)
     if options.method in UNFOLDED:
         notes += unheld_notes(layout, part.constraints.names)
     return replace(layout, notes=layout.notes + notes)

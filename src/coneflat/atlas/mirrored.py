@@ -140,7 +140,7 @@ def mirror_charts(mesh: TriangleMesh, layout: Layout, partner: IntArray) -> Char
 
 
 def _reflection(points: ComplexArray, images: ComplexArray) -> tuple[complex, float]:
-    """Return the factor of the reflection, of modulus 1, that brings points next to images, and how far off they are."""
+    """Return the factor, of modulus 1, of the reflection that brings points next to images, and how far off it is."""
     if not len(points):
         return 1.0, np.inf
     points, images = points - points.mean(), images - images.mean()

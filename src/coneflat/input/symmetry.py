@@ -96,6 +96,20 @@ def are_mirrored(symmetry: Symmetry, cones: IntArray, curvatures: FloatArray) ->
     return bool((off | np.isin(cones, paired) | np.isin(cones, partner[paired])).all())
 
 
+def symmetry_notes(use: SymmetryUse | None) -> tuple[str, ...]:
+    """Return what was not made symmetric although the model is."""
+    if use is None or (use.cones and use.seams):
+        return ()
+    if not use.cones:
+        return (
+            "The model is symmetric, its cones and seams are not: cones that are given, required, of whole quanta or "
+            "greedy are as they are, and others must not take many more.",
+        )
+    return (
+        "The model and its cones are symmetric, its seams are not: such would be much longer, or need forbidden edges.",
+    )
+
+
 def check_symmetry(parts: Sequence[Component], options: Options) -> None:
     """Raise OptionError if a plane is named about which no component is symmetric."""
     axis = AXES.get(options.symmetric)

@@ -124,14 +124,14 @@ class _Cutting:
         alone = (self.image < 0) & self.are_images
         self.is_dear = self.is_forbidden | (self.are_images & ~alone & self.is_forbidden[self.image])
         self.is_avoided = is_avoided | alone
+        self.dear = np.where(self.is_dear, edge_costs + edge_costs.sum(), edge_costs)
 
     def whole_curve(self, tries: int) -> list[_Symmetric]:
         """Return seams along all of the plane but one of the dearest stretches, branches beginning where they like."""
         on_left = self._open(0, self.costs)
         branches = np.concatenate([on_left, self._mirrored(on_left, lambda costs: self._open(1, costs))])
         stretch = self._stretches(self.curve, branches)
-        costs = self.costs[self.curve] + np.where(self.is_dear[self.curve], self.costs.sum(), 0.0)
-        dearest = np.argsort(-np.bincount(stretch, costs), kind="stable")[:tries]
+        dearest = np.argsort(-np.bincount(stretch, self.dear[self.curve]), kind="stable")[:tries]
         return [self._seams(self.curve[stretch != gap], branches) for gap in dearest]
 
     def between_cones(self, tries: int) -> list[_Symmetric]:
@@ -142,7 +142,7 @@ class _Cutting:
         if not self.is_simple:
             return []
         stretch = self._stretches(self.curve, self.curve[:0])
-        dearest = np.argsort(-np.bincount(stretch, self.costs[self.curve]), kind="stable")[:tries]
+        dearest = np.argsort(-np.bincount(stretch, self.dear[self.curve]), kind="stable")[:tries]
         whole = _Symmetric(self.curve, self.curve[:0], np.inf)
         found = [self._without(whole, self.curve[stretch == gap]) for gap in dearest]
         return [each for each in found if each is not None]
@@ -193,7 +193,8 @@ class _Cutting:
         along = np.setdiff1d(found.along, stretch)
         closed = _marked(len(mesh.vertices), mesh.edges[self.curve].ravel())
         closed &= ~_marked(len(closed), mesh.edges[along].ravel()) & ~mesh.is_boundary_vertex
-        if closed[self.cones].any() or not (len(along) or mesh.is_boundary_vertex.any()):
+        is_tied = len(along) > 0 or bool(mesh.is_boundary_vertex.any())
+        if not is_tied or closed[self.cones].any() or self.is_dear[along].any():
             return None
         on_left = self._open_beside(0, along, closed, self.costs)
         if on_left is None:
@@ -245,7 +246,7 @@ class _Cutting:
 
     def _seams(self, along: IntArray, branches: IntArray) -> _Symmetric:
         along = self._without_loose_ends(along, branches)
-        return _Symmetric(along, branches, float(self.costs[along].sum() + self.costs[branches].sum()))
+        return _Symmetric(along, branches, float(self.dear[along].sum() + self.dear[branches].sum()))
 
     def _open(self, side: int, costs: FloatArray) -> IntArray:
         """Return the edges that cut a half to a disk with its cones on the border."""
