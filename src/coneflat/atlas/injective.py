@@ -30,6 +30,8 @@ MANY = 64
 SLIVER = 0.001
 # So many charts more there may be for the two sides of a symmetric model to be alike.
 MORE_ALIKE = 2
+# Of the root of the area: charts that are off their mirror images by less look symmetric.
+SEEN = 0.005
 
 
 def injective_charts(
@@ -77,7 +79,7 @@ def injective_charts(
         # Whatever is most alike on both sides.
         partner = symmetry.mirror.partner
         off = mirror_charts(mesh, best, partner).off
-        for part in LEAST_PARTS:
+        for part in LEAST_PARTS if off > SEEN else ():
             least = part * float(np.abs(areas).sum())
             alike = split_alike(mesh, whole, lengths, np.abs(areas), pairs, symmetry, least)
             if alike is None:

@@ -14,9 +14,9 @@ from .operators import vertex_areas
 from .ties import own_axes, tie_key
 
 # Points of a surface by which planes are compared; more only tell the same.
-SAMPLES = 1500
+SAMPLES = 800
 # Steps of fitting a plane to points and the points nearest to their mirror images; most come to rest after ten.
-STEPS, FINISH = 25, 6
+FIRST_STEPS, STEPS, FINISH = 4, 20, 6
 # Relative to the size: planes are the same, and a fit is at rest, within so much.
 SAME = 1e-6
 # Farthest vertices, and how many of them on either end, that are taken for images of each other.
@@ -25,7 +25,9 @@ FARTHEST, RIVALS = 1e-3, 6
 # Nearly all are as near as that, and none is farther than this.
 PAIRED, HARDLY, MOSTLY = 0.05, 0.45, 0.95
 # Candidates that are fitted, the best before.
-FITTED = 6
+FITTED, FINISHED = 6, 3
+# Roots of the largest area of a vertex by which an image may be farther from the next vertex than from the surface.
+NEAR_VERTEX = 3.0
 # Cosine of the angle by which a plane may be off the normal that was given, 10 degrees.
 NEARLY = float(np.cos(np.radians(10)))
 # Of the area off a plane of symmetry, what is on either side at least: a flat surface lies in its own plane.
@@ -90,13 +92,19 @@ def find_mirror(
     weights = share[some] / share[some].sum()
     given = [normal] if normal is not None else list(_candidates(points, share))
     normals = np.array(given) / np.linalg.norm(given, axis=1)[:, None]
-    rough = [_rms(tree.query(_mirrored(points[some], n, 0.0))[0], weights) for n in normals]
+    rough = [(_from_vertices(points, tree, some, weights, n, 0.0), (n, 0.0)) for n in normals]
+    # Most candidates are soon seen to lead nowhere.
+    for steps, kept in ((FIRST_STEPS, FITTED), (STEPS, FINISHED)):
+        rough = sorted(rough, key=lambda each: each[0])[:kept]
+        planes = [_fit(points, tree, some, weights, plane[0], steps, plane[1]) for _, plane in rough]
+        rough = [(_from_vertices(points, tree, some, weights, *plane), plane) for plane in planes]
+    longest = float(np.sqrt(areas.max()) / size)
     fits = []
-    for i in np.argsort(rough, kind="stable")[:FITTED]:
-        plane = _fit(points, tree, some, weights, normals[i], STEPS)
-        if normal is not None and abs(plane[0] @ normals[i]) < NEARLY:
-            plane = normals[i], 0.0
-        if _has_sides(points, share, *plane):
+    for off, plane in rough:
+        if normal is not None and abs(plane[0] @ normals[0]) < NEARLY:
+            off, plane = 0.0, (normals[0], 0.0)
+        # A surface is nearer than its vertices, but not by more than a few edges.
+        if off <= 1.5 * tolerance + NEAR_VERTEX * longest and _has_sides(points, share, *plane):
             fits.append((_deviation(mesh, points, tree, some, weights, *plane), plane))
     best = min((fit[0] for fit in fits), default=np.inf)
     # A sample tells no more than this.
@@ -238,6 +246,13 @@ def _turned(
     axis = np.argmax(np.abs(normal) > 0.5 * np.abs(normal).max())
     sign = np.sign(skew) if abs(skew) > SAME else np.sign(normal[axis])
     return normal * sign, offset * sign
+
+
+def _from_vertices(
+    points: FloatArray, tree: cKDTree, some: IntArray, weights: FloatArray, normal: FloatArray, offset: float
+) -> float:
+    """Return the root mean square of the distance of mirrored points from the vertices next to them."""
+    return _rms(tree.query(_mirrored(points[some], normal, offset))[0], weights)
 
 
 def _deviation(
