@@ -301,6 +301,14 @@ def test_real_models(shared, name):
     assert result.distortion.angle_sum_error < 1e-9
 
 
+def test_cones_of_a_rough_model_are_different_vertices(shared):
+    """Nearest vertices of images need not be images of each other: no vertex may be in two pairs."""
+    result = flatten(shared("knight.off"), symmetric="x")
+    assert result.symmetry[0].cones
+    assert len(set(result.cones.tolist())) == len(result.cones)
+    assert_allclose(result.curvatures.sum(), 4 * np.pi, rtol=1e-9)
+
+
 def test_the_report_and_archives_tell_of_it(tmp_path):
     from coneflat import read_flattening
 

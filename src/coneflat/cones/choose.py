@@ -37,9 +37,9 @@ FEW, FLAT = 24, 1e-6
 NARROWLY = 1e-3
 # How much larger E may get for the sake of rotations along handles.
 DEARER = 1.15
-# So many cones more, at least and as a share of them, may be spent on symmetry; of a given number, E may be worse by
-# this factor.
-LEAST_MORE, MORE, WORSE = 1, 0.15, 1.1
+# So many cones more, at least and as a share of them, may be spent on symmetry, and on one that is asked for; of a
+# given number, E may be worse by this factor.
+LEAST_MORE, MORE, NAMED_MORE, WORSE = 1, 0.15, 0.5, 1.1
 
 #: Returns what loops across the handles turn by in the metric that a solution leads to, radians.
 Turned: TypeAlias = Callable[[ConeSolution], FloatArray]
@@ -200,7 +200,8 @@ def mirrored_cones(
 
     given, cones = options.cone_count, found.solution.cones
     goal = max(options.distortion, found.distortion) if given is None else WORSE * found.distortion
-    most = given if given is not None else len(cones) + max(LEAST_MORE, int(MORE * len(cones)))
+    more = NAMED_MORE if symmetry.is_named else MORE
+    most = given if given is not None else len(cones) + max(LEAST_MORE, int(more * len(cones)))
     if given is None and options.max_cones is not None:
         most = min(most, options.max_cones)
     mirrored = MirroredSearch(search, symmetry.mirror.partner, symmetry.on_plane, constraints.is_allowed)

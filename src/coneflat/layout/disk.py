@@ -67,7 +67,8 @@ def cut_to_disk(
     seams = find_seams(*given[:-1], forbidden=given[-1])
     if mirrored is not None and costs[mirrored.seams].sum() <= LONGER * costs[seams].sum():
         return mirrored
-    return Disk(cut_open(part.mesh, seams).mesh, seams)
+    # What needs no seams has none that are not symmetric.
+    return Disk(cut_open(part.mesh, seams).mesh, seams, symmetry is not None and not len(seams))
 
 
 def _mirrored(

@@ -80,9 +80,9 @@ class MirroredSearch:
         usable = usable & ~search.is_boundary
         may = usable[vertices]
         self._single = may & on_plane[vertices]
-        # Of a pair that is not one of images of each other, its second member is what the first says.
+        # Images of each other, so that no vertex is in two pairs.
         self._pair = may & ~on_plane[vertices] & (image >= 0) & may[image] & (image != np.arange(len(image)))
-        self._pair &= ~self._single[image]
+        self._pair &= ~self._single[image] & (image[image] == np.arange(len(image)))
         self._image = np.where(self._single, np.arange(len(image)), image)
         # The pairs and single unknowns tried on the mesh so far.
         self._own: IntArray = np.empty((0, 2), dtype=np.int64)
