@@ -17,6 +17,7 @@ from coneflat.options.declared import (
     MetricOptions,
     RunOptions,
     SeamOptions,
+    SymmetryOptions,
 )
 from coneflat.options.kinds import (
     Choice,
@@ -33,7 +34,7 @@ from coneflat.options.kinds import (
 )
 
 #: As people think of them; each group's docstring is its title.
-GROUPS = (ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
+GROUPS = (ConeOptions, MetricOptions, SeamOptions, SymmetryOptions, AtlasOptions, RunOptions)
 
 
 def flag_tables() -> str:

@@ -213,6 +213,24 @@ def gallery_figure(model: str, measured: Measured) -> Any:
     return compose([Row(panels)], dpi=GALLERY_DPI, width=8.0)
 
 
+def symmetric_figure(measured: Measured) -> Any:
+    """Return a figure of a head and a body with symmetric cones and seams, and of their layouts."""
+    rows = []
+    for model in ("camelhead", "human"):
+        result = coneflat.flatten(measured.path(model), symmetric="auto")
+        panels = [
+            Panel(
+                view_aspect(result.vertices, eye, "y"),
+                partial(coneflat.draw_cones, result, eye=eye, up="y", dpi=GALLERY_DPI),
+            )
+            for eye in ("front", "back")
+        ]
+        layout = partial(coneflat.draw_layout, result, edges=False, color_charts=True, crop=True)
+        panels.append(Panel(layout_aspect(result, crop=True), layout))
+        rows.append(Row(panels))
+    return compose(rows, dpi=GALLERY_DPI, width=8.0, marks=mark_handles(result))
+
+
 def kind_figure(model: str, kind: str, measured: Measured) -> Any:
     """Return a figure of a kind."""
     look = LOOKS[model]
@@ -345,6 +363,7 @@ PICTURES: dict[str, tuple[tuple[str, ...], Callable[[Measured], Any]]] = {
     **{f"{model}-{kind}": ((model,), partial(kind_figure, model, kind)) for model in LOOKS for kind in KINDS},
     **{f"{model}-curve": ((model,), partial(curve_figure, model)) for model in LOOKS},
     "atlas-models": (tuple(ATLAS_MODELS), atlases_figure),
+    "symmetric": (("camelhead", "human"), symmetric_figure),
     "methods": (("rocker-arm",), methods_figure),
     "tradeoff": (TRADED, tradeoff_figure),
 }

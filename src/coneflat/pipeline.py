@@ -10,6 +10,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from .atlas.injective import without_overlaps
+from .atlas.overlaid import overlaid
 from .cones.choose import Surface, choose_cones, cone_notes, pursues
 from .errors import CurvatureError, MetricError, SeamError
 from .flat import LaidOut
@@ -19,6 +20,7 @@ from .flat.more_cones import with_quality
 from .flat.relaxed import relaxed, relaxes
 from .geometry.operators import weighted_areas
 from .input.components import Component, Prepared, prepare
+from .input.symmetry import SymmetryUse, are_mirrored, check_symmetry, find_symmetry, symmetry_notes
 from .layout.disk import cutting
 from .options import UNFOLDED, Options, read_options, takes
 from .progress import Stages
@@ -53,6 +55,7 @@ def flatten_as(mesh: Any, faces: ArrayLike | None, options: Options) -> Flatteni
     stages = Stages(options.progress)
     with stages("check"):
         prepared = prepare(mesh, faces, options)
+        check_symmetry(prepared.components, options)
     with one_blas_thread(), solving(options.solver) as solvers:
         flat = list(_flat_components(prepared, options, stages))
     return replace(assemble(prepared, flat, options, stages), solvers=tuple(solvers.used))
@@ -63,19 +66,23 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     mesh = part.mesh
     with stages("cones", 0.1):
         surface = Surface.of(mesh, part.lengths)
+        symmetry = find_symmetry(part, options)
 
     def flatten_once(part: Component, options: Options) -> LaidOut:
         with stages("cones", 0.4):
             turned = turning_meter(surface, part.constraints, options)
-            cones = choose_cones(surface, part.constraints, options, stages, turned)
-        with cutting(part, cones, options) as being_cut:
+            cones = choose_cones(surface, part.constraints, options, stages, turned, symmetry)
+            is_mirrored = symmetry is not None and are_mirrored(symmetry, cones.cones, cones.curvatures)
+        with cutting(part, cones, options, symmetry if is_mirrored else None) as being_cut:
             with stages("metric", 0.75):
                 metric = find_metric(surface, cones, part.constraints, options)
             with stages("cut", 0.85):
                 disk = being_cut.result()
         with stages("layout", 0.95):
             areas = weighted_areas(surface.areas, part.constraints.weights)
-            return metric.lay_out(disk.mesh, disk.seams).with_area_distortion(cones.log_scale, areas)
+            laid_out = metric.lay_out(disk.mesh, disk.seams).with_area_distortion(cones.log_scale, areas)
+            use = None if symmetry is None else SymmetryUse(symmetry, is_mirrored, disk.is_symmetric)
+            return replace(laid_out, symmetry=use)
 
     def flatten_by(options: Options) -> LaidOut:
         once = partial(flatten_once, options=options)
@@ -89,9 +96,10 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     layout = with_quality(flatten_by, part, options)
     if options.charts == "atlas":
         with stages("atlas", 1.0):
-            layout = without_overlaps(layout, part, options)
+            part_charts = overlaid if options.mirrored == "overlap" else without_overlaps
+            layout = part_charts(layout, part, options)
     reached = layout.statistics.area_distortion_linear
-    notes = cone_notes(mesh, len(layout.cones), reached, options)
+    notes = cone_notes(mesh, len(layout.cones), reached, options) + symmetry_notes(layout.symmetry)
     if options.method in UNFOLDED:
         notes += unheld_notes(layout, part.constraints.names)
     return replace(layout, notes=layout.notes + notes)

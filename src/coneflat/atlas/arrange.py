@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..geometry.planar import signed_double_areas
 from .charts import Charts, read_charts
+from .mirrored import ChartMirrors, upright_angles
 from .orient import border_directions, mean_rise, orient_charts, straight_angles
 from .pack import MOST_TURNS, QUARTERS, Packed, pack_charts
 from .straight import along_axes
@@ -27,6 +30,7 @@ def arrange_charts(
     tiles: int,
     up: tuple[float, float, float] | None = None,
     quantum: float | None = None,
+    mirrors: Sequence[ChartMirrors] = (),
 ) -> Packed:
     """Return charts packed into a texture.
 
@@ -39,6 +43,8 @@ def arrange_charts(
         up: direction in space that is to be v; None to fill the texture best.
         quantum: the charts of a component are turned against each other by multiples of this angle only, so that the
             rotations between the sides of seams stay such multiples; None for any angle.
+        mirrors: of all components, one after the other, which charts are mirror images of each other; axes of symmetry
+            stand upright then, and none is turned to fill the texture.
     """
     flat = _upright(corner_uv, chart)
     rotate: str | int = "any" if up is None else "none"
@@ -46,9 +52,24 @@ def arrange_charts(
         turns = whole_turns(quantum)
         flat = _turned_together(read_charts(flat, chart), component, turns, space, up)
         rotate = turns if up is None else "none"
+    elif any((each.partner >= 0).any() for each in mirrors):
+        flat = _turned_upright(read_charts(flat, chart), mirrors, space, up)
+        rotate = "none"
     elif up is not None:
         flat = orient_charts(flat, chart, corners=space, up=up)
     return pack_charts(flat, chart, rotate=rotate, resolution=resolution, padding=padding, tiles=tiles)
+
+
+def _turned_upright(
+    charts: Charts, mirrors: Sequence[ChartMirrors], space: FloatArray, up: tuple[float, float, float] | None
+) -> FloatArray:
+    """Return (m, 3, 2) charts whose axes of symmetry stand upright, pairs mirrored; the others straight."""
+    outlines = charts.outlines()
+    angles, rise = straight_angles(charts, outlines, border_directions(outlines)), None
+    if up is not None:
+        rise = mean_rise(charts, space, up)
+        angles += _best_turn(rise * np.exp(1j * angles), np.ones((charts.count, QUARTERS), dtype=bool))
+    return charts.moved(np.exp(1j * upright_angles(mirrors, angles, rise)))
 
 
 def whole_turns(quantum: float) -> int:

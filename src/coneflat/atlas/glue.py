@@ -19,29 +19,34 @@ from .chart_seams import Layout, Seams, same_points
 CONGRUENT = 1e-7
 
 
-def glue_charts(mesh: TriangleMesh, layout: Layout, lengths: FloatArray) -> Layout:
+def glue_charts(
+    mesh: TriangleMesh, layout: Layout, lengths: FloatArray, image: IntArray | None = None
+) -> Layout:
     """Return a layout with fewer charts and shorter seams, of which none overlaps itself if none did before.
 
     Args:
         mesh: the mesh, whose faces are laid out.
         layout: its charts.
         lengths: (e,) of the edges on the model: the longest seams are glued first.
+        image: (e,) the mirror image of each edge of a symmetric mesh, -1 where there is none: what is glued on one side
+            is on the other, too, or not at all. None if there is no symmetry to keep.
     """
     seams = Seams(mesh, layout)
     inner = np.flatnonzero(seams.charts[:, 0] == seams.charts[:, 1])
     layout = layout.joined(seams.coinciding(layout.places, inner, CONGRUENT))
     refused: set[tuple[int, ...]] = set()
-    gluing = _Gluing(mesh, layout)
+    gluing = _Gluing(mesh, layout, image)
     # What is glued changes which seams are stretches of one.
     while gluing.glue_longest(lengths, refused):
-        gluing = _Gluing(mesh, gluing.layout)
+        gluing = _Gluing(mesh, gluing.layout, image)
     return gluing.layout
 
 
 class _Gluing:
     """Charts of a layout that are glued one by one, at the expense of what is near only."""
 
-    def __init__(self, mesh: TriangleMesh, layout: Layout) -> None:
+    def __init__(self, mesh: TriangleMesh, layout: Layout, image: IntArray | None) -> None:
+        self.image = image
         self.seams, self.places = Seams(mesh, layout), layout.places
         between = np.flatnonzero(self.seams.charts[:, 0] != self.seams.charts[:, 1])
         stretches = _members(self.seams.stretches(mesh)[between], between)
@@ -74,11 +79,34 @@ class _Gluing:
             )
             if one == other or key in refused:
                 continue
-            if self._glue_at(members):
+            if self._glue_alike(members):
                 glued = True
             else:
                 refused.add(key)
         return glued
+
+    def _glue_alike(self, members: IntArray) -> bool:
+        """Glue two charts at a stretch of seam, and their mirror images at its own; return whether both fit."""
+        if self.image is None:
+            return self._glue_at(members)
+        wanted = self.image[self.seams.edges[members]]
+        mirrored = np.flatnonzero(np.isin(self.seams.edges, wanted))
+        if len(mirrored) < len(members):
+            return False
+        seams = self.seams
+        before = self.places, self.corners, seams.here, seams.there
+        changed = seams.charts.copy(), self.chart.copy(), self.low.copy(), self.high.copy()
+        faces = list(self.faces)
+        if not self._glue_at(members):
+            return False
+        one, other = seams.charts[mirrored[0]]
+        # A stretch in the plane of symmetry is its own image.
+        if one == other or self._glue_at(mirrored):
+            return True
+        self.places, self.corners, seams.here, seams.there = before
+        seams.charts, self.chart, self.low, self.high = changed
+        self.faces = faces
+        return False
 
     def _glue_at(self, members: IntArray) -> bool:
         """Move the smaller of two charts to continue the other, if it fits there; return whether it does."""

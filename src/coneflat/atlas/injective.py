@@ -11,10 +11,12 @@ from ..flat import LaidOut
 from ..geometry.overlap import find_overlaps
 from ..geometry.planar import signed_double_areas
 from ..input.components import Component, seam_costs
+from ..input.symmetry import Symmetry
 from ..mesh import TriangleMesh
 from ..options import Options
 from .chart_seams import Layout, Seams
 from .glue import glue_charts
+from .mirrored import mirror_charts, split_alike
 from .split import split_overlaps
 
 # Parts of the area that charts should have at least. Where the cheapest cuts leave several charts, dearer ones that
@@ -26,10 +28,18 @@ LARGE = 50_000
 MANY = 64
 # Below this part of the area a chart is a sliver.
 SLIVER = 0.001
+# So many charts more there may be for the two sides of a symmetric model to be alike.
+MORE_ALIKE = 2
+# Of the root of the area: charts that are off their mirror images by less look symmetric.
+SEEN = 0.005
 
 
 def injective_charts(
-    mesh: TriangleMesh, points: FloatArray, corners: IntArray, lengths: FloatArray
+    mesh: TriangleMesh,
+    points: FloatArray,
+    corners: IntArray,
+    lengths: FloatArray,
+    symmetry: Symmetry | None = None,
 ) -> Layout:
     """Return a layout of a connected mesh in charts that do not overlap themselves.
 
@@ -41,6 +51,7 @@ def injective_charts(
         points: (u, 2) of the plane, at the mesh's scale.
         corners: (m, 3) the point of each triangle corner; one disk.
         lengths: (e,) of the edges, which cuts and seams cost.
+        symmetry: of mesh and layout; charts are split alike on both sides then, if that takes few more of them.
     """
     whole = Layout(points, corners, np.zeros(len(corners), dtype=np.int64))
     areas = signed_double_areas(points[corners])
@@ -59,25 +70,52 @@ def injective_charts(
         if chart is None:
             continue
         layout = glue_charts(mesh, whole.split(chart), lengths).numbered_anew()
-        sizes = np.bincount(layout.chart, weights=np.abs(areas))
-        slivers = int((sizes < SLIVER * sizes.sum()).sum())
-        length = float(lengths[Seams(mesh, layout).edges].sum())
-        found.append(((slivers, len(sizes), length), len(found), layout))
-        if len(sizes) == 1 or (not slivers and len(corners) > LARGE):
+        rank = _rank(mesh, layout, np.abs(areas), lengths)
+        found.append((rank, len(found), layout))
+        if rank[1] == 1 or (not rank[0] and len(corners) > LARGE):
             break
-    return min(found, key=lambda one: one[:2])[2]
+    (slivers, count, _), _, best = min(found, key=lambda one: one[:2])
+    if symmetry is not None:
+        # Whatever is most alike on both sides.
+        partner = symmetry.mirror.partner
+        off = mirror_charts(mesh, best, partner).off
+        for part in LEAST_PARTS if off > SEEN else ():
+            least = part * float(np.abs(areas).sum())
+            alike = split_alike(mesh, whole, lengths, np.abs(areas), pairs, symmetry, least)
+            if alike is None:
+                continue
+            more_slivers, more, _ = _rank(mesh, alike, np.abs(areas), lengths)
+            alike_off = mirror_charts(mesh, alike, partner).off
+            if more_slivers <= slivers and more <= count + MORE_ALIKE and alike_off < off:
+                best, off = alike, alike_off
+    return best
+
+
+def _rank(
+    mesh: TriangleMesh, layout: Layout, areas: FloatArray, lengths: FloatArray
+) -> tuple[int, int, float]:
+    """Return the number of slivers, that of charts, and the length of seams."""
+    sizes = np.bincount(layout.chart, weights=areas)
+    slivers = int((sizes < SLIVER * sizes.sum()).sum())
+    return slivers, len(sizes), float(lengths[Seams(mesh, layout).edges].sum())
+
+
+def cut_costs(laid_out: LaidOut, part: Component, options: Options) -> FloatArray:
+    """Return (e,) what cuts along the edges of a layout cost."""
+    mesh = laid_out.mesh
+    if mesh is not part.mesh:  # a refinement has edges of its own
+        ends = mesh.vertices[mesh.edges]
+        return np.sqrt(dots(ends[:, 1] - ends[:, 0], ends[:, 1] - ends[:, 0]))
+    costs, avoided, forbidden = seam_costs(part, options)
+    return np.where(avoided | forbidden, costs + costs.sum(), costs)
 
 
 def without_overlaps(laid_out: LaidOut, part: Component, options: Options) -> LaidOut:
     """Return the layout split, as little as can be, into charts that do not overlap themselves."""
-    mesh = laid_out.mesh
-    if mesh is part.mesh:
-        costs, avoided, forbidden = seam_costs(part, options)
-        costs = np.where(avoided | forbidden, costs + costs.sum(), costs)
-    else:  # a refinement has edges of its own
-        ends = mesh.vertices[mesh.edges]
-        costs = np.sqrt(dots(ends[:, 1] - ends[:, 0], ends[:, 1] - ends[:, 0]))
-    charts = injective_charts(mesh, laid_out.points, laid_out.corners, costs)
+    mesh, use = laid_out.mesh, laid_out.symmetry
+    symmetry = use.symmetry if use is not None and use.seams and mesh is part.mesh else None
+    costs = cut_costs(laid_out, part, options)
+    charts = injective_charts(mesh, laid_out.points, laid_out.corners, costs, symmetry)
     return replace(
         laid_out,
         points=charts.points,

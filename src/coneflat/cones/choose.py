@@ -14,6 +14,7 @@ from ..geometry import angle_defect, corner_angles, cotangent_laplacian, cotange
 from ..geometry.operators import vertex_areas
 from ..geometry.ties import tie_key
 from ..input.constraints import Constraints
+from ..input.symmetry import Symmetry
 from ..mesh import TriangleMesh
 from ..options import Options
 from ..progress import Stages
@@ -22,7 +23,7 @@ from ..threads import HUGE
 from . import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
 
 if TYPE_CHECKING:
-    from .sparse import ConeSearch
+    from .sparse import ConeSearch, SparseCones
 
 # The angle of a cone for which each triangle around it has room on its straight sides: less than half a turn, as not
 # all of them can be spread alike.
@@ -36,6 +37,9 @@ FEW, FLAT = 24, 1e-6
 NARROWLY = 1e-3
 # How much larger E may get for the sake of rotations along handles.
 DEARER = 1.15
+# So many cones more, at least and as a share of them, may be spent on symmetry, and on one that is asked for; of a
+# given number, E may be worse by this factor.
+LEAST_MORE, MORE, NAMED_MORE, WORSE = 1, 0.15, 0.5, 1.1
 
 #: Returns what loops across the handles turn by in the metric that a solution leads to, radians.
 Turned: TypeAlias = Callable[[ConeSolution], FloatArray]
@@ -95,13 +99,23 @@ def has_many_handles(mesh: TriangleMesh, options: Options) -> bool:
 
 
 def choose_cones(
-    surface: Surface, constraints: Constraints, options: Options, stages: Stages, turned: Turned | None = None
+    surface: Surface,
+    constraints: Constraints,
+    options: Options,
+    stages: Stages,
+    turned: Turned | None = None,
+    symmetry: Symmetry | None = None,
 ) -> ConeSolution:
-    """Return cones with their curvatures and linear log scale; `turned` is asked where these are quantised."""
+    """Return cones with their curvatures and linear log scale; `turned` is asked where these are quantised.
+
+    With a symmetry they are mirrored if few more do as well.
+    """
     mesh = surface.mesh
     if pursues(mesh, options):
         corners = corners_alone(surface, constraints, options)
-        return _pursued(surface, constraints, options, stages, turned) if corners is None else corners
+        return (
+            _pursued(surface, constraints, options, stages, turned, symmetry) if corners is None else corners
+        )
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     is_greedy = options.cone_choice == "greedy" or has_many_handles(mesh, options)
     if is_greedy:
@@ -141,7 +155,12 @@ def corners_alone(surface: Surface, constraints: Constraints, options: Options) 
 
 
 def _pursued(
-    surface: Surface, constraints: Constraints, options: Options, stages: Stages, turned: Turned | None
+    surface: Surface,
+    constraints: Constraints,
+    options: Options,
+    stages: Stages,
+    turned: Turned | None,
+    symmetry: Symmetry | None,
 ) -> ConeSolution:
     """Return the fewest cones for the distortion allowed, or the best of the number asked for."""
     from ..geometry.handles import open_turning
@@ -157,6 +176,8 @@ def _pursued(
     distortion, count = options.distortion, options.cone_count
     if options.quantise is None:
         sparse = search.fewest(distortion, options.max_cones) if count is None else search.best_of(count)
+        if symmetry is not None and not len(constraints.required):
+            sparse = mirrored_cones(search, sparse, symmetry, constraints, options)
         found = sparse.solution
     else:
         quantised = quantise_cones(
@@ -169,6 +190,25 @@ def _pursued(
             quantised = align_handles(search, quantised, by_scale, turned, bound)
         found = quantised.solution
     return replace(found, cones=found.cones[~mesh.is_boundary_vertex[found.cones]])
+
+
+def mirrored_cones(
+    search: ConeSearch, found: SparseCones, symmetry: Symmetry, constraints: Constraints, options: Options
+) -> SparseCones:
+    """Return cones in mirrored pairs and on the plane of symmetry; those found without if that takes many more."""
+    from .sparse.mirrored import MirroredSearch
+
+    given, cones = options.cone_count, found.solution.cones
+    goal = max(options.distortion, found.distortion) if given is None else WORSE * found.distortion
+    more = NAMED_MORE if symmetry.is_named else MORE
+    most = given if given is not None else len(cones) + max(LEAST_MORE, int(more * len(cones)))
+    if given is None and options.max_cones is not None:
+        most = min(most, options.max_cones)
+    mirrored = MirroredSearch(search, symmetry.mirror.partner, symmetry.on_plane, constraints.is_allowed)
+    best = mirrored.fewest(goal * goal, most, [search.unknowns_of(cones)])
+    if best is None or best.distortion > goal * (1 + NARROWLY):
+        return found
+    return best
 
 
 def only_choice(surface: Surface, constraints: Constraints, options: Options) -> ConeSolution | None:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..quality.distortion import Distortion
     from ..quality.rotations import Rotations
     from ..result.flattening import Flattening
+    from ..result.symmetry import MirrorSymmetry
 
 
 #: The arrays that make a result. The others of an archive, those of `SeamData`, follow from them.
@@ -165,6 +166,7 @@ def _flattening(path: Path, arrays: dict[str, NDArray[Any]]) -> Flattening:
         ),
         solvers=tuple(report["solvers"]),
         rotations=_rotations(report),
+        symmetry=_symmetry(report),
         # Vertices that a refinement added come from none.
         vertex_origin=reading.indices("vertex_origin", (n,), None, least=-1),
         face_origin=reading.indices("face_origin", (m,), None),
@@ -247,6 +249,19 @@ def _distortion(reading: _Checked, report: dict[str, Any], count: int) -> Distor
         log_area_scale=reading.floats("log_area_scale", (count,)),
         **numbers,
     )
+
+
+def _symmetry(report: dict[str, Any]) -> tuple[MirrorSymmetry, ...]:
+    """Return the planes of symmetry that a report has; those of earlier versions have none."""
+    from ..result.symmetry import MirrorSymmetry
+
+    planes = []
+    for one in report.get("symmetry", []):
+        x, y, z = (float(_number(value)) for value in one["normal"])
+        planes.append(MirrorSymmetry(**{**one, "normal": (x, y, z)}))
+        for name in ("offset", "deviation", "layout"):
+            _number(one[name])
+    return tuple(planes)
 
 
 def _rotations(report: dict[str, Any]) -> Rotations | None:

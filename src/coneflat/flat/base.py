@@ -13,6 +13,7 @@ from ..errors import ConvergenceError, MetricError
 from ..geometry import angle_defect, double_areas, edge_lengths
 from ..geometry.operators import area_distortion
 from ..geometry.planar import heights, sides_between, signed_angles, signed_double_areas
+from ..input.symmetry import SymmetryUse
 from ..mesh import TriangleMesh
 from ..quality.statistics import SolveStatistics
 from ..text import plural
@@ -40,6 +41,8 @@ class LaidOut:
         target, curvature: (n,) curvature wanted and reached, radians.
         statistics: how it was found.
         notes: what falls short, one sentence each.
+        symmetry: the symmetry that was found, and what it was used for; None if there is none.
+        lies_on: (c,) the point that each is to lie on, itself for most: both sides of a model in one place; or None.
     """
 
     mesh: TriangleMesh
@@ -54,6 +57,8 @@ class LaidOut:
     statistics: SolveStatistics
     chart: IntArray | None = None
     notes: tuple[str, ...] = ()
+    symmetry: SymmetryUse | None = None
+    lies_on: IntArray | None = None
 
     @property
     def area(self) -> float:

@@ -16,6 +16,7 @@ from .declared import (
     MetricOptions,
     RunOptions,
     SeamOptions,
+    SymmetryOptions,
 )
 
 # What asks for cones by the pursuit, and it alone.
@@ -32,7 +33,7 @@ ASKING = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RunOptions, AtlasOptions, SeamOptions, MetricOptions, ConeOptions):
+class Options(RunOptions, AtlasOptions, SymmetryOptions, SeamOptions, MetricOptions, ConeOptions):
     """Options of `coneflat.flatten`; `read_options` makes them from what a user gives, so that they are parsed.
 
     Raises:
@@ -51,6 +52,11 @@ class Options(RunOptions, AtlasOptions, SeamOptions, MetricOptions, ConeOptions)
             raise OptionError(
                 "a refinement has triangles of its own, between positions, which given lengths do not tell: leave out "
                 "refine"
+            )
+        if self.mirrored == "overlap" and (self.symmetric == "off" or self.charts != "atlas"):
+            raise OptionError(
+                "mirrored 'overlap' lays the sides of a symmetric model on each other: it needs an atlas and symmetry, "
+                f"not charts {self.charts!r} and symmetric {self.symmetric!r}"
             )
         if self.sharp_angle is not None and not 0 < self.sharp_angle < math.pi:
             raise OptionError(f"the sharp angle must be between 0 and pi, not {self.sharp_angle:g} radians")

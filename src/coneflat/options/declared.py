@@ -48,6 +48,8 @@ POLISHES = ("auto", "off", "whole")
 SOLVERS = ("auto", "pardiso", "cholespy", "scipy", "amg")
 CHARTS = ("atlas", "one")
 BOUNDARIES = ("free", "lengths", "disk", "straight")
+SYMMETRIES = ("auto", "x", "y", "z", "off")
+MIRRORED = ("apart", "overlap")
 
 # Radians: finer quanta than this restrict nothing that could be told from none, as multiples are known to 1e-6.
 LEAST_QUANTUM = 1e-4
@@ -274,6 +276,24 @@ class SeamOptions:
         None,
         Weights(),
         "By how much seams are dearer at each vertex: numbers, or the name of a property in the file.",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SymmetryOptions:
+    """Symmetry."""
+
+    symmetric: str = option(
+        "off",
+        Choice(SYMMETRIES),
+        "Cones, seams and charts are mirror symmetric. auto: where the model is, to three thousandths of its size, if "
+        "cones and seams become little more. x, y, z: about the plane of about that normal that fits best, to three "
+        "hundredths.",
+    )
+    mirrored: str = option(
+        "apart",
+        Choice(MIRRORED),
+        "overlap: both sides of a symmetric model lie on each other in the texture and share its texels.",
     )
 
 

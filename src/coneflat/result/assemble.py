@@ -12,6 +12,8 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..atlas import part_touching
 from ..atlas.arrange import arrange_charts
+from ..atlas.mirrored import ChartMirrors, mirrors_of
+from ..geometry.planar import sides_between
 from ..input.numbering import result_numbering, turn_corners
 from ..input.polygons import Polygons
 from ..layout.convex import make_convex
@@ -23,12 +25,17 @@ from ..quality.rotations import Rotations, measure_rotations
 from ..quality.statistics import SolveStatistics
 from .flattening import Flattening
 from .promises import broken_promises
+from .symmetry import mirror_symmetry
 
 if TYPE_CHECKING:
     from ..flat import LaidOut
     from ..input.components import Prepared
 
 
+# Of the longest side in the plane: how far one side of a model is off the other that it lies on, so that readers who
+# join what is within a millionth of a side see two charts, not one that is folded.
+# And at least so much of the texture, far above the rounding of 32-bit numbers, far below a texel.
+APART, LEAST_APART = 4e-6, 1e-6
 POLYGONS_LOST = (
     "The refinement has triangles of its own: polygons, groups and materials of the file are not kept."
 )
@@ -124,7 +131,8 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     triangles = _sort_triangles(prepared, laid_out, numbering)
     corners_in_space = numbering.positions[triangles.faces]
     with stages("pack"):
-        layout = _pack(laid_out, triangles, corners_in_space, options)
+        mirrors = [mirrors_of(one) for one in laid_out]
+        layout = _pack(laid_out, mirrors, triangles, corners_in_space, options)
     refined = any(one.statistics.refined_triangles for one in laid_out)
     face_corners = (
         None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
@@ -137,7 +145,9 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     curvature = _curvature(prepared, laid_out, numbering, options)
     cones = numbering.renumber([one.cones for one in laid_out])
     with stages("measure"):
-        layout, distortion = _measure(prepared, numbering, triangles, layout, curvature, cones, options)
+        layout, distortion = _measure(
+            prepared, laid_out, numbering, triangles, layout, curvature, cones, options
+        )
         rotations = _rotations(laid_out, layout.uv[layout.own], options)
     result = Flattening(
         vertices=numbering.positions,
@@ -167,6 +177,11 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
             [one.statistics for one in laid_out], [one.area if len(laid_out) > 1 else 1.0 for one in laid_out]
         ),
         rotations=rotations,
+        symmetry=tuple(
+            found
+            for one, charts in zip(laid_out, mirrors, strict=True)
+            if (found := mirror_symmetry(one, charts.off, checked.exponent)) is not None
+        ),
         vertex_origin=numbering.vertex_origin,
         face_origin=triangles.face_origin,
         face_corners=face_corners,
@@ -201,24 +216,34 @@ def _sort_triangles(prepared: Prepared, laid_out: Sequence[LaidOut], numbering: 
 
 
 def _pack(
-    laid_out: Sequence[LaidOut], triangles: _Triangles, corners_in_space: FloatArray, options: Options
+    laid_out: Sequence[LaidOut],
+    mirrors: Sequence[ChartMirrors],
+    triangles: _Triangles,
+    corners_in_space: FloatArray,
+    options: Options,
 ) -> _Layout:
     """Return the charts of all components, packed."""
-    points, own, chart, component = _all_charts(laid_out)
+    points, own, chart, component, lies_on = _all_charts(laid_out)
     corners = own[triangles.order]
+    # What lies on other points is not packed.
+    below = (lies_on[corners] == corners).all(axis=1)
+    of_all, of_below = np.unique(chart[triangles.order][below], return_inverse=True)
     packed = arrange_charts(
-        points[corners],
-        chart[triangles.order],
-        component,
-        corners_in_space,
+        points[corners[below]],
+        of_below,
+        component[of_all],
+        corners_in_space[below],
         resolution=options.resolution,
         padding=options.padding,
         tiles=options.tiles,
         up=options.up,
         quantum=options.quantise,
+        mirrors=mirrors if below.all() else (),
     )
     uv = np.empty_like(points)
-    uv[corners] = packed.corner_uv
+    uv[corners[below]] = packed.corner_uv
+    if not below.all():
+        uv = _laid_on(uv, lies_on, max(APART * _longest_side(packed.corner_uv), LEAST_APART))
     return _Layout(uv, corners, own, packed.scale, packed.efficiency)
 
 
@@ -235,6 +260,7 @@ def _curvature(
 
 def _measure(
     prepared: Prepared,
+    laid_out: Sequence[LaidOut],
     numbering: _Numbering,
     triangles: _Triangles,
     layout: _Layout,
@@ -253,7 +279,8 @@ def _measure(
         lengths=prepared.own_lengths,
     )
     distortion = measured(layout.uv[layout.corners])
-    if options.charts == "atlas" and distortion.overlapping_pairs:
+    is_meant = any(one.lies_on is not None for one in laid_out)
+    if options.charts == "atlas" and distortion.overlapping_pairs and not is_meant:
         parted, overlaps = part_touching(layout.uv, layout.corners)
         if len(overlaps.pairs) < distortion.overlapping_pairs:
             return replace(layout, uv=parted), measured(parted[layout.corners], overlaps=overlaps)
@@ -293,17 +320,31 @@ def _distinct_notes(laid_out: Sequence[LaidOut]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(note for one in laid_out for note in one.notes))
 
 
-def _all_charts(laid_out: Sequence[LaidOut]) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
+def _all_charts(laid_out: Sequence[LaidOut]) -> tuple[FloatArray, IntArray, IntArray, IntArray, IntArray]:
     """Return the points, corners and charts of all components, numbered one after the other.
 
-    And (k,) the component of each chart.
+    And (k,) the component of each chart, and the point that each lies on.
     """
     corners, charts, component, points, count = [], [], [], 0, 0
+    lies_on = []
     for i, one in enumerate(laid_out):
         chart = np.zeros(len(one.corners), dtype=np.int64) if one.chart is None else one.chart
         corners.append(one.corners + points)
+        lies_on.append(points + (np.arange(len(one.points)) if one.lies_on is None else one.lies_on))
         charts.append(chart + count)
         component += [i] * (int(chart.max()) + 1)
         points, count = points + len(one.points), count + int(chart.max()) + 1
     every = np.concatenate([one.points for one in laid_out])
-    return every, np.concatenate(corners), np.concatenate(charts), np.array(component, dtype=np.int64)
+    of_charts = np.array(component, dtype=np.int64)
+    return every, np.concatenate(corners), np.concatenate(charts), of_charts, np.concatenate(lies_on)
+
+
+def _laid_on(uv: FloatArray, lies_on: IntArray, apart: float) -> FloatArray:
+    """Return points (u, 2) of which some lie on others, but for a little, inside the texture."""
+    placed = uv[lies_on]
+    inside = apart if placed.max() + apart <= np.ceil(placed.max()) else -apart
+    return np.asarray(placed + inside * (lies_on != np.arange(len(uv)))[:, None])
+
+
+def _longest_side(corner_uv: FloatArray) -> float:
+    return float(np.abs(sides_between(corner_uv)).max())

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import trimesh
 
     from .seam_data import SeamData
+    from .symmetry import MirrorSymmetry
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,7 @@ class Flattening:
         solve: how the metric and the layout were found: Newton steps, flips, untangled triangles.
         solvers: the linear solvers that were used.
         rotations: of seams, against multiples of the quantum of the cones; None without one.
+        symmetry: the planes of mirror symmetry of components, and what they were used for; of those that have one.
         vertex_origin: (n,) the input vertex that each vertex came from, -1 for those that a refinement added.
         face_origin: (m,) the input face that each face came from.
         face_corners: (m, 3) for a mesh read from a file: the polygon corner of `source` at each
@@ -79,6 +81,7 @@ class Flattening:
     solve: SolveStatistics = field(default_factory=SolveStatistics)
     solvers: tuple[str, ...] = ()
     rotations: Rotations | None = None
+    symmetry: tuple[MirrorSymmetry, ...] = ()
     vertex_origin: IntArray | None = None
     face_origin: IntArray | None = None
     face_corners: IntArray | None = None

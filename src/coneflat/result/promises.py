@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._arrays import unit_exponent
-from ..geometry.overlap import Overlaps
-from ..geometry.planar import sides_between
+from ..geometry.overlap import Overlaps, find_overlaps
+from ..geometry.planar import sides_between, signed_double_areas
 from ..mesh import TriangleMesh
 from ..options import UNFOLDED
 from ..quality.distortion import angle_sum_errors, measure
@@ -128,10 +128,27 @@ def _upright(result: Flattening) -> Iterator[str]:
 
 def _apart(result: Flattening) -> Iterator[str]:
     measures = result.distortion
+    if any(one.overlaid for one in result.symmetry):
+        yield _overlaid(result)
+        return
     if result.settings.get("charts") == "atlas" and measures.overlapping_pairs:
         pairs = plural(measures.overlapping_pairs, "pair")
         verb = "overlaps" if measures.overlapping_pairs == 1 else "overlap"
         yield f"{pairs} of triangles {verb} in the atlas, {measures.overlap:.2g} of the area that it covers."
+
+
+def _overlaid(result: Flattening) -> str:
+    """Return what is to be said of sides that lie on each other: whether anything else does."""
+    is_upright = signed_double_areas(result.corner_uv) > 0
+    pairs = sum(
+        len(find_overlaps(result.uv, result.uv_faces[side]).pairs)
+        for side in (is_upright, ~is_upright)
+        if side.any()
+    )
+    rest = (
+        "nothing else overlaps" if not pairs else f"{plural(pairs, 'pair')} of triangles overlap beside that"
+    )
+    return f"The two sides of the model lie on each other in the texture, as was asked; {rest}."
 
 
 def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:

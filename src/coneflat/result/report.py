@@ -54,6 +54,7 @@ def as_dict(result: Flattening) -> dict[str, Any]:
         "solvers": list(result.solvers),
         "rotation_deviation": None if result.rotations is None else result.rotations.worst,
         "handle_deviations": None if result.rotations is None else result.rotations.handles,
+        "symmetry": [asdict(one) for one in result.symmetry],
         "packing_efficiency": result.packing_efficiency,
         "uv_scale": result.uv_scale,
         "cone_vertices": result.cones.tolist(),
@@ -101,6 +102,25 @@ def _rotation_rows(result: Flattening) -> list[Row]:
         more = f"; and {len(rotations.handles) - 6} more" if len(rotations.handles) > 6 else ""
         rows.append(("around handles", handles, f"the same along each generator{more}"))
     return rows
+
+
+def _symmetry_rows(result: Flattening) -> list[Row]:
+    if not result.symmetry:
+        return []
+    one, more = result.symmetry[0], len(result.symmetry) - 1
+    used = [name for name, is_used in (("cones", one.cones), ("seams", one.seams)) if is_used]
+    if one.layout is not None:
+        used.append("charts" if not one.overlaid else "charts on each other")
+    x, y, z = one.normal
+    others = f"; {plural(more, 'more component')}" if more else ""
+    return [
+        (
+            "symmetry",
+            ", ".join(used) or "not used",
+            f"about a plane of normal ({x:.3g}, {y:.3g}, {z:.3g}); the model is off by {one.deviation:.1e} of its size"
+            f"{others}",
+        )
+    ]
 
 
 def number_text(value: float, form: str) -> str:
@@ -154,6 +174,7 @@ def as_rows(result: Flattening) -> list[Row]:
         packing_row(result.packing_efficiency),
         *(of_map[name] for name in ("texel density", "seam length", "seam mismatch")),
         *_rotation_rows(result),
+        *_symmetry_rows(result),
     ]
 
 

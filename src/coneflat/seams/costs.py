@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from .._arrays import FloatArray
 from ..errors import OptionError
 from ..geometry.normals import dihedral_angles
-from ..geometry.operators import at_safe_scale
+from ..geometry.operators import at_safe_scale, vertex_areas
 from ..geometry.visibility import visible_share
 from ..mesh import TriangleMesh
 from ..options import MOST_PREFERENCE
@@ -21,6 +21,8 @@ CHEAPEST = 0.1
 LEAST_WEIGHT = 1e-3
 # Rounds of averages over neighbours, that take the grain from what is seen of single vertices.
 ROUNDS = 2
+# The same for detail; from which mean curvature on, times the size, a place is full of it; and what it then costs.
+DETAIL_ROUNDS, DETAILED, DETAIL = 10, 60.0, 2.0
 
 
 def edge_costs(
@@ -63,6 +65,30 @@ def edge_costs(
     if edge_weights is not None:
         costs *= _checked(edge_weights, len(mesh.edges), "edge")
     return costs
+
+
+def detail_factors(mesh: TriangleMesh, lengths: FloatArray) -> FloatArray:
+    """Return (e,) by how much seams are dearer where the surface has detail: 1 where it is smooth, to 3.
+
+    Of two ways around a symmetric shape that are much alike, that over the back of a head is to be preferred to that
+    over the face. Detail is the mean curvature, evened over some rings of vertices, times the size of the surface: a
+    sphere has 3.5, limbs 20, a face 60 and more.
+
+    lengths: (m, 3) of the sides.
+    """
+    count = len(mesh.vertices)
+    sides = lengths.ravel()[mesh.edge_halfedges[:, 0]]
+    bending = np.bincount(mesh.edges.ravel(), np.repeat(np.abs(dihedral_angles(mesh)) * sides / 4, 2), count)
+    areas = vertex_areas(mesh.faces, lengths, count)
+    size = np.sqrt(areas.sum())
+    degree = np.bincount(mesh.edges.ravel(), minlength=count)
+    both = np.stack([bending, areas])
+    for _ in range(DETAIL_ROUNDS):
+        shared = (both / degree)[:, mesh.edges[:, ::-1]].reshape(2, -1)
+        both = (both + [np.bincount(mesh.edges.ravel(), each, count) for each in shared]) / 2
+    detail = both[0] / both[1] * size / DETAILED
+    factors: FloatArray = 1 + DETAIL * np.clip(detail[mesh.edges].mean(axis=1), 0.0, 1.0)
+    return factors
 
 
 def _hidden(mesh: TriangleMesh, share: FloatArray, angles: FloatArray) -> FloatArray:

@@ -67,6 +67,7 @@ class DenseModel:
         limits: of the curvatures.
         least: (m,) bound of the curvature at each candidate, the limit or above.
         best: by number of cones.
+        most: (m,) the upper bounds; None for the limit.
     """
 
     gram: FloatArray
@@ -77,6 +78,12 @@ class DenseModel:
     limits: Limits
     least: FloatArray
     best: BestSets[ConeSet] = field(default_factory=BestSets)
+    most: FloatArray | None = None
+
+    @property
+    def _upper(self) -> FloatArray:
+        """(m,) the upper bound of the curvature at each candidate."""
+        return np.full(len(self.slope), self.limits.most) if self.most is None else self.most
 
     @property
     def diagonal(self) -> FloatArray:
@@ -85,8 +92,7 @@ class DenseModel:
 
     def fit(self, members: IntArray) -> Fit:
         """Return the best curvatures of a set."""
-        limits = self.limits
-        given = self.gram, self.slope, self.constant, self.least, limits.most, limits.total
+        given = self.gram, self.slope, self.constant, self.least, self._upper, self.limits.total
         fitted = Fit(*fit_members(*given, members))
         return fitted if fitted.energy >= 0 else replace(fitted, energy=above_rounding(fitted.energy))
 
@@ -100,9 +106,13 @@ class DenseModel:
         if limits.has_sum and not len(members):
             change: FloatArray = (2 * self.slope + diagonal * limits.total) * limits.total
             return change
-        least, most, free = self.least, limits.most, members[self._are_inside(members, fitted)]
+        least, most, free = self.least, self._upper, members[self._are_inside(members, fitted)]
         if not fitted.feasible:  # then none is bounded
-            least, most, free = np.full_like(self.least, -math.inf), math.inf, members
+            least, most, free = (
+                np.full_like(self.least, -math.inf),
+                np.full_like(self.least, math.inf),
+                members,
+            )
         if limits.has_sum and not len(free):
             free = members[:1]
         gradient = gradients(self.gram, self.slope, members, fitted.curvatures, fitted.multiplier)
@@ -112,7 +122,7 @@ class DenseModel:
         """Return a mask of the members whose curvature no bound holds."""
         k = fitted.curvatures
         span = 1e-9 * (1.0 + np.abs(k))
-        inside: BoolArray = (k < self.limits.most - span) & (k > self.least[members] + span)
+        inside: BoolArray = (k < self._upper[members] - span) & (k > self.least[members] + span)
         return inside
 
     def grown(self, members: IntArray, usable: BoolArray | None = None) -> IntArray | None:
@@ -170,7 +180,7 @@ class DenseModel:
             1e-9 * diagonal,
             is_open,
             self.least,
-            limits.most,
+            self._upper,
             TIE,
         )
         return change, which

@@ -273,19 +273,19 @@ def fit_members(
     slope: FloatArray,
     constant: float,
     least: FloatArray,
-    most: float,
+    most: FloatArray,
     total: float,
     members: IntArray,
 ) -> tuple[FloatArray, float, bool, float]:
     """Return what `fit_curvatures` finds for some of m candidates, and E^2 = constant + (2 slope + gram k) k.
 
-    E^2 is infinite where the bounds do not allow the sum. gram: (m, m), slope, least: (m,).
+    E^2 is infinite where the bounds do not allow the sum. gram: (m, m), slope, least, most: (m,).
     """
     size = len(members)
     small, linear = np.empty((size, size)), np.empty(size)
-    low, high = np.empty(size), np.full(size, most)
+    low, high = np.empty(size), np.empty(size)
     for i in range(size):
-        linear[i], low[i] = slope[members[i]], least[members[i]]
+        linear[i], low[i], high[i] = slope[members[i]], least[members[i]], most[members[i]]
         for j in range(size):
             small[i, j] = gram[members[i], members[j]]
     curvatures, multiplier, feasible = fit_curvatures(small, linear, low, high, total)

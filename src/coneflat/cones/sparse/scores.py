@@ -105,7 +105,7 @@ def addition_scores(
     gradient: FloatArray,
     free: IntArray,
     least: FloatArray,
-    most: float,
+    most: FloatArray,
     has_sum: bool,
 ) -> FloatArray:
     """Return (m,) by how much E^2 changes if a candidate joins (0 or less), bounds of others aside."""
@@ -113,7 +113,7 @@ def addition_scores(
     change = np.zeros(len(remain))
     for t in range(len(remain)):
         if remain[t] > INDEPENDENT * diagonal[t]:
-            x = min(max(-gradient[t] / remain[t], least[t]), most)
+            x = min(max(-gradient[t] / remain[t], least[t]), most[t])
             change[t] = (2 * gradient[t] + remain[t] * x) * x
     return change
 
@@ -128,7 +128,7 @@ def swap_table(
     floor: FloatArray,
     is_open: BoolArray,
     least: FloatArray,
-    most: float,
+    most: FloatArray,
     tie: float,
 ) -> tuple[FloatArray, IntArray]:
     """Return (p,) the change of E^2 by the best replacement of each member, and which candidate that is.
@@ -141,8 +141,7 @@ def swap_table(
         remain: (m,) what the projection leaves of the candidates' gram entries.
         floor: (m,) what must be left of them once a member is gone.
         is_open: (m,) the candidates that may come in.
-        least: (m,) bound of the candidates' curvatures.
-        most: the upper bound.
+        least, most: (m,) bounds of the candidates' curvatures.
         tie: changes that differ by less, relatively, are equal; the first candidate counts.
     """
     size, count = rows.shape
@@ -160,7 +159,7 @@ def swap_table(
                 h = remain[t] + w * w * share
                 if h > floor[t]:
                     g = gradient[t] - w * k * share
-                    x = min(max(-g / h, least[t]), most)
+                    x = min(max(-g / h, least[t]), most[t])
                     values[t] = lost + (2.0 * g + h * x) * x
                     lowest = min(lowest, values[t])
         if lowest < np.inf:
