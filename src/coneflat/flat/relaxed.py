@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray
-from ..errors import SeamError
-from ..geometry import double_areas
+from .._arrays import BoolArray, ComplexArray, FloatArray
+from ..errors import LengthError, SeamError
+from ..geometry import double_areas, edge_lengths
 from ..geometry.operators import LEAST_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
 from ..geometry.planar import signed_double_areas
 from ..input.components import Component
-from ..layout.relax import StretchEnergy, relax
+from ..layout.relax import Relaxed, StretchEnergy, relax
 from ..layout.relax.elements import map_factors
 from ..layout.relax.relax import rest_sides
 from ..mesh import TriangleMesh, label_components
@@ -35,108 +36,173 @@ BESIDES = 0.1
 SHARP = 2.0
 
 
+def relaxes(options: Options) -> bool:
+    """Whether layouts are relaxed at all; those of other methods are what these have published."""
+    wanted = options.polish != "off" or options.stretch > 0
+    return options.method == "exact" and not options.refine and wanted
+
+
 def relaxed(laid_out: LaidOut, part: Component, options: Options, tell: Callable[[str], None]) -> LaidOut:
     """Return a layout with less distortion, the same cones and the same seams; see `polish` and `stretch`.
 
     The boundary stays where its lengths or its shape are prescribed.
 
-    tell: called before each step with what is being done.
+    Args:
+        laid_out: the layout, of the component's mesh or of one in which edges were cut.
+        part: the component.
+        options: which `relaxes`.
+        tell: called after each step with what is being done.
     """
-    if not relaxes(options) or laid_out.mesh is not part.mesh:
-        return laid_out
-    before = _Maps.of(laid_out, part)
-    is_free = ~held_boundary(part.mesh, part.constraints, options)
+    surface = _Surface(laid_out.mesh, part, laid_out)
+    before = surface.ratios(laid_out)
+    is_free = np.ones(len(surface.mesh.vertices), dtype=bool)
+    is_free[: len(part.mesh.vertices)] = ~held_boundary(part.mesh, part.constraints, options)
     whole = options.stretch > 0 or options.polish == "whole"
     if not whole:
-        is_free &= _around(part.mesh, before.ratio > BENT)
-    if not is_free.any():
-        return _described(laid_out, laid_out, before, part, options, is_free)
-    try:
-        return _relaxed(laid_out, part, options, is_free, whole, before, tell)
-    except SeamError as error:  # a metric that did not converge
-        return replace(laid_out, notes=(*laid_out.notes, f"Not relaxed: {error}.")) if whole else laid_out
+        is_free &= _around(surface.mesh, before > BENT)
+    tolerance, steps = WHOLE if whole else LOCAL
 
-
-def _relaxed(
-    laid_out: LaidOut,
-    part: Component,
-    options: Options,
-    is_free: BoolArray,
-    whole: bool,
-    before: _Maps,
-    tell: Callable[[str], None],
-) -> LaidOut:
-    moved, was_free = laid_out, is_free
-    for sharpness in (1.0, SHARP):
-        found = relax(
-            part.mesh,
-            moved.points,
-            moved.corners,
+    def relaxed_by(layout: LaidOut, sharpness: float, is_free: BoolArray) -> LaidOut:
+        found: Relaxed = relax(
+            surface.mesh,
+            layout.points,
+            layout.corners,
             StretchEnergy(options.stretch, sharpness),
-            lengths=part.lengths,
-            weights=_face_weights(part, before),
+            lengths=surface.lengths,
+            weights=surface.weights,
             free=is_free,
-            tolerance=(WHOLE if whole else LOCAL)[0],
-            steps=(WHOLE if whole else LOCAL)[1],
+            tolerance=tolerance,
+            steps=steps,
             progress=lambda step, _: tell(f"step {step}"),
         )
-        tried = replace(moved, points=found.points)
+        return replace(layout, points=found.points)
+
+    moved = laid_out
+    try:
         if options.stretch:
-            moved = tried
-            break
-        moved, is_free = _without_losses(moved, tried, before, part, is_free)
-        if not is_free.any():
-            break
-    return _described(laid_out, moved, before, part, options, was_free)
-
-
-def relaxes(options: Options) -> bool:
-    """Whether layouts are relaxed at all; those of other methods are what these have published."""
-    return (
-        options.method == "exact" and not options.refine and (options.polish != "off" or options.stretch > 0)
-    )
-
-
-def _face_weights(part: Component, before: _Maps) -> FloatArray:
-    """Return (m,) what triangles count for their area."""
-    besides: FloatArray = 1 + BESIDES * before.areas.mean() / before.areas
-    weights = part.constraints.weights
-    if weights is None:
-        return besides
-    return besides * np.maximum(at_unit_scale(weights), LEAST_WEIGHT)[part.mesh.faces].mean(axis=1)
+            moved = relaxed_by(moved, 1.0, is_free)
+        else:
+            moved, is_lost = surface.without_losses(moved, relaxed_by(moved, 1.0, is_free), before, is_free)
+            if is_lost.any():
+                moved, _ = surface.without_losses(moved, relaxed_by(moved, SHARP, is_lost), before, is_lost)
+    except (SeamError, LengthError) as error:  # a metric that did not converge, or a cut at a sliver
+        return replace(laid_out, notes=(*laid_out.notes, f"Not relaxed: {error}.")) if whole else laid_out
+    return surface.described(moved, before, is_free, options)
 
 
 def mean_ratio(laid_out: LaidOut, part: Component) -> float:
     """Return the mean quasi-conformal distortion of a layout, by area."""
-    return _Maps.of(laid_out, part).mean()
+    surface = _Surface(laid_out.mesh, part, laid_out)
+    return surface.mean(surface.ratios(laid_out))
 
 
 @dataclass(frozen=True, eq=False)
-class _Maps:
-    """How triangles are mapped: (m,) ratios of singular values, infinite where turned over; areas in space."""
+class _Surface:
+    """The triangles as they should be.
 
-    ratio: FloatArray
-    areas: FloatArray
+    Attributes:
+        mesh: what is laid out: the component's mesh, or that with edges cut.
+        part: the component.
+        laid_out: a layout of it.
+    """
 
-    @classmethod
-    def of(cls, laid_out: LaidOut, part: Component) -> _Maps:
-        along, across = map_factors(rest_sides(part.lengths))
+    mesh: TriangleMesh
+    part: Component
+    laid_out: LaidOut
+
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """(m, 3) side lengths."""
+        if self.mesh is self.part.mesh:
+            return self.part.lengths
+        return edge_lengths(self.mesh.vertices, self.mesh.faces)
+
+    @cached_property
+    def areas(self) -> FloatArray:
+        """(m,) areas."""
+        return double_areas(self.lengths) / 2
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """(m,) what triangles count for their area."""
+        least = np.finfo(np.float64).tiny
+        besides: FloatArray = 1 + BESIDES * self.areas.mean() / np.maximum(self.areas, least)
+        weights = self.part.constraints.weights
+        if weights is None:
+            return besides
+        of_faces = np.maximum(at_unit_scale(weights), LEAST_WEIGHT)[self.part.mesh.faces].mean(axis=1)
+        return besides * of_faces[self.laid_out.face_origin]
+
+    @cached_property
+    def _factors(self) -> tuple[ComplexArray, ComplexArray]:
+        return map_factors(rest_sides(self.lengths))
+
+    def ratios(self, laid_out: LaidOut) -> FloatArray:
+        """Return (m,) ratios of singular values, infinite for triangles that are turned over or have no area."""
+        along, across = self._factors
         corners = laid_out.points[laid_out.corners]
         places = (corners - corners[:, :1]) @ np.array([1.0, 1j])
         one, two = np.abs((along * places).sum(axis=1)), np.abs((across * places).sum(axis=1))
-        ratio = np.divide(one + two, one - two, out=np.full(len(one), np.inf), where=one > two)
-        return cls(ratio, double_areas(part.lengths) / 2)
+        return np.divide(one + two, one - two, out=np.full(len(one), np.inf), where=one > two)
 
-    def mean(self) -> float:
+    def mean(self, ratios: FloatArray) -> float:
         """The mean ratio by area, over upright triangles."""
-        upright = np.isfinite(self.ratio)
-        return (
-            float(np.average(self.ratio[upright], weights=self.areas[upright])) if upright.any() else np.inf
+        upright = np.isfinite(ratios)
+        return float(np.average(ratios[upright], weights=self.areas[upright])) if upright.any() else np.inf
+
+    def without_losses(
+        self, laid_out: LaidOut, moved: LaidOut, before: FloatArray, was_free: BoolArray
+    ) -> tuple[LaidOut, BoolArray]:
+        """Return the moved layout, but as it was where its mean or its worst triangle would be worse.
+
+        The vertices there, (n,), too. before: (m,) the ratios of the layout that nothing may be worse than.
+        """
+        after, (mesh, faces) = self.ratios(moved), (self.mesh, self.mesh.faces)
+        edges = mesh.edges[was_free[mesh.edges].all(axis=1)]
+        count, patch = label_components(len(mesh.vertices), edges[:, 0], edges[:, 1])
+        touched = np.flatnonzero(was_free[faces].any(axis=1) & np.isfinite(before))
+        corner = np.argmax(was_free[faces[touched]], axis=1)
+        of_face = patch[faces[touched, corner]]
+        gain = before[touched] - after[touched]
+        gained = np.bincount(of_face, gain * self.areas[touched], count)
+        worst = np.zeros(count)
+        np.maximum.at(worst, of_face, after[touched])
+        is_lost = ((gained < 0) | (worst > _largest(before)))[patch] & was_free
+        back = np.zeros(len(moved.points), dtype=bool)
+        back[moved.corners[is_lost[faces]]] = True
+        return replace(moved, points=np.where(back[:, None], laid_out.points, moved.points)), is_lost
+
+    def described(self, moved: LaidOut, before: FloatArray, was_free: BoolArray, options: Options) -> LaidOut:
+        """Return the moved layout with the curvature and the scale that it has, and with what it was before."""
+        mesh, given = self.mesh, self.part.mesh
+        corners = moved.points[moved.corners]
+        curvature = laid_out_curvature(mesh, corners)
+        after = np.abs(signed_double_areas(corners)) / 2
+        log_scale = np.where(was_free, vertex_log_scale(mesh, self.areas, after), moved.log_scale)
+        count = len(given.vertices)
+        areas = weighted_areas(
+            vertex_areas(given.faces, self.part.lengths, count), self.part.constraints.weights
+        )
+        statistics = replace(
+            moved.statistics,
+            relaxed_vertices=int(was_free.sum()),
+            qc_mean_unrelaxed=self.mean(before),
+            qc_max_unrelaxed=_largest(before),
+            area_distortion=area_distortion(log_scale[:count], areas),
+        )
+        is_open = mesh.is_boundary_vertex & (not options.prescribes_boundary)
+        return replace(
+            moved,
+            curvature=curvature,
+            # Where the boundary is free, what comes out is what was wanted.
+            target=np.where(is_open, curvature, moved.target),
+            log_scale=log_scale,
+            statistics=statistics,
         )
 
-    def largest(self) -> float:
-        """The largest ratio of upright triangles."""
-        return float(self.ratio[np.isfinite(self.ratio)].max(initial=1.0))
+
+def _largest(ratios: FloatArray) -> float:
+    return float(ratios[np.isfinite(ratios)].max(initial=1.0))
 
 
 def _around(mesh: TriangleMesh, is_bent: BoolArray) -> BoolArray:
@@ -146,63 +212,3 @@ def _around(mesh: TriangleMesh, is_bent: BoolArray) -> BoolArray:
     for _ in range(RINGS):
         inside[mesh.faces[inside[mesh.faces].any(axis=1)]] = True
     return inside
-
-
-def _without_losses(
-    laid_out: LaidOut, moved: LaidOut, before: _Maps, part: Component, was_free: BoolArray
-) -> tuple[LaidOut, BoolArray]:
-    """Return the moved layout, but as it was around vertices where its mean or its worst triangle would be worse.
-
-    These, (n,), too.
-    """
-    after = _Maps.of(moved, part)
-    mesh, faces = part.mesh, part.mesh.faces
-    edges = mesh.edges[was_free[mesh.edges].all(axis=1)]
-    count, patch = label_components(len(mesh.vertices), edges[:, 0], edges[:, 1])
-    touched = np.flatnonzero(was_free[faces].any(axis=1) & np.isfinite(before.ratio))
-    corner = np.argmax(was_free[faces[touched]], axis=1)
-    of_face = patch[faces[touched, corner]]
-    gain = before.ratio[touched] - after.ratio[touched]
-    gained = np.bincount(of_face, gain * before.areas[touched], count)
-    worst = np.zeros(count)
-    np.maximum.at(worst, of_face, after.ratio[touched])
-    is_lost = (gained < 0) | (worst > before.largest())
-    lost = is_lost[patch] & was_free
-    back = np.zeros(len(moved.points), dtype=bool)
-    back[moved.corners[lost[faces]]] = True
-    return replace(moved, points=np.where(back[:, None], laid_out.points, moved.points)), lost
-
-
-def _described(
-    laid_out: LaidOut,
-    moved: LaidOut,
-    before: _Maps,
-    part: Component,
-    options: Options,
-    was_free: BoolArray,
-) -> LaidOut:
-    """Return the moved layout with the curvature and the scale that it has, and with what it was before."""
-    mesh = part.mesh
-    corners = moved.points[moved.corners]
-    curvature = laid_out_curvature(mesh, corners)
-    after = np.abs(signed_double_areas(corners)) / 2
-    log_scale = np.where(was_free, vertex_log_scale(mesh, before.areas, after), laid_out.log_scale)
-    areas = weighted_areas(
-        vertex_areas(mesh.faces, part.lengths, len(mesh.vertices)), part.constraints.weights
-    )
-    statistics = replace(
-        laid_out.statistics,
-        relaxed_vertices=int(was_free.sum()),
-        qc_mean_unrelaxed=before.mean(),
-        qc_max_unrelaxed=before.largest(),
-        area_distortion=area_distortion(log_scale, areas),
-    )
-    is_open = mesh.is_boundary_vertex & (not options.prescribes_boundary)
-    return replace(
-        moved,
-        curvature=curvature,
-        # Where the boundary is free, what comes out is what was wanted.
-        target=np.where(is_open, curvature, laid_out.target),
-        log_scale=log_scale,
-        statistics=statistics,
-    )
