@@ -59,7 +59,7 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     """Flatten a connected mesh: find cones, scale the metric, cut, lay out, and part what overlaps."""
     mesh = part.mesh
     with stages("cones", 0.1):
-        surface = Surface.of(mesh, part.lengths)
+        surface = Surface.of(mesh, part.lengths, options.method in UNFOLDED and not options.refine)
 
     def flatten_once(part: Component) -> LaidOut:
         with stages("cones", 0.4):

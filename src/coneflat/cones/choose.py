@@ -11,6 +11,7 @@ from scipy.sparse import csc_matrix
 
 from .._arrays import BoolArray, FloatArray
 from ..geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
+from ..geometry.delaunay import intrinsic_delaunay
 from ..geometry.operators import vertex_areas
 from ..geometry.ties import tie_key
 from ..input.constraints import Constraints
@@ -30,6 +31,9 @@ ROOM = 0.6 * np.pi
 # On meshes of so many vertices, a neighbour is as good a place: corners of cones there, all widened alike, must not
 # exceed this, or the straight sides of a triangle may have no room for one, and the search has to be repeated.
 FINE, WIDEST = 30_000, 0.95 * np.pi
+# Share of edges that are not Delaunay above which a mesh is far from it. Scans have up to 0.15; stretched ten to one
+# they have 0.2 to 0.3.
+MUCH = 0.15
 # Up to so many corners of a polyhedron are all made cones. Below so many radians a vertex is none.
 FEW, FLAT = 24, 1e-6
 # The distortion asked for may be missed by so much, relatively, without a word.
@@ -64,15 +68,34 @@ class Surface:
     search: ConeSearch | None = None
 
     @classmethod
-    def of(cls, mesh: TriangleMesh, lengths: FloatArray) -> Surface:
-        """Return a mesh with what follows from its lengths."""
+    def of(cls, mesh: TriangleMesh, lengths: FloatArray, flips: bool = True) -> Surface:
+        """Return a mesh with what follows from its lengths.
+
+        Where much of it is not Delaunay, as on stretched meshes, its own cotangents, many of them negative, tell little
+        of the surface, nor of the metric, which is found on the intrinsic Delaunay triangulation: its Laplacian and
+        vertex areas are then taken from that.
+
+        flips: the metric is one that may flip edges; else Laplacian and areas are always the mesh's own.
+        """
         angles, n = corner_angles(lengths), len(mesh.vertices)
         curvature = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
-        laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths), n)
         widest = np.zeros(n)
         np.maximum.at(widest, mesh.faces.ravel(), angles.ravel())
         widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
-        return cls(mesh, lengths, laplacian, curvature, vertex_areas(mesh.faces, lengths, n), widest)
+        faces = mesh.faces
+        if flips and _not_delaunay(mesh, lengths) > MUCH:
+            triangulation, _ = intrinsic_delaunay(mesh, lengths)
+            faces, lengths_there = triangulation.faces, triangulation.length.reshape(-1, 3)
+        else:
+            lengths_there = lengths
+        laplacian = cotangent_laplacian(faces, cotangents(lengths_there), n)
+        return cls(mesh, lengths, laplacian, curvature, vertex_areas(faces, lengths_there, n), widest)
+
+
+def _not_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> float:
+    """Return the share of edges that are not Delaunay: whose opposite angles sum to more than half a turn."""
+    weights = np.bincount(mesh.halfedge_edges, cotangents(lengths).ravel(), len(mesh.edges))
+    return float(np.count_nonzero(~mesh.is_boundary_edge & (weights < 0)) / len(mesh.edges))
 
 
 def pursues(mesh: TriangleMesh, options: Options) -> bool:

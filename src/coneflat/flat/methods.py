@@ -78,6 +78,7 @@ def _exact_choices(
         keep_area=options.boundary_kind != "lengths" and not options.marks_seams,
         best_effort=options.best_effort,
         refine=options.refine,
+        split=options.split,
         names=constraints.names,
     )
 

@@ -207,6 +207,12 @@ class MetricOptions:
         "map; nothing can be inverted there. Polygons and groups are not kept.",
         only="exact",
     )
+    split: bool = option(
+        True,
+        Flag(),
+        "Where triangles would be inverted on straight sides whatever is moved, as around a cone that they have no room "
+        "for, cut them, and no others, with a note. Without, the result has the input's triangles, some inverted.",
+    )
     best_effort: bool = option(
         False, Flag(), "Give a result even if the metric did not converge, which is refused otherwise."
     )

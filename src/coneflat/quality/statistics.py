@@ -22,6 +22,7 @@ class SolveStatistics:
         untangled_vertices: vertices that were moved for this.
         untangled_move: how far one was moved at most, relative to the mean edge around them.
         refined_triangles: triangles that were added by the common subdivision.
+        split_triangles: triangles that were added where straight sides left some inverted.
         area_distortion_linear: E of the linear model that the cones were chosen in: the standard deviation of
             the log scale, by area (and importance, where weights were given).
         area_distortion: E of the metric that was laid out.
@@ -36,6 +37,7 @@ class SolveStatistics:
     untangled_vertices: int = 0
     untangled_move: float = 0.0
     refined_triangles: int = 0
+    split_triangles: int = 0
     area_distortion_linear: float = 0.0
     area_distortion: float = 0.0
 

@@ -125,7 +125,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     corners_in_space = numbering.positions[triangles.faces]
     with stages("pack"):
         layout = _pack(laid_out, triangles, corners_in_space, options)
-    refined = any(one.statistics.refined_triangles for one in laid_out)
+    refined = any(len(one.face_origin) > len(part.faces) for part, one in zip(prepared.components, laid_out, strict=True))
     face_corners = (
         None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
     )

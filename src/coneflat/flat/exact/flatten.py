@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ...cones import ConeSolution
 from ...geometry import double_areas
 from ...geometry.straight import FlatTriangles
 from ...layout.unfold import unfold
-from ...layout.untangle import untangle
+from ...layout.untangle import Untangled, untangle
 from ...mesh import TriangleMesh
 from ...quality.statistics import SolveStatistics
 from ...seams import cut_open
@@ -19,6 +20,9 @@ from ...text import plural
 from ..base import LaidOut, all_faces, failure_notes, laid_out_curvature, off_by
 from .boundary import BoundaryCurvature
 from .metric import ExactMetric, exact_metric
+
+if TYPE_CHECKING:
+    from ...layout.refine import Refinement
 
 # The curvature of a round boundary is found from the metric it leads to, over and over: rounds at most, and the
 # largest relative change at a vertex at which to stop. What is solved for in the end is exact in any case.
@@ -46,6 +50,7 @@ class ExactChoices:
             lengths are then kept.
         best_effort: return a metric that did not converge.
         refine: lay out the common subdivision instead of the mesh's own triangles on straight sides.
+        split: cut triangles that are inverted on straight sides and cannot be turned over.
         names: (n,) what the user calls each vertex; None if he has no other numbers.
     """
 
@@ -55,6 +60,7 @@ class ExactChoices:
     keep_area: bool = True
     best_effort: bool = False
     refine: bool = False
+    split: bool = False
     names: IntArray | None = None
 
     def is_open(self, mesh: TriangleMesh) -> BoolArray:
@@ -82,6 +88,7 @@ class ExactFlatMetric:
         solved: the metric.
         shrink: factor that brings it to the wanted size.
         refine: lay out the common subdivision.
+        split: cut triangles that are inverted on straight sides and cannot be turned over.
         notes: what falls short of what was wanted.
     """
 
@@ -92,7 +99,8 @@ class ExactFlatMetric:
     is_held: BoolArray
     solved: ExactMetric
     shrink: float
-    refine: bool
+    refine: bool = False
+    split: bool = False
     notes: tuple[str, ...] = ()
 
     @property
@@ -107,17 +115,29 @@ class ExactFlatMetric:
 
     def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
         """Unfold the metric; on the mesh's own triangles, after turning over what is inverted there."""
-        return self._lay_out_refined(seams) if self.refine else self._lay_out_straight(disk, seams)
+        if self.refine:
+            return self._lay_out_refined(seams)
+        straight = self.straight()
+        untangled = self._untangled(straight, seams)
+        if self.split and len(untangled.left):
+            return self._lay_out_split(straight, seams)
+        return self._lay_out_straight(disk, seams, straight, untangled)
 
-    def _lay_out_straight(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
-        mesh, solved = self.mesh, self.solved
-        flat = self.straight()
-        on_boundary = mesh.is_boundary_vertex
+    def _untangled(
+        self, straight: FlatTriangles, seams: IntArray, whole: BoolArray | None = None
+    ) -> Untangled:
+        """Return the triangles with what can be turned over turned over; see `untangle`."""
+        mesh = self.mesh
         pinned, on_seam = self.is_held.copy(), np.zeros(len(mesh.vertices), dtype=bool)
         pinned[self.cones] = True
         on_seam[mesh.edges[seams]] = True
-        angles = np.where(on_boundary, np.pi, 2 * np.pi) - self.target
-        untangled = untangle(flat, mesh.faces, angles, pinned, on_seam, on_boundary)
+        angles = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - self.target
+        return untangle(straight, mesh.faces, angles, pinned, on_seam, mesh.is_boundary_vertex, whole)
+
+    def _lay_out_straight(
+        self, disk: TriangleMesh, seams: IntArray, straight: FlatTriangles, untangled: Untangled
+    ) -> LaidOut:
+        mesh, solved = self.mesh, self.solved
         points = unfold(untangled.flat, disk.faces) * self.shrink
         curvature = laid_out_curvature(mesh, points[disk.faces])
         return LaidOut(
@@ -133,7 +153,7 @@ class ExactFlatMetric:
             curvature=curvature,
             statistics=replace(
                 self.statistics,
-                untangled_triangles=int(flat.is_inverted.sum()),
+                untangled_triangles=int(straight.is_inverted.sum()),
                 untangled_vertices=len(untangled.moved),
                 untangled_move=untangled.largest_move,
             ),
@@ -148,6 +168,25 @@ class ExactFlatMetric:
         from ...layout.refine import refine
 
         refined = refine(self.mesh, self.solved)
+        added = len(refined.mesh.faces) - len(self.mesh.faces)
+        return self._lay_out_pieces(refined, seams, replace(self.statistics, refined_triangles=added))
+
+    def _lay_out_split(self, straight: FlatTriangles, seams: IntArray) -> LaidOut:
+        from ...layout.mend import mend, overlay_straight
+
+        overlaid = overlay_straight(self.mesh, self.solved)
+        untangled = self._untangled(straight, seams, overlaid.whole)
+        mended = mend(overlaid, straight, untangled.flat)
+        statistics = replace(
+            self.statistics,
+            untangled_triangles=int(straight.is_inverted.sum()) - len(untangled.left),
+            untangled_vertices=len(untangled.moved),
+            untangled_move=untangled.largest_move,
+            split_triangles=len(mended.mesh.faces) - len(self.mesh.faces),
+        )
+        return self._lay_out_pieces(mended, seams, statistics)
+
+    def _lay_out_pieces(self, refined: Refinement, seams: IntArray, statistics: SolveStatistics) -> LaidOut:
         mesh, edges = refined.mesh, refined.edges_on(seams)
         disk = cut_open(mesh, edges).mesh
         points = unfold(refined.flat, disk.faces) * self.shrink
@@ -161,7 +200,7 @@ class ExactFlatMetric:
             log_scale=refined.log_scale + np.log(self.shrink),
             target=np.concatenate([self.target, np.zeros(len(mesh.vertices) - len(self.target))]),
             curvature=laid_out_curvature(mesh, points[disk.faces]),
-            statistics=replace(self.statistics, refined_triangles=len(mesh.faces) - len(self.mesh.faces)),
+            statistics=statistics,
             notes=self.notes,
         )
 
@@ -203,7 +242,7 @@ def exact_flattening(
     shrink = area_factor(lengths, solved) if choices.keep_area else 1.0
     target = np.where(fixed, solved.curvature, target)
     return ExactFlatMetric(
-        mesh, solution.cones, target, is_open, choices.is_held(mesh), solved, shrink, choices.refine, notes
+        mesh, solution.cones, target, is_open, choices.is_held(mesh), solved, shrink, choices.refine, choices.split, notes
     )
 
 
@@ -252,7 +291,7 @@ def at_own_area(
     target = np.where(mesh.is_boundary_vertex, solved.curvature, solution.target)
     is_open, is_held = mesh.is_boundary_vertex, np.zeros(len(mesh.vertices), dtype=bool)
     shrink = area_factor(lengths, solved)
-    return ExactFlatMetric(mesh, solution.cones, target, is_open, is_held, solved, shrink, False, notes)
+    return ExactFlatMetric(mesh, solution.cones, target, is_open, is_held, solved, shrink, notes=notes)
 
 
 def _solve(
