@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,67 +23,65 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Overlaid:
-    """A mesh and a triangulation of its flat surface that has all edges of the mesh that are straight there.
+    """A mesh and a triangulation of its flat surface.
 
     Attributes:
         mesh: the mesh.
-        metric: flat. Of a doubled surface the first half is the mesh.
-        source: its own triangles, with the mirror image where there is one.
-        original: the vertex of the mesh that each vertex of `source` is, or is a copy of.
+        log_scale: (n,) phi at the vertices of `source`.
+        source: its own triangles, followed by their mirror image where there is one.
+        original: (n,) the vertex of the mesh that each vertex of `source` is, or is a copy of.
         flat: the flat triangulation.
     """
 
     mesh: TriangleMesh
-    metric: ExactMetric
+    log_scale: FloatArray
     source: IntrinsicTriangulation
     original: IntArray
     flat: FlatTriangulation
 
-    @property
+    @cached_property
     def whole(self) -> BoolArray:
-        """(3m,) the half-edges of the mesh that are straight."""
+        """(3m,) the half-edges of the mesh that are edges of the flat triangulation, too."""
         counts, first = count_crossings(self.source, self.flat.triangulation, self.flat.flips)
         whole = np.zeros(len(counts), dtype=bool)
         whole[first[counts < 0]] = True
-        own: BoolArray = whole[: self.mesh.faces.size]
-        return own
+        return whole[: self.mesh.faces.size]
 
 
 def overlay_straight(mesh: TriangleMesh, metric: ExactMetric) -> Overlaid:
-    """Return a mesh overlaid with a triangulation of its flat surface that has as many of its edges as there can be."""
-    source, original = intrinsic_triangulation(mesh, np.ones((len(mesh.faces), 3))), np.arange(len(mesh.vertices))
+    """Return a mesh with a triangulation of a flat metric that has as many of its edges as there can be."""
+    source = intrinsic_triangulation(mesh, np.ones((len(mesh.faces), 3)))
+    original = np.arange(len(mesh.vertices))
     if metric.doubled:
         source, original = double(source)
     flat = insert_edges(source, metric.triangulation, metric.flips)
-    return Overlaid(mesh, metric, source, original, flat)
+    return Overlaid(mesh, metric.log_scale[original], source, original, flat)
 
 
 def mend(overlaid: Overlaid, straight: FlatTriangles, untangled: FlatTriangles) -> Refinement:
-    """Return the mesh with the fewest of its triangles cut, so that none is turned over in a flat metric.
+    """Return the mesh with those of its edges cut that bend around vertices, so that no triangle is turned over.
 
-    Edges of the input that are straight in the flat metric stay whole, and so does what untangling has turned over.
-    The others bend around vertices, cones mostly: they are cut where they cross the edges of a flat triangulation
-    that has all straight ones, and the new vertices lie on them. So the surface stays what it is.
+    They are cut where they cross the edges of the flat triangulation, and the new vertices lie on them. So the
+    surface stays what it is.
 
     Args:
-        overlaid: the mesh.
-        straight: its triangles in the metric.
-        untangled: the same after untangling, with triangles that are left as they were.
+        overlaid: the mesh. Of a doubled surface the first half is cut.
+        straight: its triangles on straight sides.
+        untangled: the same after untangling, for which patches need no cut whose outlines are straight.
 
     Notes:
         Whatever places crossings have, as long as they follow each other along both edges in the right order, the
         pieces between are convex in the plane and in the input's triangles: the map is linear on the triangles of
         each. So no metric has to be kept on the way, and Euclidean flips do no harm, as they do in `refine`.
     """
-    mesh, metric, source, original, flat = (getattr(overlaid, name) for name in Overlaid.__match_args__)
-    phi = metric.log_scale[original]
-    crossings = place_crossings(source, flat, phi)
+    mesh, source, flat = overlaid.mesh, overlaid.source, overlaid.flat
+    crossings = place_crossings(source, flat, overlaid.log_scale)
     ends = np.stack([source.tail[crossings.leaving], source.tail[source.twin[crossings.leaving]]], axis=1)
-    positions = interpolate(mesh.vertices[original], ends, crossings.on_leaving)
+    positions = interpolate(mesh.vertices[overlaid.original], ends, crossings.on_leaving)
     pieces = find_pieces(source, flat.triangulation, flat.sides, crossings, positions)
     moved = _kept_moves(overlaid, straight, untangled)
     pieces = _with_moved(pieces, moved, mesh, untangled)
-    log_scale = np.concatenate([phi, crossings.log_scale])
+    log_scale = np.concatenate([overlaid.log_scale, crossings.log_scale])
     refined = assemble_pieces(mesh, source, crossings, positions, log_scale, pieces, flat.turns)
     return _turned(refined, moved)
 

@@ -35,6 +35,8 @@ LENGTH_TOLERANCE = 1e-9
 # Curvature, radians, at a vertex of a round boundary that is no part of a circle any more but a corner too sharp to be
 # one: the sides beside it are nearly all of the boundary. Then the round before has to do.
 TOO_SHARP = 0.99 * np.pi
+# Share of triangles inverted on straight sides above which moving vertices alone seldom helps them all.
+MANY = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,10 +120,12 @@ class ExactFlatMetric:
         if self.refine:
             return self._lay_out_refined(seams)
         straight = self.straight()
-        untangled = self._untangled(straight, seams)
-        if self.split and len(untangled.left):
-            return self._lay_out_split(straight, seams)
-        return self._lay_out_straight(disk, seams, straight, untangled)
+        few = np.count_nonzero(straight.is_inverted) <= MANY * len(self.mesh.faces)
+        if few or not self.split:
+            untangled = self._untangled(straight, seams)
+            if not (self.split and len(untangled.left)):
+                return self._lay_out_straight(disk, seams, straight, untangled)
+        return self._lay_out_split(straight, seams)
 
     def _untangled(
         self, straight: FlatTriangles, seams: IntArray, whole: BoolArray | None = None
@@ -151,13 +155,16 @@ class ExactFlatMetric:
             # Where the boundary is free, what comes out is what was wanted.
             target=np.where(self.is_open, curvature, self.target),
             curvature=curvature,
-            statistics=replace(
-                self.statistics,
-                untangled_triangles=int(straight.is_inverted.sum()),
-                untangled_vertices=len(untangled.moved),
-                untangled_move=untangled.largest_move,
-            ),
+            statistics=self._untangling(straight, untangled),
             notes=self.notes,
+        )
+
+    def _untangling(self, straight: FlatTriangles, untangled: Untangled) -> SolveStatistics:
+        return replace(
+            self.statistics,
+            untangled_triangles=int(straight.is_inverted.sum()),
+            untangled_vertices=len(untangled.moved),
+            untangled_move=untangled.largest_move,
         )
 
     def straight(self) -> FlatTriangles:
@@ -172,24 +179,23 @@ class ExactFlatMetric:
         return self._lay_out_pieces(refined, seams, replace(self.statistics, refined_triangles=added))
 
     def _lay_out_split(self, straight: FlatTriangles, seams: IntArray) -> LaidOut:
+        """Lay out with edges cut where they must bend, as far as no vertices can be moved instead."""
         from ...layout.mend import mend, overlay_straight
 
         overlaid = overlay_straight(self.mesh, self.solved)
         untangled = self._untangled(straight, seams, overlaid.whole)
         mended = mend(overlaid, straight, untangled.flat)
-        statistics = replace(
-            self.statistics,
-            untangled_triangles=int(straight.is_inverted.sum()) - len(untangled.left),
-            untangled_vertices=len(untangled.moved),
-            untangled_move=untangled.largest_move,
-            split_triangles=len(mended.mesh.faces) - len(self.mesh.faces),
-        )
+        added = len(mended.mesh.faces) - len(self.mesh.faces)
+        statistics = replace(self._untangling(straight, untangled), split_triangles=added)
         return self._lay_out_pieces(mended, seams, statistics)
 
     def _lay_out_pieces(self, refined: Refinement, seams: IntArray, statistics: SolveStatistics) -> LaidOut:
         mesh, edges = refined.mesh, refined.edges_on(seams)
         disk = cut_open(mesh, edges).mesh
         points = unfold(refined.flat, disk.faces) * self.shrink
+        curvature, added = laid_out_curvature(mesh, points[disk.faces]), len(mesh.vertices) - len(self.target)
+        target = np.concatenate([self.target, np.zeros(added)])
+        is_open = np.concatenate([self.is_open, np.zeros(added, dtype=bool)])
         return LaidOut(
             mesh=mesh,
             face_origin=refined.face_origin,
@@ -198,8 +204,8 @@ class ExactFlatMetric:
             cones=self.cones,
             seams=mesh.edges[edges],
             log_scale=refined.log_scale + np.log(self.shrink),
-            target=np.concatenate([self.target, np.zeros(len(mesh.vertices) - len(self.target))]),
-            curvature=laid_out_curvature(mesh, points[disk.faces]),
+            target=np.where(is_open, curvature, target),
+            curvature=curvature,
             statistics=statistics,
             notes=self.notes,
         )
