@@ -12,7 +12,7 @@ from .atlas.injective import without_overlaps
 from .cones.choose import Surface, choose_cones, cone_notes, pursues
 from .errors import CurvatureError, MetricError, SeamError
 from .flat import LaidOut
-from .flat.held_cones import unheld_notes, with_held_cones
+from .flat.held_cones import split_notes, unheld_notes, with_held_cones
 from .flat.methods import find_metric, turning_meter
 from .geometry.operators import weighted_areas
 from .input.components import Component, Prepared, prepare
@@ -82,7 +82,7 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     reached = layout.statistics.area_distortion_linear
     notes = cone_notes(mesh, len(layout.cones), reached, options)
     if options.method in UNFOLDED:
-        notes += unheld_notes(layout, part.constraints.names)
+        notes += unheld_notes(layout, part.constraints.names) + split_notes(layout, part.constraints.names)
     return replace(layout, notes=layout.notes + notes)
 
 

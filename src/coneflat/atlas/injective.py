@@ -71,12 +71,14 @@ def injective_charts(
 def without_overlaps(laid_out: LaidOut, part: Component, options: Options) -> LaidOut:
     """Return the layout split, as little as can be, into charts that do not overlap themselves."""
     mesh = laid_out.mesh
-    if mesh is part.mesh:
-        costs, avoided, forbidden = seam_costs(part, options)
-        costs = np.where(avoided | forbidden, costs + costs.sum(), costs)
-    else:  # a refinement has edges of its own
-        ends = mesh.vertices[mesh.edges]
-        costs = np.sqrt(dots(ends[:, 1] - ends[:, 0], ends[:, 1] - ends[:, 0]))
+    costs, avoided, forbidden = seam_costs(part, options)
+    costs = np.where(avoided | forbidden, costs + costs.sum(), costs)
+    if laid_out.cuts is not None:
+        # Parts of edges cost their part, and those that are new what they are long.
+        origin = laid_out.cuts.edge_origin
+        before, after = _edge_lengths(part.mesh), _edge_lengths(mesh)
+        share = after / np.where(before > 0, before, 1.0)[origin]
+        costs = np.where(origin >= 0, costs[origin] * share, after)
     charts = injective_charts(mesh, laid_out.points, laid_out.corners, costs)
     return replace(
         laid_out,
@@ -85,3 +87,10 @@ def without_overlaps(laid_out: LaidOut, part: Component, options: Options) -> La
         chart=charts.chart,
         seams=mesh.edges[Seams(mesh, charts).edges],
     )
+
+
+def _edge_lengths(mesh: TriangleMesh) -> FloatArray:
+    """Return (e,) the lengths of edges in space."""
+    ends = mesh.vertices[mesh.edges]
+    lengths: FloatArray = np.sqrt(dots(ends[:, 1] - ends[:, 0], ends[:, 1] - ends[:, 0]))
+    return lengths

@@ -77,7 +77,9 @@ def insert_edges(
         lost = np.ones(len(counts), dtype=bool)
         lost[first[counts < 0]] = False
         edges = np.flatnonzero(lost & (source.twin > np.arange(len(counts))))
-        record = np.empty((FLIPS_PER_CROSSING * int(np.maximum(counts, 0).sum()) + MORE_FLIPS), dtype=np.int64)
+        record = np.empty(
+            (FLIPS_PER_CROSSING * int(np.maximum(counts, 0).sum()) + MORE_FLIPS), dtype=np.int64
+        )
         done.append(record[: put_in_straight(source.twin, source.tail, edges, *arrays, record)])
         if not len(done[-1]):
             break
@@ -88,9 +90,7 @@ def insert_edges(
 def height(one: complex, two: complex) -> float:
     """Return the height over the longest side of the triangle with two sides that follow each other."""
     three = one + two
-    longest = max(
-        one.real**2 + one.imag**2, two.real**2 + two.imag**2, three.real**2 + three.imag**2
-    )
+    longest = max(one.real**2 + one.imag**2, two.real**2 + two.imag**2, three.real**2 + three.imag**2)
     return (one.real * two.imag - one.imag * two.real) / longest if longest > 0 else 0.0
 
 

@@ -47,6 +47,12 @@ class Overlaid:
         whole[first[counts < 0]] = True
         return whole[: self.mesh.faces.size]
 
+    @property
+    def is_whole_outside(self) -> bool:
+        """Whether no edge of the boundary need be cut: what lies beyond it, along a marked seam, would not be."""
+        sides = self.mesh.edge_halfedges[self.mesh.is_boundary_edge, 0]
+        return bool(self.whole[sides].all())
+
 
 def overlay_straight(mesh: TriangleMesh, metric: ExactMetric) -> Overlaid:
     """Return a mesh with a triangulation of a flat metric that has as many of its edges as there can be."""
@@ -86,7 +92,9 @@ def mend(overlaid: Overlaid, straight: FlatTriangles, untangled: FlatTriangles) 
     return _turned(refined, moved)
 
 
-def place_crossings(source: IntrinsicTriangulation, flat: FlatTriangulation, log_scale: FloatArray) -> Overlay:
+def place_crossings(
+    source: IntrinsicTriangulation, flat: FlatTriangulation, log_scale: FloatArray
+) -> Overlay:
     """Return the crossings of the input's edges with those of a flat triangulation, evenly spaced along the latter.
 
     Along the input's edges they are spaced as along the polygons in the plane.

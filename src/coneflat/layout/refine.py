@@ -43,6 +43,13 @@ class Refinement:
     crossing_edges: IntArray
     crossing_weights: FloatArray
 
+    @property
+    def edge_origin(self) -> IntArray:
+        """(e,) the input edge that each edge lies on, -1 for those inside of input faces."""
+        origin = np.full(len(self.mesh.edges), -1)
+        origin[self.mesh.halfedge_edges] = self.halfedge_edges
+        return origin
+
     def edges_on(self, edges: IntArray) -> IntArray:
         """Return the refined mesh's edges that lie on some edges of the input, its seams for instance."""
         return np.unique(self.mesh.halfedge_edges[np.isin(self.halfedge_edges, edges)])

@@ -17,7 +17,7 @@ from ...mesh import TriangleMesh
 from ...quality.statistics import SolveStatistics
 from ...seams import cut_open
 from ...text import plural
-from ..base import LaidOut, all_faces, failure_notes, laid_out_curvature, off_by
+from ..base import Cuts, LaidOut, all_faces, failure_notes, laid_out_curvature, off_by
 from .boundary import BoundaryCurvature
 from .metric import ExactMetric, exact_metric
 
@@ -125,7 +125,7 @@ class ExactFlatMetric:
             untangled = self._untangled(straight, seams)
             if not (self.split and len(untangled.left)):
                 return self._lay_out_straight(disk, seams, straight, untangled)
-        return self._lay_out_split(straight, seams)
+        return self._lay_out_split(disk, seams, straight)
 
     def _untangled(
         self, straight: FlatTriangles, seams: IntArray, whole: BoolArray | None = None
@@ -178,12 +178,14 @@ class ExactFlatMetric:
         added = len(refined.mesh.faces) - len(self.mesh.faces)
         return self._lay_out_pieces(refined, seams, replace(self.statistics, refined_triangles=added))
 
-    def _lay_out_split(self, straight: FlatTriangles, seams: IntArray) -> LaidOut:
+    def _lay_out_split(self, disk: TriangleMesh, seams: IntArray, straight: FlatTriangles) -> LaidOut:
         """Lay out with edges cut where they must bend, as far as no vertices can be moved instead."""
         from ...layout.mend import mend, overlay_straight
 
         overlaid = overlay_straight(self.mesh, self.solved)
         untangled = self._untangled(straight, seams, overlaid.whole)
+        if not len(untangled.left) or not overlaid.is_whole_outside:
+            return self._lay_out_straight(disk, seams, straight, untangled)
         mended = mend(overlaid, straight, untangled.flat)
         added = len(mended.mesh.faces) - len(self.mesh.faces)
         statistics = replace(self._untangling(straight, untangled), split_triangles=added)
@@ -207,6 +209,7 @@ class ExactFlatMetric:
             target=np.where(is_open, curvature, target),
             curvature=curvature,
             statistics=statistics,
+            cuts=Cuts(self.mesh.edges[refined.crossing_edges], refined.crossing_weights, refined.edge_origin),
             notes=self.notes,
         )
 
@@ -248,7 +251,16 @@ def exact_flattening(
     shrink = area_factor(lengths, solved) if choices.keep_area else 1.0
     target = np.where(fixed, solved.curvature, target)
     return ExactFlatMetric(
-        mesh, solution.cones, target, is_open, choices.is_held(mesh), solved, shrink, choices.refine, choices.split, notes
+        mesh,
+        solution.cones,
+        target,
+        is_open,
+        choices.is_held(mesh),
+        solved,
+        shrink,
+        choices.refine,
+        choices.split,
+        notes,
     )
 
 
