@@ -75,8 +75,8 @@ class TestWinding:
         """Where it would, triangles stay upside down, and are named."""
         seen = []
 
-        def watched(flat, faces, angles, pinned, on_seam, on_boundary):
-            result = untangle(flat, faces, angles, pinned, on_seam, on_boundary)
+        def watched(flat, faces, angles, pinned, on_seam, on_boundary, whole=None):
+            result = untangle(flat, faces, angles, pinned, on_seam, on_boundary, whole)
             seen.append((result, faces, angles, flat, on_boundary))
             return result
 

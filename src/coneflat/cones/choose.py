@@ -31,9 +31,9 @@ ROOM = 0.6 * np.pi
 # On meshes of so many vertices, a neighbour is as good a place: corners of cones there, all widened alike, must not
 # exceed this, or the straight sides of a triangle may have no room for one, and the search has to be repeated.
 FINE, WIDEST = 30_000, 0.95 * np.pi
-# Share of edges that are not Delaunay above which a mesh is far from it. Scans have up to 0.15; stretched ten to one
-# they have 0.2 to 0.3.
-MUCH = 0.15
+# Flips for each edge that make a mesh Delaunay, above which it is stretched: scans take less than 0.2, stretched thirty
+# to one 1.0 to 1.5; noise alone, up to 0.8. Not even a try where less than this share of edges is not Delaunay.
+STRETCHED, MANY = 0.8, 0.15
 # Up to so many corners of a polyhedron are all made cones. Below so many radians a vertex is none.
 FEW, FLAT = 24, 1e-6
 # The distortion asked for may be missed by so much, relatively, without a word.
@@ -71,9 +71,9 @@ class Surface:
     def of(cls, mesh: TriangleMesh, lengths: FloatArray, flips: bool = True) -> Surface:
         """Return a mesh with what follows from its lengths.
 
-        Where much of it is not Delaunay, as on stretched meshes, its own cotangents, many of them negative, tell little
-        of the surface, nor of the metric, which is found on the intrinsic Delaunay triangulation: its Laplacian and
-        vertex areas are then taken from that.
+        On stretched meshes the cotangents of the mesh's own triangles, many of them negative, tell little of the
+        surface, nor of the metric, which is found on the intrinsic Delaunay triangulation: Laplacian and vertex areas
+        are then taken from that.
 
         flips: the metric is one that may flip edges; else Laplacian and areas are always the mesh's own.
         """
@@ -82,20 +82,19 @@ class Surface:
         widest = np.zeros(n)
         np.maximum.at(widest, mesh.faces.ravel(), angles.ravel())
         widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
-        faces = mesh.faces
-        if flips and _not_delaunay(mesh, lengths) > MUCH:
-            triangulation, _ = intrinsic_delaunay(mesh, lengths)
-            faces, lengths_there = triangulation.faces, triangulation.length.reshape(-1, 3)
-        else:
-            lengths_there = lengths
-        laplacian = cotangent_laplacian(faces, cotangents(lengths_there), n)
-        return cls(mesh, lengths, laplacian, curvature, vertex_areas(faces, lengths_there, n), widest)
+        faces, sides = mesh.faces, lengths
+        if flips and _far_from_delaunay(mesh, lengths):
+            triangulation, done = intrinsic_delaunay(mesh, lengths)
+            if len(done) > STRETCHED * len(mesh.edges):
+                faces, sides = triangulation.faces, triangulation.length.reshape(-1, 3)
+        laplacian = cotangent_laplacian(faces, cotangents(sides), n)
+        return cls(mesh, lengths, laplacian, curvature, vertex_areas(faces, sides, n), widest)
 
 
-def _not_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> float:
-    """Return the share of edges that are not Delaunay: whose opposite angles sum to more than half a turn."""
+def _far_from_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> bool:
+    """Return whether many edges are not Delaunay: their opposite angles sum to more than half a turn."""
     weights = np.bincount(mesh.halfedge_edges, cotangents(lengths).ravel(), len(mesh.edges))
-    return float(np.count_nonzero(~mesh.is_boundary_edge & (weights < 0)) / len(mesh.edges))
+    return bool(np.count_nonzero(~mesh.is_boundary_edge & (weights < 0)) > MANY * len(mesh.edges))
 
 
 def pursues(mesh: TriangleMesh, options: Options) -> bool:

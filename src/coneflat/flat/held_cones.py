@@ -40,23 +40,24 @@ def with_held_cones(flatten: Callable[[Component], LaidOut], part: Component) ->
         laid_out = flatten(part)
         if _lack(laid_out) < _lack(best):
             best = laid_out
-        if laid_out.statistics.split_triangles or best.statistics.split_triangles:
+        if best.statistics.split_triangles and not best.notes:
             break
     return best
 
 
-def _lack(laid_out: LaidOut) -> tuple[int, int]:
-    """Return how many triangles were cut, and how many cones triangles have no room for."""
-    return laid_out.statistics.split_triangles, len(unheld_cones(laid_out))
+def _lack(laid_out: LaidOut) -> tuple[int, int, int]:
+    """Return how often the metric fell short, how many triangles were cut, and how many cones have no room."""
+    return len(laid_out.notes), laid_out.statistics.split_triangles, len(unheld_cones(laid_out))
 
 
 def unheld_cones(laid_out: LaidOut) -> IntArray:
     """Return the cones that the triangles around them cannot make room for, each having an angle below pi.
 
-    Of a layout in which triangles were cut, if so few that other cones may do without, those that are corners of these.
+    Of a layout in which triangles were cut, those that are corners of these, if other cones may do without: where few
+    were cut, or the metric fell short besides.
     """
     if laid_out.statistics.split_triangles:
-        if laid_out.statistics.split_triangles > FEW_CUT:
+        if laid_out.statistics.split_triangles > FEW_CUT and not laid_out.notes:
             return np.empty(0, dtype=np.int64)
         cut = np.bincount(laid_out.face_origin)[laid_out.face_origin] > 1
         return np.intersect1d(laid_out.mesh.faces[cut], laid_out.cones)

@@ -210,8 +210,8 @@ class MetricOptions:
     split: bool = option(
         True,
         Flag(),
-        "Where triangles would be inverted on straight sides whatever is moved, as around a cone that they have no room "
-        "for, cut them, and no others, with a note. Without, the result has the input's triangles, some inverted.",
+        "Where triangles would be inverted on straight sides whatever is moved, as around a cone that is too wide for "
+        "them, cut them, and no others, with a note. Without, the result has the input's own triangles, some inverted.",
     )
     best_effort: bool = option(
         False, Flag(), "Give a result even if the metric did not converge, which is refused otherwise."

@@ -123,7 +123,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         laid_out: its flattened components.
         options, stages: what the result tells about itself.
     """
-    given, checked = prepared.given, prepared.checked
+    checked = prepared.checked
     numbering = _number_vertices(prepared, laid_out)
     triangles = _sort_triangles(prepared, laid_out, numbering)
     corners_in_space = numbering.positions[triangles.faces]
