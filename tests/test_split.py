@@ -154,8 +154,8 @@ class TestFiles:
     def path(self, tmp_path):
         """The sphere with the wide cone as an OBJ file with groups, a comment and normals."""
         vertices, faces, cones, _ = wide_cone()
-        lines = ["# a sphere", *("v %r %r %r" % tuple(row) for row in vertices.tolist())]
-        lines += ["vn %r %r %r" % tuple(row) for row in vertices.tolist()]
+        lines = ["# a sphere", *(" ".join(("v", *map(repr, row))) for row in vertices.tolist())]
+        lines += [" ".join(("vn", *map(repr, row))) for row in vertices.tolist()]
         for i, face in enumerate((faces + 1).tolist()):
             if i % 100 == 0:
                 lines.append(f"g part{i}")
@@ -207,7 +207,9 @@ class TestFiles:
         shade = np.round(127 + 100 * vertices).astype(int)
         count = iter(shade.tolist())
         lines = [
-            line + " %g %g %g" % tuple(np.array(next(count)) / 255) if line.startswith("v ") else line
+            " ".join((line, *(f"{one:g}" for one in np.array(next(count)) / 255)))
+            if line.startswith("v ")
+            else line
             for line in path.read_text().splitlines()
         ]
         path.write_text("\n".join(lines) + "\n")

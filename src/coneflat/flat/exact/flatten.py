@@ -37,7 +37,7 @@ LENGTH_TOLERANCE = 1e-9
 TOO_SHARP = 0.99 * np.pi
 # Share of triangles inverted on straight sides above which moving vertices alone seldom helps them all, and takes long
 # on large meshes.
-MANY = 0.02
+MANY = 0.01
 
 
 @dataclass(frozen=True, eq=False)
