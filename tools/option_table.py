@@ -88,7 +88,7 @@ def _flags(name: str) -> str:
         opts
         for param in cli.commands["flatten"].params
         if param.name == name
-        for opts in (*param.opts, *param.secondary_opts)
+        for opts in (*param.opts, *(other for other in param.secondary_opts if other.startswith("--no-")))
     ]
     return ", ".join(f"`{flag}`" for flag in spellings or [flag_of(name)])
 

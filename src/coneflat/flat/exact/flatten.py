@@ -12,7 +12,7 @@ from ...cones import ConeSolution
 from ...geometry import double_areas
 from ...geometry.straight import FlatTriangles
 from ...layout.unfold import unfold
-from ...layout.untangle import LEAST_WORK, Untangled, untangle
+from ...layout.untangle import Untangled, untangle
 from ...mesh import TriangleMesh
 from ...quality.statistics import SolveStatistics
 from ...seams import cut_open
@@ -36,8 +36,8 @@ LENGTH_TOLERANCE = 1e-9
 # one: the sides beside it are nearly all of the boundary. Then the round before has to do.
 TOO_SHARP = 0.99 * np.pi
 # Share of triangles inverted on straight sides above which moving vertices alone seldom helps them all, and takes long
-# on large meshes.
-MANY = 0.01
+# if they are more than a few.
+MANY, FEW = 0.01, 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class ExactFlatMetric:
         if self.refine:
             return self._lay_out_refined(seams)
         straight = self.straight()
-        few = np.count_nonzero(straight.is_inverted) <= MANY * max(len(self.mesh.faces), LEAST_WORK)
+        few = np.count_nonzero(straight.is_inverted) <= max(MANY * len(self.mesh.faces), FEW)
         if few or not self.split:
             untangled = self._untangled(straight, seams)
             if not (self.split and len(untangled.left)):
