@@ -184,12 +184,17 @@ class ExactFlatMetric:
         from ...layout.mend import mend, overlay_straight
 
         overlaid = overlay_straight(self.mesh, self.solved)
-        untangled = self._untangled(straight, seams, overlaid.whole)
-        if not len(untangled.left) or not overlaid.is_whole_outside:
+        cuts = overlaid.is_whole_outside
+        untangled = self._untangled(straight, seams, overlaid.whole if cuts else None)
+        if not (cuts and len(untangled.left)):
             return self._lay_out_straight(disk, seams, straight, untangled)
         mended = mend(overlaid, straight, untangled.flat)
         added = len(mended.mesh.faces) - len(self.mesh.faces)
-        statistics = replace(self._untangling(straight, untangled), split_triangles=added)
+        statistics = replace(
+            self._untangling(straight, untangled),
+            untangled_triangles=int(straight.is_inverted.sum() - untangled.flat.is_inverted.sum()),
+            split_triangles=added,
+        )
         return self._lay_out_pieces(mended, seams, statistics)
 
     def _lay_out_pieces(self, refined: Refinement, seams: IntArray, statistics: SolveStatistics) -> LaidOut:
