@@ -32,8 +32,8 @@ ROOM = 0.6 * np.pi
 # exceed this, or the straight sides of a triangle may have no room for one, and the search has to be repeated.
 FINE, WIDEST = 30_000, 0.95 * np.pi
 # Flips for each edge that make a mesh Delaunay, above which it is stretched: scans take less than 0.2, stretched thirty
-# to one 1.0 to 1.5; noise alone, up to 0.8. Not even a try where less than this share of edges is not Delaunay.
-STRETCHED, MANY = 0.8, 0.15
+# to one 1.0 to 1.5; noise alone, up to 0.85. Not even a try where less than this share of edges is not Delaunay.
+STRETCHED, MANY = 0.95, 0.15
 # Up to so many corners of a polyhedron are all made cones. Below so many radians a vertex is none.
 FEW, FLAT = 24, 1e-6
 # The distortion asked for may be missed by so much, relatively, without a word.
