@@ -86,7 +86,10 @@ def _options(group: type) -> Iterator[tuple[str, Field[Any], Declaration]]:
 
 def _flags(name: str) -> str:
     spellings = [
-        opts for param in cli.commands["flatten"].params if param.name == name for opts in param.opts
+        opts
+        for param in cli.commands["flatten"].params
+        if param.name == name
+        for opts in (*param.opts, *(other for other in param.secondary_opts if other.startswith("--no-")))
     ]
     return ", ".join(f"`{flag}`" for flag in spellings or [flag_of(name)])
 
@@ -120,7 +123,7 @@ def _values(kind: Kind) -> str:
 
 
 def _flag_default(field: Field[Any], declaration: Declaration) -> str:
-    if isinstance(declaration.kind, Flag) and declaration.command_default:
+    if isinstance(declaration.kind, Flag) and (declaration.command_default or field.default is True):
         return "yes"
     shown = shown_default(field)
     return f"`{shown}`" if shown else ""

@@ -84,6 +84,7 @@ def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[s
         maybe(0.03, "boundary", "lengths", "disk", "straight")
     maybe(0.1, "best_effort", True)
     maybe(0.12, "refine", True)
+    maybe(0.2, "split", False)
     maybe(0.35, "repair", True)
     maybe(0.04, "strict", True)
     maybe(0.1, "solver", "scipy", "cholespy", "auto", "amg", "pardiso")

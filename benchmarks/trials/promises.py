@@ -100,10 +100,28 @@ def _check_origin(trial: Trial) -> None:
         trial.outcome.breach("origin: vertices are not the input's", "")
     if result.solve.refined_triangles == 0 and not result.settings.get("refine"):
         named = np.sort(result.vertex_origin[result.faces], axis=1)
-        if not np.array_equal(named, np.sort(faces[result.face_origin], axis=1)):
+        whole = np.bincount(result.face_origin)[result.face_origin] == 1
+        if not np.array_equal(named[whole], np.sort(faces[result.face_origin[whole]], axis=1)):
             trial.outcome.breach("origin: faces are not the input's", "")
+        if whole.all() != (result.solve.split_triangles == 0):
+            trial.outcome.breach("origin: faces were cut in secret", f"{np.count_nonzero(~whole)} pieces")
+        pieces = np.bincount(
+            result.face_origin[~whole], _areas(result.vertices, result.faces[~whole]), len(faces)
+        )
+        cut = np.unique(result.face_origin[~whole])
+        before = _areas(vertices, faces[cut])
+        if not (np.abs(pieces[cut] - before) <= 1e-9 * before.max(initial=0.0)).all():
+            trial.outcome.breach(
+                "origin: pieces are not those of their faces", np.abs(pieces[cut] - before).max()
+            )
     if (trial.topology.count > 2).any():
         trial.outcome.breach("origin: the result is no manifold", "")
+
+
+def _areas(vertices: Any, faces: Any) -> Any:
+    """Return (m,) the areas of triangles in space."""
+    one, two, three = np.moveaxis(vertices[faces], 1, 0)
+    return np.linalg.norm(np.cross(two - one, three - one), axis=1) / 2
 
 
 def _check_place(trial: Trial) -> None:

@@ -14,7 +14,7 @@ from .atlas.overlaid import overlaid
 from .cones.choose import Surface, choose_cones, cone_notes, pursues
 from .errors import CurvatureError, MetricError, SeamError
 from .flat import LaidOut
-from .flat.held_cones import unheld_notes, with_held_cones
+from .flat.held_cones import split_notes, unheld_notes, with_held_cones
 from .flat.methods import find_metric, turning_meter
 from .flat.more_cones import with_quality
 from .flat.relaxed import relaxed, relaxes
@@ -65,7 +65,7 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     """Flatten a connected mesh: find cones, scale the metric, cut, lay out, and part what overlaps."""
     mesh = part.mesh
     with stages("cones", 0.1):
-        surface = Surface.of(mesh, part.lengths)
+        surface = Surface.of(mesh, part.lengths, options.method in UNFOLDED and not options.refine)
         symmetry = find_symmetry(part, options)
 
     def flatten_once(part: Component, options: Options) -> LaidOut:
@@ -101,7 +101,7 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     reached = layout.statistics.area_distortion_linear
     notes = cone_notes(mesh, len(layout.cones), reached, options) + symmetry_notes(layout.symmetry)
     if options.method in UNFOLDED:
-        notes += unheld_notes(layout, part.constraints.names)
+        notes += unheld_notes(layout, part.constraints.names) + split_notes(layout, part.constraints.names)
     return replace(layout, notes=layout.notes + notes)
 
 

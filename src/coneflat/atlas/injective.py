@@ -101,13 +101,17 @@ def _rank(
 
 
 def cut_costs(laid_out: LaidOut, part: Component, options: Options) -> FloatArray:
-    """Return (e,) what cuts along the edges of a layout cost."""
+    """Return (e,) what cuts along the edges of a layout's mesh cost."""
     mesh = laid_out.mesh
-    if mesh is not part.mesh:  # a refinement has edges of its own
-        ends = mesh.vertices[mesh.edges]
-        return np.sqrt(dots(ends[:, 1] - ends[:, 0], ends[:, 1] - ends[:, 0]))
     costs, avoided, forbidden = seam_costs(part, options)
-    return np.where(avoided | forbidden, costs + costs.sum(), costs)
+    costs = np.where(avoided | forbidden, costs + costs.sum(), costs)
+    if laid_out.cuts is None:
+        return costs
+    # Parts of edges cost their part, and those that are new what they are long.
+    origin = laid_out.cuts.edge_origin
+    before, after = _edge_lengths(part.mesh), _edge_lengths(mesh)
+    share = after / np.where(before > 0, before, 1.0)[origin]
+    return np.where(origin >= 0, costs[origin] * share, after)
 
 
 def without_overlaps(laid_out: LaidOut, part: Component, options: Options) -> LaidOut:
@@ -123,3 +127,10 @@ def without_overlaps(laid_out: LaidOut, part: Component, options: Options) -> La
         chart=charts.chart,
         seams=mesh.edges[Seams(mesh, charts).edges],
     )
+
+
+def _edge_lengths(mesh: TriangleMesh) -> FloatArray:
+    """Return (e,) the lengths of edges in space."""
+    ends = mesh.vertices[mesh.edges]
+    lengths: FloatArray = np.sqrt(dots(ends[:, 1] - ends[:, 0], ends[:, 1] - ends[:, 0]))
+    return lengths

@@ -162,7 +162,10 @@ def _flattening(path: Path, arrays: dict[str, NDArray[Any]]) -> Flattening:
         notes=tuple(report["notes"]),
         settings=report["settings"],
         solve=SolveStatistics(
-            **{field.name: _number(report[field.name]) for field in fields(SolveStatistics)}
+            **{
+                field.name: _number(report.get(field.name, field.default))
+                for field in fields(SolveStatistics)
+            }
         ),
         solvers=tuple(report["solvers"]),
         rotations=_rotations(report),

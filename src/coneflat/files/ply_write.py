@@ -35,7 +35,7 @@ def write_ply(result: Flattening, stream: IO[bytes]) -> None:
         doubles["nx ny nz"] = mesh.normals
     doubles["s t"] = mesh.uv
     names = " ".join(doubles).split()
-    colours = _colours(result, mesh.origin)
+    colours = _colours(result, mesh.own)
     kind = [("doubles", "<f8", len(names)), ("source_vertex", "<i4"), ("colours", "u1", colours.shape[1])]
     vertices = np.empty(len(mesh.vertices), kind)
     vertices["doubles"] = np.concatenate(list(doubles.values()), axis=1)
@@ -61,10 +61,14 @@ def write_ply(result: Flattening, stream: IO[bytes]) -> None:
     stream.write(faces.data)
 
 
-def _colours(result: Flattening, origin: IntArray) -> NDArray[np.uint8]:
-    """Return (k, 3) the colours that the file gives vertices of the input, 0 to 255; (k, 0) if it gives none."""
+def _colours(result: Flattening, vertices: IntArray) -> NDArray[np.uint8]:
+    """Return (k, 3) the colours that the file gives vertices of the result, 0 to 255; (k, 0) if it gives none."""
     source = result.source
     if source is None or result.face_corners is None or not source.has_colours:
-        return np.empty((len(origin), 0), np.uint8)
-    shades = np.stack([source.properties[name][origin] for name in COLOURS], axis=1)
+        return np.empty((len(vertices), 0), np.uint8)
+    number = np.arange(len(result.vertices)) if result.vertex_origin is None else result.vertex_origin.copy()
+    # Vertices on edges that were cut are the file's last ones.
+    added = np.flatnonzero(number < 0)
+    number[added] = len(source.vertices) - len(added) + np.arange(len(added))
+    shades = np.stack([source.properties[name][number[vertices]] for name in COLOURS], axis=1)
     return np.round(255 * np.clip(np.nan_to_num(shades), 0, 1)).astype(np.uint8)

@@ -24,6 +24,21 @@ FLAT = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
+class Cuts:
+    """Where edges of a mesh were cut.
+
+    Attributes:
+        ends: (x, 2) the vertices of the mesh between which each new one lies.
+        weights: (x, 2) its barycentric coordinates there.
+        edge_origin: (e,) the edge of the mesh that each edge of the result lies on, -1 for those inside of faces.
+    """
+
+    ends: IntArray
+    weights: FloatArray
+    edge_origin: IntArray
+
+
+@dataclass(frozen=True, eq=False)
 class LaidOut:
     """A connected mesh with its layout.
 
@@ -35,6 +50,7 @@ class LaidOut:
         corners: (m, 3) index into `points` of every triangle corner.
         chart: (m,) the chart of each triangle, from 0; charts have no points in common and may lie over each other.
             None for one chart.
+        cuts: where edges were cut, if the mesh is a refinement.
         cones: (s,) vertices.
         seams: (k, 2) vertex pairs.
         log_scale: (n,) phi; flat lengths are about l * exp(phi).
@@ -56,6 +72,7 @@ class LaidOut:
     curvature: FloatArray
     statistics: SolveStatistics
     chart: IntArray | None = None
+    cuts: Cuts | None = None
     notes: tuple[str, ...] = ()
     symmetry: SymmetryUse | None = None
     lies_on: IntArray | None = None

@@ -19,7 +19,7 @@ from ..mesh import TriangleMesh
 from ..options import Options
 from .base import FlatMetric
 from .exact.boundary import prescribed_boundary, straight_boundary
-from .exact.flatten import ExactChoices, exact_flattening
+from .exact.flatten import ExactChoices, ExactFlatMetric, exact_flattening
 from .exact.handles import corrected_flattening
 from .linear import linear_flattening
 
@@ -32,7 +32,10 @@ def find_metric(
     if options.method == "linear":
         return linear_flattening(mesh, lengths, solution)
     if options.method != "exact":
-        return other_method(options.method)(mesh, lengths, solution, options.best_effort)
+        metric = other_method(options.method)(mesh, lengths, solution, options.best_effort)
+        if isinstance(metric, ExactFlatMetric):
+            return replace(metric, split=options.split and options.lengths is None)
+        return metric
     choices = _exact_choices(surface, solution, constraints, options)
     if options.correct_handles and options.quantise is not None and mesh.genus():
         return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantise)
@@ -78,6 +81,8 @@ def _exact_choices(
         keep_area=options.boundary_kind != "lengths" and not options.marks_seams,
         best_effort=options.best_effort,
         refine=options.refine,
+        # The positions of new vertices would tell nothing of lengths that are given.
+        split=options.split and options.lengths is None,
         names=constraints.names,
     )
 

@@ -70,8 +70,8 @@ def overlay(
         edge ab, and the right side, with factors exp(phi_s) and exp(phi_e), that on the edge se before the
         flips. The sum of the latter coefficients over that of the former is the conformal factor.
     """
-    counts, first = _count(source, flat, flips)
-    offset, number, crossed, leaving, near, far = _trace(source, flat, counts, first)
+    counts, first = count_crossings(source, flat, flips)
+    offset, number, crossed, leaving, near, far = trace_crossings(source, flat, counts, first)
     (near_a, near_b), (far_a, far_b) = near.T, far.T
     on_crossed = np.stack([near_b * far_b, near_a * far_a], axis=1)
     on_leaving = np.stack([far_a * far_b, near_a * near_b], axis=1)
@@ -93,7 +93,7 @@ def overlay(
     )
 
 
-def _count(
+def count_crossings(
     source: IntrinsicTriangulation, flat: IntrinsicTriangulation, flips: IntArray
 ) -> tuple[IntArray, IntArray]:
     """Return the number of crossings on each flat half-edge, and its place among the input ones."""
@@ -110,7 +110,7 @@ def _count(
     return counts, first
 
 
-def _trace(
+def trace_crossings(
     source: IntrinsicTriangulation, flat: IntrinsicTriangulation, counts: IntArray, first: IntArray
 ) -> tuple[IntArray, IntArray, IntArray, IntArray, FloatArray, FloatArray]:
     """Return the crossings along both sets of edges and the lambda lengths around them."""

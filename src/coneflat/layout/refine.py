@@ -43,6 +43,13 @@ class Refinement:
     crossing_edges: IntArray
     crossing_weights: FloatArray
 
+    @property
+    def edge_origin(self) -> IntArray:
+        """(e,) the input edge that each edge lies on, -1 for those inside of input faces."""
+        origin = np.full(len(self.mesh.edges), -1)
+        origin[self.mesh.halfedge_edges] = self.halfedge_edges
+        return origin
+
     def edges_on(self, edges: IntArray) -> IntArray:
         """Return the refined mesh's edges that lie on some edges of the input, its seams for instance."""
         return np.unique(self.mesh.halfedge_edges[np.isin(self.halfedge_edges, edges)])
@@ -116,10 +123,10 @@ def refine(mesh: TriangleMesh, metric: ExactMetric) -> Refinement:
     find_turns(flat.twin, sides, turns)
     pieces = find_pieces(source, flat, sides, crossings, positions)
     log_scale = np.concatenate([phi, crossings.log_scale])
-    return _assemble(mesh, source, crossings, positions, log_scale, pieces, turns)
+    return assemble_pieces(mesh, source, crossings, positions, log_scale, pieces, turns)
 
 
-def _assemble(
+def assemble_pieces(
     mesh: TriangleMesh,
     source: IntrinsicTriangulation,
     crossings: Overlay,
@@ -128,23 +135,25 @@ def _assemble(
     pieces: Pieces,
     turns: ComplexArray,
 ) -> Refinement:
-    """Return the pieces of the mesh's own faces, without those of its mirror image.
+    """Return the pieces of the mesh's own faces, without those of its mirror image, and the crossings at their corners.
 
     turns: (3m,) from the frame across each half-edge of the flat triangulation to that of its own triangle.
     """
     leaving = crossings.leaving
     halfedge = np.where(leaving < mesh.faces.size, leaving, source.twin[leaving])
     is_own = halfedge < mesh.faces.size
-    edges, leaving = mesh.halfedge_edges[halfedge[is_own]], leaving[is_own]
-    weights = crossings.on_leaving[is_own]
+    count = int(np.searchsorted(pieces.origin, len(mesh.faces)))
+    used = np.zeros(len(positions), dtype=bool)
+    used[pieces.corners[:count]] = True
+    used = is_own & used[source.vertex_count :]
+    kept = np.zeros(len(positions), dtype=bool)
+    kept[: len(mesh.vertices)] = True
+    kept[source.vertex_count :] = used
+    number = np.cumsum(kept) - 1
+    edges, leaving = mesh.halfedge_edges[halfedge[used]], leaving[used]
+    weights = crossings.on_leaving[used]
     backwards = source.tail[leaving] != mesh.edges[edges, 0]
     weights[backwards] = weights[backwards, ::-1]
-
-    kept = np.ones(len(positions), dtype=bool)
-    kept[len(mesh.vertices) : source.vertex_count] = False
-    kept[source.vertex_count :] = is_own
-    number = np.cumsum(kept) - 1
-    count = int(np.searchsorted(pieces.origin, len(mesh.faces)))
     refined = TriangleMesh(positions[kept], number[pieces.corners[:count]])
     twin = halfedge_twins(refined)
     on_flat, on_input = pieces.on_flat[:count].ravel(), pieces.on_input[:count].ravel()

@@ -53,6 +53,7 @@ def untangle(
     pinned: BoolArray,
     on_seam: BoolArray,
     on_boundary: BoolArray,
+    whole: BoolArray | None = None,
 ) -> Untangled:
     """Turn inverted and degenerate triangles over, moving as few vertices as possible.
 
@@ -74,12 +75,14 @@ def untangle(
             must keep their curvature or the lengths between them.
         on_seam: (n,) vertices that should stay.
         on_boundary: (n,) vertices of the boundary.
+        whole: (3m,) half-edges that need no cut. Triangles beside others count as bad, and are left as they were
+            unless all that are in their patch can be made upright and those around are whole. None for all.
 
     Notes:
         V. Garanzha et al., "Foldover-free maps in 50 lines of code", 2021: an energy that grows without
         bound as a triangle loses its area, with a regularisation that makes it finite beyond.
     """
-    state = _Untangling(flat, faces, angles, on_boundary)
+    state = _Untangling(flat, faces, angles, on_boundary, whole)
     for stay, sizes in (
         (pinned | on_seam | on_boundary, RINGS_BESIDE_SEAMS),
         (pinned | on_boundary, RINGS),
@@ -109,13 +112,21 @@ class _Untangling:
     """
 
     def __init__(
-        self, flat: FlatTriangles, faces: IntArray, angles: FloatArray, on_boundary: BoolArray
+        self,
+        flat: FlatTriangles,
+        faces: IntArray,
+        angles: FloatArray,
+        on_boundary: BoolArray,
+        whole: BoolArray | None,
     ) -> None:
         self.flat, self.faces, self.angles, self.on_boundary = flat, faces, angles, on_boundary
         self.sides = flat.sides.reshape(-1, 3).copy()
         self.moves = np.zeros(len(angles))
         self.work, self.most_work = 0, WORK * max(len(faces), LEAST_WORK)
         self.is_bad = ~(heights(self.sides) > DEGENERATE)
+        self.cut = None if whole is None else ~whole.reshape(-1, 3)
+        if self.cut is not None:
+            self.is_bad |= self.cut.any(axis=1)
         self._failed: set[bytes] = set()
 
     def improve(self, rings: int, least: float, stay: BoolArray) -> None:
@@ -159,6 +170,8 @@ class _Untangling:
         is_upright = heights(result) > DEGENERATE
         failed = np.zeros(patches.count, dtype=bool)
         failed[patches.face_patch[~is_upright]] = True
+        if self.cut is not None:
+            failed[patches.face_patch[self._is_open(patches)]] = True
         trial = np.where(failed[patches.face_patch, None], patches.sides, result)
         winding = self._winding(patches, trial)
         winds = np.zeros(len(self.angles), dtype=bool)
@@ -170,6 +183,17 @@ class _Untangling:
         self.is_bad[patches.faces[good]] = False
         self.moves[patches.vertices] += np.where(failed[patches.patch], 0.0, np.abs(shifts))
         return winding
+
+    def _is_open(self, patches: Patches) -> BoolArray:
+        """Return (f,) the triangles of patches beside which one outside is bad, across an edge that needs a cut."""
+        assert self.cut is not None
+        label = np.full(len(self.faces), -1)
+        label[patches.faces] = patches.face_patch
+        across = self.flat.twin.reshape(-1, 3)[patches.faces]
+        beyond = across // 3
+        outside = (across >= 0) & (label[beyond] != patches.face_patch[:, None]) & self.is_bad[beyond]
+        is_open: BoolArray = (outside & self.cut[patches.faces]).any(axis=1)
+        return is_open
 
     def _winding(self, patches: Patches, trial: ComplexArray) -> IntArray:
         """Return the vertices around which triangles would wind that do not now, with sides (f, 3) for the patches'."""

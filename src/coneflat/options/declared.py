@@ -233,6 +233,12 @@ class MetricOptions:
         "moves all vertices, except on a boundary that is prescribed.",
         only="exact",
     )
+    split: bool = option(
+        True,
+        Flag(),
+        "Where triangles would be inverted on straight sides whatever is moved, as around a cone that is too wide for "
+        "them, cut them, and no others, with a note. Without, the result has the input's own triangles, some inverted.",
+    )
     best_effort: bool = option(
         False, Flag(), "Give a result even if the metric did not converge, which is refused otherwise."
     )

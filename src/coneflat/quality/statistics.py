@@ -25,6 +25,7 @@ class SolveStatistics:
         qc_mean_unrelaxed, qc_max_unrelaxed: the mean and the largest quasi-conformal distortion before; NaN where
             nothing was to be relaxed.
         refined_triangles: triangles that were added by the common subdivision.
+        split_triangles: triangles that were added where straight sides left some inverted.
         area_distortion_linear: E of the linear model that the cones were chosen in: the standard deviation of
             the log scale, by area (and importance, where weights were given).
         area_distortion: E of the metric that was laid out.
@@ -42,6 +43,7 @@ class SolveStatistics:
     qc_mean_unrelaxed: float = float("nan")
     qc_max_unrelaxed: float = float("nan")
     refined_triangles: int = 0
+    split_triangles: int = 0
     area_distortion_linear: float = 0.0
     area_distortion: float = 0.0
 

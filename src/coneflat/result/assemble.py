@@ -16,6 +16,7 @@ from ..atlas.mirrored import ChartMirrors, mirrors_of
 from ..geometry.planar import sides_between
 from ..input.numbering import result_numbering, turn_corners
 from ..input.polygons import Polygons
+from ..input.split_file import CutTriangles, cut_file
 from ..layout.convex import make_convex
 from ..mesh import TriangleMesh
 from ..options import CONED, Options, settings
@@ -30,6 +31,7 @@ from .symmetry import mirror_symmetry
 if TYPE_CHECKING:
     from ..flat import LaidOut
     from ..input.components import Prepared
+    from ..input.mesh_file import MeshFile
 
 
 # Of the longest side in the plane: how far one side of a model is off the other that it lies on, so that readers who
@@ -76,11 +78,13 @@ class _Triangles:
     Attributes:
         order: (m,) which triangle each is, of those of all components.
         faces: (m, 3) vertices of the result.
+        checked: (m,) the face of the checked mesh.
         face_origin: (m,) the face of the input.
     """
 
     order: IntArray
     faces: IntArray
+    checked: IntArray
     face_origin: IntArray
 
 
@@ -126,19 +130,16 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         laid_out: its flattened components.
         options, stages: what the result tells about itself.
     """
-    given, checked = prepared.given, prepared.checked
+    checked = prepared.checked
     numbering = _number_vertices(prepared, laid_out)
     triangles = _sort_triangles(prepared, laid_out, numbering)
     corners_in_space = numbering.positions[triangles.faces]
     with stages("pack"):
         mirrors = [mirrors_of(one) for one in laid_out]
         layout = _pack(laid_out, mirrors, triangles, corners_in_space, options)
-    refined = any(one.statistics.refined_triangles for one in laid_out)
-    face_corners = (
-        None if refined or given.face_corners is None else turn_corners(checked, given.face_corners)
-    )
-    if face_corners is not None and given.source is not None:
-        polygons = Polygons(given.source.offsets, face_corners)
+    source, face_corners = _polygons(prepared, laid_out, numbering, triangles)
+    if face_corners is not None and source is not None:
+        polygons = Polygons(source.offsets, face_corners)
         with stages("polygons"):
             uv = make_convex(layout.uv, layout.corners, polygons, corners_in_space)
             layout = replace(layout, uv=uv)
@@ -170,7 +171,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
             *checked.notes,
             *prepared.notes,
             *_distinct_notes(laid_out),
-            *[POLYGONS_LOST] * (refined and given.source is not None),
+            *[POLYGONS_LOST] * (source is not None and face_corners is None),
         ),
         settings=settings(options),
         solve=SolveStatistics.of_all(
@@ -185,10 +186,48 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
         vertex_origin=numbering.vertex_origin,
         face_origin=triangles.face_origin,
         face_corners=face_corners,
-        source=given.source,
+        source=source,
         lengths=None if prepared.own_lengths is None else np.ldexp(prepared.own_lengths, -checked.exponent),
     )
     return replace(result, notes=(*result.notes, *broken_promises(result)))
+
+
+def _polygons(
+    prepared: Prepared, laid_out: Sequence[LaidOut], numbering: _Numbering, triangles: _Triangles
+) -> tuple[MeshFile | None, IntArray | None]:
+    """Return the file with the polygons of the result, and its polygon corner at each triangle corner, if there is one.
+
+    Where a few triangles were cut, the file is one with their pieces. A refinement of everything has no polygons, nor
+    has one of the scene of a glTF file.
+    """
+    given, checked = prepared.given, prepared.checked
+    source, is_cut = given.source, any(one.cuts is not None for one in laid_out)
+    if source is None or given.face_corners is None:
+        return source, None
+    corners = turn_corners(checked, given.face_corners)
+    if not is_cut:
+        return source, corners
+    if source.scene is not None or any(one.statistics.refined_triangles for one in laid_out):
+        return source, None
+    added = [
+        np.arange(len(part.vertices), len(one.mesh.vertices))
+        for part, one in zip(prepared.components, laid_out, strict=True)
+    ]
+    none = np.empty((0, 2))
+    vertices = numbering.renumber(added)
+    cut = CutTriangles(
+        faces=triangles.faces,
+        origin=triangles.checked,
+        origin_faces=numbering.of_checked[checked.mesh.faces][triangles.checked],
+        origin_corners=corners[triangles.checked],
+        added=vertices,
+        ends=numbering.renumber(
+            [none.astype(np.int64) if one.cuts is None else one.cuts.ends for one in laid_out]
+        ),
+        weights=np.concatenate([none if one.cuts is None else one.cuts.weights for one in laid_out]),
+        positions=numbering.positions[vertices],
+    )
+    return cut_file(source, cut, numbering.vertex_origin)
 
 
 def _number_vertices(prepared: Prepared, laid_out: Sequence[LaidOut]) -> _Numbering:
@@ -212,7 +251,7 @@ def _sort_triangles(prepared: Prepared, laid_out: Sequence[LaidOut], numbering: 
     )
     order = np.argsort(origin, kind="stable")
     faces = numbering.renumber([one.mesh.faces for one in laid_out])[order]
-    return _Triangles(order, faces, prepared.checked.face_origin[origin[order]])
+    return _Triangles(order, faces, origin[order], prepared.checked.face_origin[origin[order]])
 
 
 def _pack(

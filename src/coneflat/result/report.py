@@ -144,6 +144,8 @@ def as_rows(result: Flattening) -> list[Row]:
             f"{solve.untangled_move:.2g} edges"
         )
     added = f"; {solve.refined_triangles:,} more by the refinement" if solve.refined_triangles else ""
+    if solve.split_triangles:
+        added = f"; {solve.split_triangles:,} triangles more where they could not be upright"
     of_map = map_rows(d)
     if solve.relaxed_vertices:
         relaxed = (

@@ -124,7 +124,9 @@ def _may_fit_any_mesh(declaration: Declaration) -> bool:
 
 def _flag(name: str, field: Field[Any], declaration: Declaration) -> Callable[[Command], Command]:
     """Return what adds one flag; its value is None, or an empty tuple, where it is not given."""
-    kind, more = declaration.kind, dict[str, Any]()
+    kind, more, flag = declaration.kind, dict[str, Any](), flag_of(name)
+    if field.default is True:
+        flag += f"/--no-{flag[2:]}"
     match kind:
         case Flag():
             more = {"is_flag": True, "default": None}
@@ -154,7 +156,7 @@ def _flag(name: str, field: Field[Any], declaration: Declaration) -> Callable[[C
     )
     shown = shown_default(field)
     doc += f"  [default: {shown}]" if shown else ""
-    return click.option(flag_of(name), *SPELLINGS.get(name, ()), name, help=doc, **more)
+    return click.option(flag, *SPELLINGS.get(name, ()), name, help=doc, **more)
 
 
 def shown_default(field: Field[Any]) -> str:
@@ -165,6 +167,8 @@ def shown_default(field: Field[Any]) -> str:
     if isinstance(field.metadata["declaration"].kind, Number) and field.metadata["declaration"].kind.is_angle:
         turns = value / math.pi
         return f"{turns:g}pi" if turns >= 1 else f"pi/{1 / turns:g}"
+    if value is True:
+        return "yes"
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

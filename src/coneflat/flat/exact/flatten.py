@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,14 +12,17 @@ from ...cones import ConeSolution
 from ...geometry import double_areas
 from ...geometry.straight import FlatTriangles
 from ...layout.unfold import unfold
-from ...layout.untangle import untangle
+from ...layout.untangle import Untangled, untangle
 from ...mesh import TriangleMesh
 from ...quality.statistics import SolveStatistics
 from ...seams import cut_open
 from ...text import plural
-from ..base import LaidOut, all_faces, failure_notes, laid_out_curvature, off_by
+from ..base import Cuts, LaidOut, all_faces, failure_notes, laid_out_curvature, off_by
 from .boundary import BoundaryCurvature
 from .metric import ExactMetric, exact_metric
+
+if TYPE_CHECKING:
+    from ...layout.refine import Refinement
 
 # The curvature of a round boundary is found from the metric it leads to, over and over: rounds at most, and the
 # largest relative change at a vertex at which to stop. What is solved for in the end is exact in any case.
@@ -31,6 +35,9 @@ LENGTH_TOLERANCE = 1e-9
 # Curvature, radians, at a vertex of a round boundary that is no part of a circle any more but a corner too sharp to be
 # one: the sides beside it are nearly all of the boundary. Then the round before has to do.
 TOO_SHARP = 0.99 * np.pi
+# Share of triangles inverted on straight sides above which moving vertices alone seldom helps them all, and takes long
+# if they are more than a few.
+MANY, FEW = 0.01, 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +53,7 @@ class ExactChoices:
             lengths are then kept.
         best_effort: return a metric that did not converge.
         refine: lay out the common subdivision instead of the mesh's own triangles on straight sides.
+        split: cut triangles that are inverted on straight sides and cannot be turned over.
         names: (n,) what the user calls each vertex; None if he has no other numbers.
     """
 
@@ -55,6 +63,7 @@ class ExactChoices:
     keep_area: bool = True
     best_effort: bool = False
     refine: bool = False
+    split: bool = False
     names: IntArray | None = None
 
     def is_open(self, mesh: TriangleMesh) -> BoolArray:
@@ -82,6 +91,7 @@ class ExactFlatMetric:
         solved: the metric.
         shrink: factor that brings it to the wanted size.
         refine: lay out the common subdivision.
+        split: cut triangles that are inverted on straight sides and cannot be turned over.
         notes: what falls short of what was wanted.
     """
 
@@ -92,7 +102,8 @@ class ExactFlatMetric:
     is_held: BoolArray
     solved: ExactMetric
     shrink: float
-    refine: bool
+    refine: bool = False
+    split: bool = False
     notes: tuple[str, ...] = ()
 
     @property
@@ -107,17 +118,31 @@ class ExactFlatMetric:
 
     def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
         """Unfold the metric; on the mesh's own triangles, after turning over what is inverted there."""
-        return self._lay_out_refined(seams) if self.refine else self._lay_out_straight(disk, seams)
+        if self.refine:
+            return self._lay_out_refined(seams)
+        straight = self.straight()
+        few = np.count_nonzero(straight.is_inverted) <= max(MANY * len(self.mesh.faces), FEW)
+        if few or not self.split:
+            untangled = self._untangled(straight, seams)
+            if not (self.split and len(untangled.left)):
+                return self._lay_out_straight(disk, seams, straight, untangled)
+        return self._lay_out_split(disk, seams, straight)
 
-    def _lay_out_straight(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
-        mesh, solved = self.mesh, self.solved
-        flat = self.straight()
-        on_boundary = mesh.is_boundary_vertex
+    def _untangled(
+        self, straight: FlatTriangles, seams: IntArray, whole: BoolArray | None = None
+    ) -> Untangled:
+        """Return the triangles with what can be turned over turned over; see `untangle`."""
+        mesh = self.mesh
         pinned, on_seam = self.is_held.copy(), np.zeros(len(mesh.vertices), dtype=bool)
         pinned[self.cones] = True
         on_seam[mesh.edges[seams]] = True
-        angles = np.where(on_boundary, np.pi, 2 * np.pi) - self.target
-        untangled = untangle(flat, mesh.faces, angles, pinned, on_seam, on_boundary)
+        angles = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - self.target
+        return untangle(straight, mesh.faces, angles, pinned, on_seam, mesh.is_boundary_vertex, whole)
+
+    def _lay_out_straight(
+        self, disk: TriangleMesh, seams: IntArray, straight: FlatTriangles, untangled: Untangled
+    ) -> LaidOut:
+        mesh, solved = self.mesh, self.solved
         points = unfold(untangled.flat, disk.faces) * self.shrink
         curvature = laid_out_curvature(mesh, points[disk.faces])
         return LaidOut(
@@ -131,13 +156,16 @@ class ExactFlatMetric:
             # Where the boundary is free, what comes out is what was wanted.
             target=np.where(self.is_open, curvature, self.target),
             curvature=curvature,
-            statistics=replace(
-                self.statistics,
-                untangled_triangles=int(flat.is_inverted.sum()),
-                untangled_vertices=len(untangled.moved),
-                untangled_move=untangled.largest_move,
-            ),
+            statistics=self._untangling(straight, untangled),
             notes=self.notes,
+        )
+
+    def _untangling(self, straight: FlatTriangles, untangled: Untangled) -> SolveStatistics:
+        return replace(
+            self.statistics,
+            untangled_triangles=int(straight.is_inverted.sum()),
+            untangled_vertices=len(untangled.moved),
+            untangled_move=untangled.largest_move,
         )
 
     def straight(self) -> FlatTriangles:
@@ -148,9 +176,34 @@ class ExactFlatMetric:
         from ...layout.refine import refine
 
         refined = refine(self.mesh, self.solved)
+        added = len(refined.mesh.faces) - len(self.mesh.faces)
+        return self._lay_out_pieces(refined, seams, replace(self.statistics, refined_triangles=added))
+
+    def _lay_out_split(self, disk: TriangleMesh, seams: IntArray, straight: FlatTriangles) -> LaidOut:
+        """Lay out with edges cut where they must bend, as far as no vertices can be moved instead."""
+        from ...layout.mend import mend, overlay_straight
+
+        overlaid = overlay_straight(self.mesh, self.solved)
+        cuts = overlaid.is_whole_outside
+        untangled = self._untangled(straight, seams, overlaid.whole if cuts else None)
+        if not (cuts and len(untangled.left)):
+            return self._lay_out_straight(disk, seams, straight, untangled)
+        mended = mend(overlaid, straight, untangled.flat)
+        added = len(mended.mesh.faces) - len(self.mesh.faces)
+        statistics = replace(
+            self._untangling(straight, untangled),
+            untangled_triangles=int(straight.is_inverted.sum() - untangled.flat.is_inverted.sum()),
+            split_triangles=added,
+        )
+        return self._lay_out_pieces(mended, seams, statistics)
+
+    def _lay_out_pieces(self, refined: Refinement, seams: IntArray, statistics: SolveStatistics) -> LaidOut:
         mesh, edges = refined.mesh, refined.edges_on(seams)
         disk = cut_open(mesh, edges).mesh
         points = unfold(refined.flat, disk.faces) * self.shrink
+        curvature, added = laid_out_curvature(mesh, points[disk.faces]), len(mesh.vertices) - len(self.target)
+        target = np.concatenate([self.target, np.zeros(added)])
+        is_open = np.concatenate([self.is_open, np.zeros(added, dtype=bool)])
         return LaidOut(
             mesh=mesh,
             face_origin=refined.face_origin,
@@ -159,9 +212,10 @@ class ExactFlatMetric:
             cones=self.cones,
             seams=mesh.edges[edges],
             log_scale=refined.log_scale + np.log(self.shrink),
-            target=np.concatenate([self.target, np.zeros(len(mesh.vertices) - len(self.target))]),
-            curvature=laid_out_curvature(mesh, points[disk.faces]),
-            statistics=replace(self.statistics, refined_triangles=len(mesh.faces) - len(self.mesh.faces)),
+            target=np.where(is_open, curvature, target),
+            curvature=curvature,
+            statistics=statistics,
+            cuts=Cuts(self.mesh.edges[refined.crossing_edges], refined.crossing_weights, refined.edge_origin),
             notes=self.notes,
         )
 
@@ -203,7 +257,16 @@ def exact_flattening(
     shrink = area_factor(lengths, solved) if choices.keep_area else 1.0
     target = np.where(fixed, solved.curvature, target)
     return ExactFlatMetric(
-        mesh, solution.cones, target, is_open, choices.is_held(mesh), solved, shrink, choices.refine, notes
+        mesh,
+        solution.cones,
+        target,
+        is_open,
+        choices.is_held(mesh),
+        solved,
+        shrink,
+        choices.refine,
+        choices.split,
+        notes,
     )
 
 
@@ -252,7 +315,7 @@ def at_own_area(
     target = np.where(mesh.is_boundary_vertex, solved.curvature, solution.target)
     is_open, is_held = mesh.is_boundary_vertex, np.zeros(len(mesh.vertices), dtype=bool)
     shrink = area_factor(lengths, solved)
-    return ExactFlatMetric(mesh, solution.cones, target, is_open, is_held, solved, shrink, False, notes)
+    return ExactFlatMetric(mesh, solution.cones, target, is_open, is_held, solved, shrink, notes=notes)
 
 
 def _solve(
