@@ -20,7 +20,7 @@ from .motions import Motions
 
 # Part of the step to where a triangle would have no area that is taken at most (Smith and Schaefer 2015).
 SHORT_OF_FLAT = 0.9
-# Part of the largest diagonal entry that is added to it: what nothing holds may turn and shift as a whole.
+# Part of each diagonal entry that is added to it: what nothing holds may turn and shift as a whole.
 RIDGE = 1e-11
 
 
@@ -205,7 +205,7 @@ class Elements:
             pull,
             values,
         )
-        values[self._diagonal] += RIDGE * values[self._diagonal].max(initial=0.0)
+        values[self._diagonal] *= 1 + RIDGE
         self._matrix.data = values
         return gradient[: self.count], offset * pull[: self.count], self._matrix
 

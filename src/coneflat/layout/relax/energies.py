@@ -26,7 +26,15 @@ class Energy(Protocol):
     """What a triangle's map costs per area.
 
     It must be symmetric in the singular values, smooth for s1, s2 > 0, and grow without bound as s1 s2 falls to 0.
+
+    Attributes:
+        least: the least it can be, for an isometry say.
     """
+
+    @property
+    def least(self) -> float:
+        """The least it can be."""
+        ...
 
     def values(self, one: FloatArray, two: FloatArray) -> FloatArray:
         """Return (f,) the energy at singular values (f,) each, both positive."""
@@ -61,6 +69,11 @@ class StretchEnergy:
             raise OptionError(f"stretch must be a number from 0, not {self.stretch!r}")
         if not (np.isfinite(self.sharpness) and self.sharpness >= 1):
             raise OptionError(f"sharpness must be a number from 1, not {self.sharpness!r}")
+
+    @property
+    def least(self) -> float:
+        """The least it can be: 1, for isometries."""
+        return 1.0
 
     def values(self, one: FloatArray, two: FloatArray) -> FloatArray:
         """Return (f,) the energy at singular values (f,) each, both positive."""

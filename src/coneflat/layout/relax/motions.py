@@ -13,8 +13,9 @@ from ...mesh import TriangleMesh
 from .constraints import CheckedConstraints
 from .seam_chains import SeamChains, find_chains
 
-# Relative size below which what elimination leaves of an equation or a coefficient is rounding.
-ROUNDING = 1e-10
+# Relative size below which what elimination leaves of an equation is rounding, and of a coefficient. What is taken for
+# none there is missed by the sides of seams.
+ROUNDING, NONE = 1e-10, 1e-15
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +141,11 @@ class _Builder:
         order = np.argsort(point, kind="stable")
         start = np.searchsorted(point[order], np.arange(len(self.points) + 1))
         return Motions(
-            self.count, start, unknown[order], coefficient[order], bool(np.any(coefficient[last] != 0))
+            self.count,
+            start,
+            unknown[order],
+            coefficient[order],
+            bool(np.any(coefficient[last] != 0)),
         )
 
     def _add(self, points: IntArray, variables: IntArray, factors: ComplexArray, is_complex: bool) -> None:
@@ -235,7 +240,7 @@ class _Builder:
             r[:rank, :rank], np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
         )
         basis = np.zeros((self.size, self.size - rank + 1))
-        basis[pivots[:rank]] = np.where(np.abs(solved) > ROUNDING, solved, 0.0)
+        basis[pivots[:rank]] = np.where(np.abs(solved) > NONE, solved, 0.0)
         basis[pivots[rank:], np.arange(self.size - rank)] = 1.0
         return basis
 

@@ -60,7 +60,7 @@ def descend(
         motions: how they move.
         elements: the triangles that do.
         energy: what is minimised.
-        tolerance: part of all that a part of the layout has gained that a further step must promise for it to go on.
+        tolerance: part of its energy above the least that a step must promise to gain for a part to go on.
         steps: at most.
         tell: called with the number of steps and the energy; True ends it.
 
@@ -78,7 +78,7 @@ def descend(
         return np.bincount(part, values, parts).astype(np.float64)
 
     here = sums(elements.energies(energy, maps))
-    first, before = here, float(here.sum())
+    before, least = float(here.sum()), energy.least * sums(elements.weight)
     total = np.zeros(elements.count + 1)
     active = np.ones(parts, dtype=bool)
     factor: Factor | None = None
@@ -91,8 +91,7 @@ def descend(
             raise MetricError(f"relaxation found no finite step of {elements.count:,} unknowns")
         slope = np.bincount(unknown_part, gradient * step[:-1], parts)
         if not remaining:
-            # The least energy is not known, so what a step promises is compared with what was gained.
-            active &= -slope > np.maximum(tolerance * (first - here - slope), ROUNDING * here)
+            active &= -slope > np.maximum(tolerance * (here - least), ROUNDING * here)
             step[:-1][~active[unknown_part]] = 0.0
             if not active.any():
                 break

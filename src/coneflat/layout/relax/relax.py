@@ -22,8 +22,8 @@ from .energies import Energy, StretchEnergy
 from .motions import find_motions
 from .newton import descend
 
-# Part of all that was gained that a step must promise to be taken, and steps at most.
-TOLERANCE, STEPS = 1e-4, 100
+# Part of the energy above the least that a step must promise to gain to be taken, and steps at most.
+TOLERANCE, STEPS = 1e-3, 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ def relax(
             between the positions of the mesh.
         weights: (m,) what each triangle counts besides its area; None: the same.
         free: (n,) True for vertices that may move; None: all.
-        tolerance: part of all the energy gained so far that a further step must promise to be taken.
+        tolerance: part of the energy above the least there can be that a step must promise to gain to be taken.
         steps: Newton steps at most.
         progress: called after each step with its number and the energy; what it has found so far is returned where
             this returns True.
