@@ -185,3 +185,11 @@ class TestQuality:
     def test_what_makes_no_sense_is_refused(self, options):
         with pytest.raises(errors.OptionError):
             flatten(*SHAPES["hill"], **options)
+
+
+def test_sides_that_lie_on_each_other_are_not_relaxed_by_themselves():
+    vertices, faces = shapes.box(4)
+    plain = flatten(vertices, faces, symmetric="x", cone_count=4)
+    apart = flatten(vertices, faces, symmetric="x", mirrored="overlap", cone_count=4)
+    assert np.isfinite(plain.solve.qc_mean_unrelaxed)
+    assert np.isnan(apart.solve.qc_mean_unrelaxed)

@@ -38,7 +38,9 @@ SHARP = 2.0
 
 def relaxes(options: Options) -> bool:
     """Whether layouts are relaxed at all; those of other methods are what these have published."""
-    wanted = options.polish != "off" or options.stretch > 0
+    # What is relaxed is as symmetric as the triangles, and sides that lie on each other must be alike.
+    by_itself = options.polish == "auto" and options.mirrored != "overlap"
+    wanted = by_itself or options.polish == "whole" or options.stretch > 0
     return options.method == "exact" and not options.refine and wanted
 
 
