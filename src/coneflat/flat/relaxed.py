@@ -12,10 +12,9 @@ from .._arrays import BoolArray, ComplexArray, FloatArray
 from ..errors import LengthError, SeamError
 from ..geometry import double_areas, edge_lengths
 from ..geometry.operators import LEAST_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
-from ..geometry.planar import signed_double_areas
+from ..geometry.planar import map_factors, signed_double_areas
 from ..input.components import Component
 from ..layout.relax import Relaxed, StretchEnergy, relax
-from ..layout.relax.elements import map_factors
 from ..layout.relax.relax import rest_sides
 from ..mesh import TriangleMesh, label_components
 from ..options import Options

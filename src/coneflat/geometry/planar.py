@@ -32,3 +32,18 @@ def sides_between(corners: FloatArray) -> ComplexArray:
     """Return (m, 3) the sides of triangles with corners (m, 3, 2)."""
     sides = np.ascontiguousarray(corners[:, PREVIOUS] - corners[:, NEXT], dtype=np.float64)
     return sides.view(np.complex128)[..., 0]
+
+
+def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return (m, 3) the derivatives, by the places of the corners, of a and b in the map z -> a z + b conj(z).
+
+    The map takes triangles from the shapes that they should have, of which `rest` (m, 3) has the sides, to the plane. Its
+    singular values are |a| + |b| and |a| - |b|.
+    """
+    r0, r1 = rest[:, 0], rest[:, 1]
+    area = r0 * np.conj(r1) - np.conj(r0) * r1
+    found = []
+    for c0, c1 in ((np.conj(r1) / area, -np.conj(r0) / area), (-r1 / area, r0 / area)):
+        # Side 0 runs from corner 1 to corner 2, side 1 from corner 2 to corner 0.
+        found.append(np.stack([c1, -c0, c0 - c1], axis=1))
+    return found[0], found[1]

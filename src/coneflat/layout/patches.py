@@ -11,6 +11,7 @@ from scipy.sparse import bsr_matrix
 from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..compiled import compiled
 from ..errors import MetricError
+from ..geometry.planar import map_factors
 from ..geometry.straight import FlatTriangles
 from ..mesh import label_components
 from ..solver.factors import SuperLUFactor
@@ -80,13 +81,11 @@ class Patches:
 
     def _find_maps(self, wanted: ComplexArray) -> None:
         """Set a and b as they are, and their derivatives by the shifts of the corners."""
-        r0, r1 = wanted[:, 0], wanted[:, 1]
-        area = r0 * np.conj(r1) - np.conj(r0) * r1
         found = []
-        for c0, c1 in ((np.conj(r1) / area, -np.conj(r0) / area), (-r1 / area, r0 / area)):
-            # Side 0 runs from corner 1 to corner 2, side 1 from corner 2 to corner 0.
-            found.append(c0 * self.sides[:, 0] + c1 * self.sides[:, 1])
-            found.append(np.stack([c1, -c0, c0 - c1], axis=1) * self.shift)
+        for factors in map_factors(wanted):
+            # With corner 2 at 0, side 0 is minus the place of corner 1, and side 1 is that of corner 0.
+            found.append(factors[:, 0] * self.sides[:, 1] - factors[:, 1] * self.sides[:, 0])
+            found.append(factors * self.shift)
         self.a, self.a_of, self.b, self.b_of = found
 
     def fingerprints(self) -> list[bytes]:

@@ -14,6 +14,7 @@ from scipy.sparse import coo_matrix, csc_matrix
 
 from ..._arrays import ComplexArray, FloatArray, IntArray
 from ...compiled import compiled
+from ...geometry.planar import map_factors
 from ...mesh import label_components
 from .energies import Energy
 from .motions import Motions
@@ -22,20 +23,6 @@ from .motions import Motions
 SHORT_OF_FLAT = 0.9
 # Part of each diagonal entry that is added to it: what nothing holds may turn and shift as a whole.
 RIDGE = 1e-11
-
-
-def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    """Return (f, 3) the derivatives of a and b by the places of the corners.
-
-    rest: (f, 3) sides of the triangles as they should be, column i opposite corner i.
-    """
-    r0, r1 = rest[:, 0], rest[:, 1]
-    area = r0 * np.conj(r1) - np.conj(r0) * r1
-    found = []
-    for c0, c1 in ((np.conj(r1) / area, -np.conj(r0) / area), (-r1 / area, r0 / area)):
-        # Side 0 runs from corner 1 to corner 2, side 1 from corner 2 to corner 0.
-        found.append(np.stack([c1, -c0, c0 - c1], axis=1))
-    return found[0], found[1]
 
 
 @dataclass(frozen=True, eq=False)
