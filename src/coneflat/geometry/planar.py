@@ -37,8 +37,8 @@ def sides_between(corners: FloatArray) -> ComplexArray:
 def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     """Return (m, 3) the derivatives, by the places of the corners, of a and b in the map z -> a z + b conj(z).
 
-    The map takes triangles from the shapes that they should have, of which `rest` (m, 3) has the sides, to the plane. Its
-    singular values are |a| + |b| and |a| - |b|.
+    The map takes triangles from the shapes that they should have, of which `rest` (m, 3) has the sides, to the plane.
+    Its singular values are |a| + |b| and |a| - |b|.
     """
     r0, r1 = rest[:, 0], rest[:, 1]
     area = r0 * np.conj(r1) - np.conj(r0) * r1
