@@ -60,7 +60,7 @@ def relaxed(laid_out: LaidOut, part: Component, options: Options, tell: Callable
     is_free[: len(part.mesh.vertices)] = ~held_boundary(part.mesh, part.constraints, options)
     whole = options.stretch > 0 or options.polish == "whole"
     if not whole:
-        is_free &= _around(surface.mesh, before > BENT)
+        is_free &= _around(surface.mesh, before > BENT) & ~surface.mesh.is_boundary_vertex
 
     def relaxed_by(layout: LaidOut, sharpness: float, is_free: BoolArray) -> LaidOut:
         found: Relaxed = relax(
