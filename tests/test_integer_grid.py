@@ -225,6 +225,33 @@ def test_a_flat_rectangle_keeps_its_shape():
     assert grid.least_area == pytest.approx(1)
 
 
+def test_sides_of_loops_that_are_askew_are_said_to_be_on_no_line(shared):
+    """The holes of this plate are straight each, but seams between them turn by any angle."""
+    grid = integer_grid(shared("plane-holes.obj"), quads=3000, boundary="straight", refine=True)
+    check_laws(grid)
+    assert not len(grid.corners)
+    assert "of the boundary are on no grid line" in " ".join(grid.notes)
+
+
+def test_what_is_too_coarse_is_told_what_would_do():
+    """The torus' smooth layout is a hundred times smaller in one place than it should be, with cones there."""
+    shape = pair(shapes.sphere(2), shapes.torus(24, 12))
+    with pytest.raises(
+        errors.GridError, match=r"no grid of about 1,000 quads was found: .*would do"
+    ) as caught:
+        integer_grid(*shape, quads=1000)
+    advised = int(str(caught.value).rsplit("; ", 1)[1].split()[0].replace(",", ""))
+    check_laws(integer_grid(*shape, quads=advised))
+
+
+def test_numbering_changes_nothing():
+    vertices, faces = shapes.sphere(3)
+    shuffled, turned, new = shapes.renumber(vertices, faces)
+    one, two = (integer_grid(*shape, quads=300) for shape in ((vertices, faces), (shuffled, turned)))
+    assert sorted(new[one.cones]) == sorted(two.cones)
+    assert np.sort(double_areas(one)) == pytest.approx(np.sort(double_areas(two)), rel=1e-6)
+
+
 def test_grids_are_the_same_every_time():
     one, two = (integer_grid(*shapes.sphere(3), quads=123) for _ in range(2))
     assert (one.corner_grid == two.corner_grid).all()

@@ -134,7 +134,22 @@ def integer_grid(
         result = flatten(mesh, faces, **{**defaults, **options})
     layout = aligned(result, None if size is not None else wanted, size)
     with one_blas_thread():
-        return _whole(layout, StretchEnergy(stretch))
+        found = _whole(layout, StretchEnergy(stretch))
+    loose = _loose_border(layout) if result.settings.get("boundary") == "straight" else 0
+    if not loose:
+        return found
+    note = (
+        f"{plural(loose, 'edge')} of the boundary {'is' if loose == 1 else 'are'} on no grid line: straight sides of "
+        "different loops do not point in the same directions, up to quarter turns."
+    )
+    return replace(found, notes=(*found.notes, note))
+
+
+def _loose_border(layout: Layout) -> int:
+    """Return how many edges of the boundary are not parts of sides on grid lines."""
+    border = layout.mesh.edge_halfedges[layout.mesh.is_boundary_edge, 0]
+    starts = layout.corners[:, NEXT].ravel()[border]
+    return int(np.count_nonzero(~np.isin(starts, layout.sides.points)))
 
 
 def _whole(layout: Layout, energy: StretchEnergy) -> IntegerGrid:

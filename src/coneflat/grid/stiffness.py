@@ -47,7 +47,8 @@ class Stiffness:
         """Return (d, d) the energies of changes that columns of a basis (v, d) span, as scalar products."""
         count = basis.shape[1]
         gram = np.zeros((count, count))
-        pulls = self._energy @ (self._shifts @ basis)
+        # Few points are on seams: as a sparse matrix this stays small.
+        pulls = self._energy @ (self._shifts @ csr_matrix(basis))
         for start in range(0, count, BLOCK):
             block = slice(start, min(start + BLOCK, count))
             gram[:, block] = pulls.T @ self.displacement(basis[:, block].astype(np.float64))
