@@ -65,6 +65,8 @@ _HOMES = {
     "Lines": "layout.relax",
     "FlatTriangles": "geometry.straight",
     "flat_triangles": "geometry.straight",
+    "integer_grid": "grid",
+    "IntegerGrid": "grid",
     "find_overlaps": "geometry.overlap",
     "Overlaps": "geometry.overlap",
     "overlap_regions": "atlas",
@@ -92,6 +94,7 @@ __all__ = [
     "FlatTriangles",
     "Flattening",
     "FoundCones",
+    "IntegerGrid",
     "Lines",
     "MeshFile",
     "Overlaps",
@@ -130,6 +133,7 @@ __all__ = [
     "flat_triangles",
     "flatten",
     "greedy_cones",
+    "integer_grid",
     "least_squares_layout",
     "make_figure",
     "measure",
@@ -162,6 +166,7 @@ if TYPE_CHECKING:
     from .geometry.overlap import Overlaps, find_overlaps
     from .geometry.straight import FlatTriangles, flat_triangles
     from .geometry.visibility import visible_share
+    from .grid import IntegerGrid, integer_grid
     from .input.mesh_file import MeshFile
     from .input.validation import CheckedMesh, check_mesh
     from .layout import least_squares_layout
