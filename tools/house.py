@@ -26,7 +26,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("atlas",),
     ("result",),
     ("pipeline", "curve"),
-    ("files", "view"),
+    ("files", "view", "grid"),
     ("ahead", "apps", "sample"),
     ("__main__",),
 )
@@ -55,6 +55,7 @@ HOLDS = {
     "curve": "distortion by number of cones",
     "files": "OBJ, PLY, STL, OFF, glTF, NPZ",
     "view": "figures for print, the page",
+    "grid": "integer grids, quads from them",
     "sample": "the model that ships",
     "ahead": "kernels compiled at the build",
     "apps": "commands, batches, comparisons",

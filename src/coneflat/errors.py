@@ -70,6 +70,10 @@ class ConvergenceError(MetricError):
     """The solve ended short of its tolerance."""
 
 
+class GridError(MetricError):
+    """No integer grid was found."""
+
+
 class MeshFileError(ConeflatError, OSError):
     """A file cannot be read or written, or is not what its name says."""
 

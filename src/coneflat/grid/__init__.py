@@ -1,0 +1,1 @@
+"""Integer grids on surfaces, and the quad meshes that they are."""
