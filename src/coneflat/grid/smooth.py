@@ -13,7 +13,7 @@ from ..mesh import NEXT, TriangleMesh
 from .quad_mesh import QuadMesh
 
 # Scaled Jacobian below which no quad goes that was above, nor any deeper that was below.
-LEAST = 0.2
+LEAST = 0.5
 # Radians: edges of the surface that bend more are sharp, and quad vertices on them stay.
 SHARP = np.deg2rad(40.0)
 
