@@ -27,7 +27,7 @@ from grid_maps import (
 from shapes import grid as rectangle
 from shapes import renumber
 
-from coneflat import TriangleMesh, read_mesh
+from coneflat import read_mesh
 from coneflat.errors import GridError, OptionError, UnknownFormatError
 from coneflat.geometry.nearest import surface_distances
 from coneflat.grid.exact_grid import exact_grid
@@ -36,10 +36,6 @@ from coneflat.grid.quality import measure_quads
 from coneflat.grid.smooth import least_jacobians, smooth_quads
 
 TOOL = Path(__file__).resolve().parents[2] / "shared" / "tools" / "quads.py"
-
-
-def surface_of(grid):
-    return TriangleMesh(grid.vertices, grid.faces)
 
 
 def oriented_sides(quads):
@@ -81,7 +77,7 @@ def test_polycubes(name, cells, inside):
     count = len(squares) * cells**2
     assert len(mesh.quads) == count
     assert len(mesh.vertices) == count + euler  # E is 2 F
-    assert mesh.euler_characteristic == mesh.surface_euler == euler
+    assert mesh.euler_characteristic == mesh.surface.euler_characteristic == euler
     which, many = np.unique(mesh.valences[mesh.irregular], return_counts=True)
     assert dict(zip(which.tolist(), many.tolist(), strict=True)) == valences
     # On flat squares all quads are squares, at corners that are whole multiples, and they cover all.
@@ -277,9 +273,10 @@ def bumpy(seed=0, cells=5):
 
 def test_smoothing_makes_quads_squarer_and_stays_on_the_surface():
     grid = bumpy()
-    surface, mesh = surface_of(grid), extract_quads(grid)
-    smooth = smooth_quads(mesh, surface, 10)
-    before, after = measure_quads(mesh, surface), measure_quads(smooth, surface)
+    mesh = extract_quads(grid)
+    surface = mesh.surface
+    smooth = smooth_quads(mesh, 10)
+    before, after = measure_quads(mesh), measure_quads(smooth)
     assert after.angle_mean < 0.9 * before.angle_mean
     assert after.angle_p95 < before.angle_p95
     assert after.jacobian_min > 0
@@ -292,14 +289,14 @@ def test_smoothing_makes_quads_squarer_and_stays_on_the_surface():
     # What lies on the sharp edges, the corners of the cubes among it, stays.
     assert (smooth.vertices == mesh.vertices).all(axis=1).sum() >= len(mesh.irregular)
     with pytest.raises(OptionError, match="not -1"):
-        smooth_quads(mesh, surface, -1)
+        smooth_quads(mesh, -1)
 
 
 def test_squares_stay():
     points, faces = rectangle(6, 6)
     grid = flat(points[:, :2] * 6, faces)
     mesh = extract_quads(grid)
-    smooth = smooth_quads(mesh, surface_of(grid), 5)
+    smooth = smooth_quads(mesh, 5)
     np.testing.assert_allclose(smooth.vertices, mesh.vertices, atol=1e-12)
 
 
@@ -312,7 +309,7 @@ def test_smoothing_inverts_nothing():
     grid.vertices = np.column_stack([x**3 / 30, y + 0.8 * np.sin(x), 2 * np.sin(y) * np.cos(x)])
     mesh = extract_quads(grid)
     before = least_jacobians(mesh.vertices, mesh.quads)
-    after = least_jacobians(*(lambda m: (m.vertices, m.quads))(smooth_quads(mesh, surface_of(grid), 30)))
+    after = least_jacobians(smooth_quads(mesh, 30).vertices, mesh.quads)
     assert (after >= np.minimum(before, 0.5) - 1e-12).all()
     assert np.abs(after - before).max() > 0.01
 
@@ -323,7 +320,7 @@ def test_measures_by_hand():
     grid = flat(points[:, :2] * 4, faces)
     grid.vertices = (points[:, :2] * 4) @ np.array([[1, 0, 0], [0.5, 0.75**0.5, 0]])
     mesh = extract_quads(grid)
-    measures = measure_quads(mesh, surface_of(grid))
+    measures = measure_quads(mesh)
     assert measures.quads == 16
     assert measures.boundary_edges == 16
     assert measures.angle_mean == pytest.approx(30)
@@ -343,7 +340,7 @@ def test_gaps_by_hand():
     grid = flat(np.column_stack([x, y]), faces)
     height = np.where(x == 0.5, 0.3, 0.0)  # within the first column of quads, 0 at its two sides
     grid.vertices = np.column_stack([x, y, height])
-    measures = measure_quads(extract_quads(grid), surface_of(grid))
+    measures = measure_quads(extract_quads(grid))
     assert measures.from_surface == pytest.approx(0.3)
     # From the middle of the quad to the slopes, which rise by 0.3 over 0.5.
     assert measures.to_surface == pytest.approx(0.15 / np.hypot(0.5, 0.3) * 1.0)
@@ -382,7 +379,7 @@ def test_measures_agree_with_another_program(tmp_path):
     mesh = extract_quads(grid)
     path = mesh.save(tmp_path / "quads.obj")
     run = subprocess.run([sys.executable, TOOL, path], capture_output=True, text=True, check=True)
-    theirs, ours = json.loads(run.stdout), measure_quads(mesh, surface_of(grid))
+    theirs, ours = json.loads(run.stdout), measure_quads(mesh)
     assert theirs["faces"] == theirs["quads"] == ours.quads
     assert theirs["open"] == ours.boundary_edges == 0
     assert theirs["nonmanifold"] == 0

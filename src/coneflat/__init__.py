@@ -65,6 +65,11 @@ _HOMES = {
     "Lines": "layout.relax",
     "FlatTriangles": "geometry.straight",
     "flat_triangles": "geometry.straight",
+    "integer_grid": "grid",
+    "quads": "grid.quads",
+    "QuadMesh": "grid",
+    "measure_quads": "grid",
+    "IntegerGrid": "grid",
     "find_overlaps": "geometry.overlap",
     "Overlaps": "geometry.overlap",
     "overlap_regions": "atlas",
@@ -92,12 +97,14 @@ __all__ = [
     "FlatTriangles",
     "Flattening",
     "FoundCones",
+    "IntegerGrid",
     "Lines",
     "MeshFile",
     "Overlaps",
     "PAPER",
     "Packed",
     "PointConstraints",
+    "QuadMesh",
     "Relaxed",
     "SeamData",
     "SparseCones",
@@ -130,14 +137,17 @@ __all__ = [
     "flat_triangles",
     "flatten",
     "greedy_cones",
+    "integer_grid",
     "least_squares_layout",
     "make_figure",
     "measure",
+    "measure_quads",
     "measure_uv",
     "mollify",
     "overlap_regions",
     "pack_charts",
     "pack_together",
+    "quads",
     "read_flattening",
     "read_mesh",
     "relax",
@@ -162,6 +172,8 @@ if TYPE_CHECKING:
     from .geometry.overlap import Overlaps, find_overlaps
     from .geometry.straight import FlatTriangles, flat_triangles
     from .geometry.visibility import visible_share
+    from .grid import IntegerGrid, QuadMesh, integer_grid, measure_quads
+    from .grid.quads import quads
     from .input.mesh_file import MeshFile
     from .input.validation import CheckedMesh, check_mesh
     from .layout import least_squares_layout

@@ -61,7 +61,7 @@ def extract_quads(grid: GridMap) -> QuadMesh:
         barycentric,
         left_out,
         area - len(darts),
-        exact.mesh.euler_characteristic,
+        exact.mesh,
     )
 
 

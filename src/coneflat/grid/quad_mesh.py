@@ -11,7 +11,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import GridError
-from ..mesh import sort_pairs
+from ..mesh import TriangleMesh, sort_pairs
 from ..text import list_some, plural
 
 
@@ -27,8 +27,8 @@ class QuadMesh:
         left_out: squares of the grid that were left out, as the boundary of the surface cuts them.
         area_left_out: of the grid on the surface that is under no quad, in squares: beside boundaries that are not
             on grid lines; negative, should a quad lie over a hole.
-        surface_euler: the Euler characteristic of the surface. That of the quads is the same unless squares were
-            left out.
+        surface: the triangle mesh.
+        notes: what was done, and what falls short, one sentence each.
     """
 
     vertices: FloatArray
@@ -37,7 +37,8 @@ class QuadMesh:
     barycentric: FloatArray
     left_out: int
     area_left_out: float
-    surface_euler: int
+    surface: TriangleMesh
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def _edges(self) -> tuple[IntArray, IntArray]:
@@ -76,7 +77,7 @@ class QuadMesh:
 
     @property
     def euler_characteristic(self) -> int:
-        """Vertices minus edges plus quads."""
+        """Vertices minus edges plus quads: that of the surface, unless squares were left out."""
         return len(self.vertices) - len(self.edges) + len(self.quads)
 
     def save(self, path: str | PathLike[str]) -> Path:

@@ -62,14 +62,14 @@ class QuadMeasures:
         return asdict(self)
 
 
-def measure_quads(quads: QuadMesh, mesh: TriangleMesh) -> QuadMeasures:
+def measure_quads(quads: QuadMesh) -> QuadMeasures:
     """Return the measures of a quad mesh on a surface."""
     points = quads.vertices
     off = np.abs(corner_angles_of(quads) - 90.0)
     length = np.linalg.norm(points[quads.edges[:, 0]] - points[quads.edges[:, 1]], axis=1)
     least = least_jacobians(points, quads.quads)
     which, many = np.unique(quads.valences[quads.irregular], return_counts=True)
-    there, back = surface_gaps(quads, mesh)
+    there, back = surface_gaps(quads)
     return QuadMeasures(
         vertices=len(points),
         quads=len(quads.quads),
@@ -100,14 +100,14 @@ def corner_angles_of(quads: QuadMesh) -> FloatArray:
     return np.degrees(np.arccos(np.clip(dots(one, two) / scale, -1.0, 1.0)))
 
 
-def surface_gaps(quads: QuadMesh, mesh: TriangleMesh) -> tuple[float, float]:
+def surface_gaps(quads: QuadMesh) -> tuple[float, float]:
     """Return the largest distances found from the quads to the surface, and from the surface to the quads.
 
     Distances are exact, but measured at samples: at 5 x 5 points of the bilinear patch of each quad, and at points of
     each triangle whose distances are half the mean edge of the quads at most. Distances to quads are those to their two
     triangles on either side of the diagonal that is shorter.
     """
-    corners = quads.vertices[quads.quads]
+    mesh, corners = quads.surface, quads.vertices[quads.quads]
     t = np.arange(SAMPLES) / (SAMPLES - 1)
     u, v = (x.ravel() for x in np.meshgrid(t, t, indexing="ij"))
     patch = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)

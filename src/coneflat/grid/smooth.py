@@ -9,7 +9,7 @@ import numpy as np
 from .._arrays import BoolArray, FloatArray, IntArray, dots
 from ..errors import OptionError
 from ..geometry.nearest import slide_near
-from ..mesh import NEXT, TriangleMesh
+from ..mesh import NEXT
 from .quad_mesh import QuadMesh
 
 # Scaled Jacobian below which no quad goes that was above, nor any deeper that was below.
@@ -18,7 +18,7 @@ LEAST = 0.5
 SHARP = np.deg2rad(40.0)
 
 
-def smooth_quads(quads: QuadMesh, mesh: TriangleMesh, rounds: int = 10) -> QuadMesh:
+def smooth_quads(quads: QuadMesh, rounds: int = 10) -> QuadMesh:
     """Return a quad mesh with squarer quads, whose vertices have moved on the surface.
 
     Each quad asks its corners to go to the nearest square (S. Bouaziz, M. Deuss, Y. Schwartzburg, T. Weise, M. Pauly,
@@ -28,7 +28,6 @@ def smooth_quads(quads: QuadMesh, mesh: TriangleMesh, rounds: int = 10) -> QuadM
 
     Args:
         quads: the quad mesh.
-        mesh: the surface that it lies on.
         rounds: how many times.
 
     Raises:
@@ -36,7 +35,8 @@ def smooth_quads(quads: QuadMesh, mesh: TriangleMesh, rounds: int = 10) -> QuadM
     """
     if rounds < 0:
         raise OptionError(f"smoothing takes 0 rounds or more, not {rounds}")
-    movable = ~(quads.is_boundary_vertex | _is_held(quads, mesh))
+    mesh = quads.surface
+    movable = ~(quads.is_boundary_vertex | _is_held(quads))
     order = np.argsort(mesh.faces.ravel(), kind="stable")
     star_start = np.concatenate(
         [[0], np.cumsum(np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)))]
@@ -102,8 +102,9 @@ def _held_back(old: FloatArray, new: FloatArray, quads: IntArray) -> BoolArray:
         stays[quads[bad]] = True
 
 
-def _is_held(quads: QuadMesh, mesh: TriangleMesh) -> BoolArray:
+def _is_held(quads: QuadMesh) -> BoolArray:
     """Return (q,) the vertices on sharp edges of the surface."""
+    mesh = quads.surface
     corners = mesh.vertices[mesh.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.sqrt(dots(normal, normal)), np.finfo(float).tiny)[:, None]

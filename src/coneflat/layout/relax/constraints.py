@@ -41,12 +41,17 @@ class PointConstraints:
         lines: points on lines; None for none.
         held_seams: (k, 2) edges, as vertices, of seams whose two sides keep not only the rotation between them but the
             translation, too.
+        tied: (q,) half-edges of seams.
+        translations: (q, 2) what is added in the end to a point in the frame of the triangle across each, turned by the
+            seam's rotation, to give the one in the frame of its own.
     """
 
     pinned: ArrayLike = ()
     places: ArrayLike | None = None
     lines: Lines | None = None
     held_seams: ArrayLike = ()
+    tied: ArrayLike = ()
+    translations: ArrayLike = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +65,8 @@ class CheckedConstraints:
     directions: FloatArray
     offsets: FloatArray
     held_seams: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
+    tied: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    translations: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
 
 
 def check_constraints(constraints: PointConstraints, points: FloatArray) -> CheckedConstraints:
@@ -77,10 +84,18 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
             f"places have shape {places.shape}, not {(len(pinned), 2)}, one for each pinned point"
         )
     held = np.asarray(constraints.held_seams, dtype=np.int64).reshape(-1, 2)
+    tied = np.asarray(constraints.tied, dtype=np.int64).ravel()
+    translations = _floats(constraints.translations, "translations").reshape(-1, 2)
+    if len(tied) != len(translations):
+        raise OptionError(
+            f"{plural(len(tied), 'half-edge')} tied, but {plural(len(translations), 'translation')} for them"
+        )
     lines = constraints.lines
     if lines is None:
         none = np.empty(0, dtype=np.int64)
-        return CheckedConstraints(pinned, places, none, none, np.empty((0, 2)), np.empty(0), held)
+        return CheckedConstraints(
+            pinned, places, none, none, np.empty((0, 2)), np.empty(0), held, tied, translations
+        )
     on_line = _indices(lines.points, len(points), "points of lines")
     directions = _floats(lines.directions, "directions of lines").reshape(-1, 2)
     line = _indices(lines.line, len(directions), "line")
@@ -102,7 +117,7 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
             raise OptionError(
                 f"offsets of lines must be {plural(len(directions), 'number')}, or NaN, not of shape {offsets.shape}"
             )
-    return CheckedConstraints(pinned, places, on_line, line, directions, offsets, held)
+    return CheckedConstraints(pinned, places, on_line, line, directions, offsets, held, tied, translations)
 
 
 def _across(directions: FloatArray, places: FloatArray) -> FloatArray:

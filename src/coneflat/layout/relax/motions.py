@@ -269,6 +269,12 @@ class _Builder:
         for point, place in zip(c.pinned.tolist(), self._complex(c.places).tolist(), strict=True):
             if self.of_point[point] >= 0:
                 add([(int(self.of_point[point]), 1.0 + 0.0j)], place - complex(self.points[point]))
+        for side, shift in zip(c.tied.tolist(), self._complex(c.translations).tolist(), strict=True):
+            chain, value = self._tie(side, shift)
+            if self.of_chain[chain] >= 0:
+                add([(int(self.of_chain[chain]), 1.0 + 0.0j)], value)
+            elif abs(value) > ROUNDING * max(1.0, abs(shift)):
+                raise OptionError(f"the seam at half-edge {side} is tied, but cannot move")
         off = self._off_line(c.on_line, c.line)
         for point, line, value in zip(c.on_line.tolist(), c.line.tolist(), off.tolist(), strict=True):
             if self.of_point[point] >= 0:
@@ -280,6 +286,20 @@ class _Builder:
                 rows.append(row)
                 right.append(value)
         return np.array(rows).reshape(-1, self.size), np.array(right)
+
+    def _tie(self, side: int, shift: complex) -> tuple[int, complex]:
+        """Return a half-edge's chain, and the change of its translation that makes `shift` of that to the half-edge."""
+        chains = self.chains
+        at = np.argwhere(chains.halfedges == side)
+        if not len(at):
+            raise OptionError(f"tied half-edge {side} is on no seam")
+        k, is_right = at[0].tolist()
+        chain = int(chains.chain[k])
+        turn = complex(chains.rotation[chain])
+        wanted = shift if is_right else -turn * shift
+        return chain, wanted - complex(
+            self.points[chains.right[k, 0]] - turn * self.points[chains.left[k, 0]]
+        )
 
     @staticmethod
     def _complex(places: FloatArray) -> ComplexArray:

@@ -25,6 +25,7 @@ class SeamChains:
         edges: (k,) the mesh's edges.
         vertices: (k, 2) the two ends of each.
         left, right: (k, 2) the points at its ends on either side.
+        halfedges: (k, 2) the half-edges of the triangles on either side.
         chain: (k,) the chain of each.
         rotation: (c,) unit numbers: turned by it, the left side of a chain is parallel to the right one.
         is_node: (n,) vertices where chains end: cones, branch points, those on the boundary, and those asked for.
@@ -34,6 +35,7 @@ class SeamChains:
     vertices: IntArray
     left: IntArray
     right: IntArray
+    halfedges: IntArray
     chain: IntArray
     rotation: ComplexArray
     is_node: BoolArray
@@ -84,6 +86,7 @@ def find_chains(
     swapped = second < first
     left = np.where(swapped[:, None], sides[1], sides[0])
     right = np.where(swapped[:, None], sides[0], sides[1])
+    halfedges = np.where(swapped[:, None], np.stack([t, h], axis=1), np.stack([h, t], axis=1))
     _, chain = np.unique(np.minimum(first, second), return_inverse=True)
     chain = chain.ravel()
     total = np.zeros(int(chain.max(initial=-1)) + 1, dtype=np.complex128)
@@ -92,7 +95,7 @@ def find_chains(
         chain,
         np.where(swapped, two * np.conj(one), 0).conj() + np.where(swapped, 0, two * np.conj(one)),
     )
-    return SeamChains(edges, vertices, left, right, chain, total / np.abs(total), is_node)
+    return SeamChains(edges, vertices, left, right, halfedges, chain, total / np.abs(total), is_node)
 
 
 def _turning(vertices: IntArray, sides: IntArray, turns: ComplexArray, is_node: BoolArray) -> IntArray:

@@ -1,0 +1,124 @@
+"""A flattening's layout made ready for a grid: charts turned to each other, along the creases, and at its scale."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._arrays import ComplexArray, FloatArray, IntArray
+from ..errors import GridError
+from ..geometry.planar import signed_double_areas
+from ..geometry.triangles import double_areas, edge_lengths
+from ..layout.relax.seam_chains import find_chains
+from ..mesh import NEXT, PREVIOUS, TriangleMesh
+from ..result.flattening import Flattening
+from .transitions import charts_of, first_points, joining_chains
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A layout in units of a grid.
+
+    Attributes:
+        mesh: of all components.
+        lengths: (m, 3) side lengths of its triangles in model units, column i opposite corner i.
+        corners: (m, 3) the point at each triangle corner.
+        points: (u,) of the plane.
+        cones: (s,) vertices, inside the surface.
+        size: of a square of the grid, in model units.
+    """
+
+    mesh: TriangleMesh
+    lengths: FloatArray
+    corners: IntArray
+    points: ComplexArray
+    cones: IntArray
+    size: float
+
+
+def aligned(result: Flattening, quads: float | None, size: float | None) -> Layout:
+    """Return the layout of a flattening, turned so that the grid follows creases, bends and boundaries.
+
+    Args:
+        result: with quantised cones.
+        quads: unit squares that it is to cover.
+        size: of a square in model units, instead.
+
+    Raises:
+        GridError: triangles are turned over.
+        SeamError: the sides of a seam are no rigid copies of each other.
+    """
+    mesh = TriangleMesh(result.vertices, result.faces)
+    lengths = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
+    flat = signed_double_areas(result.corner_uv)
+    if not (flat > 0).all():
+        raise GridError(
+            f"{int((flat <= 0).sum())} of {len(flat):,} triangles of the layout are turned over or have no area"
+        )
+    area = float(double_areas(lengths).sum()) / 2
+    if size is None:
+        assert quads is not None
+        size = float(np.sqrt(area / quads))
+    scale = np.sqrt(area / size**2 / (flat.sum() / 2))
+    points = scale * (result.uv[:, 0] + 1j * result.uv[:, 1])
+    cones = np.asarray(result.cones, dtype=np.int64)
+    cones = cones[~mesh.is_boundary_vertex[cones]]
+    layout = Layout(mesh, lengths, result.uv_faces, points, cones, size)
+    return _turned(layout)
+
+
+def _turned(layout: Layout) -> Layout:
+    """Return the layout with charts joined at some seams, along its creases, a cone of each component at the origin."""
+    mesh, corners, points = layout.mesh, layout.corners, layout.points.copy()
+    chains = find_chains(mesh, corners, points, layout.cones)
+    chart, component = charts_of(corners, len(points), chains)
+    _, firsts = np.unique(chains.chain, return_index=True)
+    done = np.zeros(len(component), dtype=bool)
+    done[np.unique(component, return_index=True)[1]] = True
+    left_over = joining_chains(chains, chart).tolist()
+    while left_over:
+        later = []
+        for chain in left_over:
+            k = firsts[chain]
+            sides = chains.left[k], chains.right[k]
+            if done[chart[sides[0][0]]] == done[chart[sides[1][0]]]:
+                later.append(chain)
+                continue
+            still, moving = sides if done[chart[sides[0][0]]] else sides[::-1]
+            factor = np.diff(points[still])[0] / np.diff(points[moving])[0]
+            with_it = chart == chart[moving[0]]
+            points[with_it] = factor / abs(factor) * (points[with_it] - points[moving[0]]) + points[still[0]]
+            done[chart[moving[0]]] = True
+        left_over = later
+    of_point = component[chart]
+    points *= np.exp(-1j * _crease_angles(layout, points, of_point))[of_point]
+    vertex = np.zeros(len(points), dtype=np.int64)
+    vertex[corners.ravel()] = mesh.faces.ravel()
+    at = first_points(vertex)[layout.cones]
+    origin = np.zeros(int(component.max(initial=-1)) + 1, dtype=np.complex128)
+    origin[of_point[at][::-1]] = points[at[::-1]]  # the first cone's stays
+    return Layout(mesh, layout.lengths, corners, points - origin[of_point], layout.cones, layout.size)
+
+
+def _crease_angles(layout: Layout, points: ComplexArray, of_point: IntArray) -> FloatArray:
+    """Return the angle of each component that most of its bending is along, up to quarter turns.
+
+    An edge counts for the curvature it carries, its length times its dihedral angle (Cohen-Steiner and Morvan 2003),
+    one on the boundary as a right angle.
+    """
+    mesh = layout.mesh
+    starts, ends = layout.corners[:, NEXT].ravel(), layout.corners[:, PREVIOUS].ravel()
+    corners = mesh.vertices[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    one, two = mesh.edge_halfedges.T
+    first, second = normals[one // 3], normals[np.maximum(two, 0) // 3]
+    bend = np.arctan2(np.linalg.norm(np.cross(first, second), axis=1), (first * second).sum(axis=1))
+    bend[two < 0] = np.pi / 2
+    side = points[ends[one]] - points[starts[one]]
+    length = layout.lengths.ravel()[one]
+    fourth = length * bend * (side / np.abs(side)) ** 4
+    label, count = of_point[starts[one]], int(of_point.max(initial=-1)) + 1
+    sums = np.bincount(label, fourth.real, count) + 1j * np.bincount(label, fourth.imag, count)
+    angles: FloatArray = np.angle(sums) / 4
+    return angles

@@ -1,0 +1,268 @@
+"""Seamless maps to the integer grid: the squares of the plane become quads of the surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import ComplexArray, FloatArray, IntArray
+from ..errors import ConvergenceError, GridError, OptionError
+from ..geometry.planar import sides_between, signed_angles, signed_double_areas
+from ..geometry.triangles import double_areas
+from ..layout.relax import PointConstraints, Relaxed, StretchEnergy, relax
+from ..layout.relax.elements import map_factors
+from ..layout.relax.relax import rest_sides
+from ..mesh import NEXT, PREVIOUS
+from ..pipeline import flatten
+from ..result.flattening import Flattening
+from ..text import plural
+from ..threads import one_blas_thread
+from .aligned import Layout, aligned
+from .rounding import Rounding, find_rounding
+from .transitions import UNITS, Transitions, find_transitions
+
+# What the grid wants of a flattening: three, five or six quads at a cone, and rotations that are quarter turns.
+OPTIONS = {
+    "quantise": np.pi / 2,
+    "correct_handles": True,
+    "charts": "one",
+    "min_cone_angle": 1.5 * np.pi,
+    "max_cone_angle": 3 * np.pi,
+}
+# Lattice points that are tried, one after the other.
+TRIES = 6
+# Bits after the point that coordinates have at most: so seams fit exactly, and no triangle notices.
+BITS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class IntegerGrid:
+    """A map of a surface to the plane in which grid lines go on across seams: m triangles, n vertices.
+
+    A half-edge h = 3 f + i is the side of triangle f opposite its corner i, from corner i + 1 to corner i + 2. What is
+    x in the frame of the triangle across it is R x + shifts[h] in its own, R being turns[h] quarter turns to the left.
+
+    Attributes:
+        vertices: (n, 3) positions in model units.
+        faces: (m, 3) vertex indices.
+        corner_grid: (m, 3, 2) the point of the grid of every triangle corner, in units of the grid; no triangle is
+            turned over.
+        turns: (3m,) from 0 to 3; -1 on the boundary.
+        shifts: (3m, 2) whole numbers; 0 on the boundary.
+        cones: (s,) vertices that lie on grid points and have other than four quads.
+        quarters: (s,) how many they have, the quarter turns of their angle.
+        size: of a square of the grid, in model units: the root of the surface's area by the grid's.
+        move_rms, move_max: by how much rounding has moved the cones, in units of the grid.
+        energy_before, energy: the mean distortion that was minimised, in the smooth layout and in the grid.
+        qc_before, qc_mean: quasi-conformal distortion, the mean by area, likewise.
+        least_area: of any triangle, over what it should have.
+        notes: what was done, one sentence each.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    corner_grid: FloatArray
+    turns: IntArray
+    shifts: IntArray
+    cones: IntArray
+    quarters: IntArray
+    size: float
+    move_rms: float
+    move_max: float
+    energy_before: float
+    energy: float
+    qc_before: float
+    qc_mean: float
+    least_area: float
+    notes: tuple[str, ...] = ()
+
+
+def integer_grid(
+    mesh: Any,
+    faces: ArrayLike | None = None,
+    *,
+    quads: int | None = None,
+    size: float | None = None,
+    stretch: float = 0.0,
+    **options: Any,
+) -> IntegerGrid:
+    """Return a map of a surface to the integer grid, seamless: unit squares become quads that meet across seams.
+
+    Args:
+        mesh, faces: as `coneflat.flatten` takes them; or a `Flattening` with cones quantised to quarter turns.
+        quads: about so many unit squares cover the surface; None: 10,000, unless a size is given.
+        size: of a square in model units, instead.
+        stretch: from angles, 0, to areas, 1: what the map keeps; see `StretchEnergy`.
+        options: of `coneflat.flatten`; by default cones have three, five or six quads.
+
+    Raises:
+        GridError: no grid of this size was found that turns no triangle over.
+        MeshError, CurvatureError, OptionError, SeamError, MetricError: as `coneflat.flatten`.
+
+    Notes:
+        A smooth layout with quantised cones (Kaelberer, Nieser, Polthier, "QuadCover", 2007) is scaled; translations of
+        seams and places of cones are rounded together, to the lattice point that is nearest by the energy that going
+        there costs at least; and the layout is relaxed with these (integer-grid maps: Bommes, Campen, Ebke, Alliez,
+        Kobbelt 2013), from the smooth one by steps that turn no triangle over.
+    """
+    if quads is not None and size is not None:
+        raise OptionError("quads and size say the same: give one of them")
+    wanted, name = (size, "size") if size is not None else (10_000 if quads is None else quads, "quads")
+    if not (np.isfinite(wanted) and wanted > 0):
+        raise OptionError(f"{name} must be a positive number, not {wanted!r}")
+    if isinstance(mesh, Flattening):
+        if faces is not None or options:
+            raise OptionError("a flattening has its faces and options: none can be given beside it")
+        result = mesh
+    else:
+        result = flatten(mesh, faces, **{**OPTIONS, **options})
+    layout = aligned(result, None if size is not None else wanted, size)
+    with one_blas_thread():
+        return _whole(layout, StretchEnergy(stretch))
+
+
+def _whole(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
+    """Return the grid of a smooth layout."""
+    mesh, corners = layout.mesh, layout.corners
+    transitions = find_transitions(mesh, corners, layout.points, layout.cones)
+    rounding = find_rounding(mesh, corners, layout.points, layout.cones, transitions)
+    smooth = transitions.places(layout.points, rounding.smooth)
+    tries = 0
+    furthest = "it has none that keeps cones apart"
+    for values in rounding.candidates():
+        try:
+            found = _relaxed(layout, smooth, transitions, values, energy)
+        except ConvergenceError as error:
+            tries, furthest = tries + 1, str(error)
+            if tries == TRIES:
+                break
+            continue
+        points = _snapped(found, transitions, values)
+        if (signed_double_areas(_pairs(points)[corners]) > 0).all():
+            return _described(layout, smooth, points, found, transitions, rounding, values, tries)
+        furthest = "a triangle was turned over by rounding"
+    raise GridError(
+        f"no grid of about {_area(layout):,.0f} quads was found in {plural(tries, 'try', 'tries')}, the last: "
+        f"{furthest}"
+    )
+
+
+def _relaxed(
+    layout: Layout, smooth: ComplexArray, transitions: Transitions, values: IntArray, energy: StretchEnergy
+) -> Relaxed:
+    """Return the layout relaxed with whole translations of seams and cones on whole places.
+
+    Raises:
+        ConvergenceError: they cannot be reached without turning a triangle over.
+    """
+    chains, count = transitions.chains, 2 * len(transitions.quarters)
+    places = transitions.places(smooth, values.astype(np.float64))
+    cones = np.flatnonzero(transitions.is_cone)
+    _, one_of = np.unique(chains.chain, return_index=True)
+    tied = chains.halfedges[one_of, 1]
+    constraints = PointConstraints(
+        pinned=cones, places=_pairs(places[cones]), tied=tied, translations=values[:count].reshape(-1, 2)
+    )
+    return relax(
+        layout.mesh, _pairs(smooth), layout.corners, energy, constraints, lengths=layout.lengths, steps=200
+    )
+
+
+def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> ComplexArray:
+    """Return the points with seams that are whole motions of each other to the last bit, and cones on grid points.
+
+    Coordinates become multiples of a power of two so small that their sums with whole numbers are exact.
+    """
+    largest = float(np.abs(found.points).max(initial=1.0)) + float(np.abs(values).max(initial=0))
+    bits = min(BITS, 50 - int(np.ceil(np.log2(largest))))
+    z = found.points[:, 0] + 1j * found.points[:, 1]
+    rounded = np.ldexp(np.rint(np.ldexp(_pairs(z), bits)), -bits)
+    return transitions.places(rounded[:, 0] + 1j * rounded[:, 1], values.astype(np.float64))
+
+
+def _described(
+    layout: Layout,
+    smooth: ComplexArray,
+    points: ComplexArray,
+    found: Relaxed,
+    transitions: Transitions,
+    rounding: Rounding,
+    values: IntArray,
+    tries: int,
+) -> IntegerGrid:
+    mesh, corners = layout.mesh, layout.corners
+    turns, shifts = _across(layout, points)
+    angles = signed_angles(sides_between(_pairs(points)[corners]))
+    sums = np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
+    move_rms, move_max = _moves(layout, smooth, points)
+    notes: tuple[str, ...] = ()
+    if tries:
+        notes = (
+            f"The {plural(tries, 'nearest lattice point', 'nearest lattice points')} could not be reached without "
+            "turning triangles over; the next one could.",
+        )
+    return IntegerGrid(
+        vertices=mesh.vertices,
+        faces=mesh.faces,
+        corner_grid=_pairs(points)[corners],
+        turns=turns,
+        shifts=shifts,
+        cones=layout.cones,
+        quarters=np.rint(sums[layout.cones] / (np.pi / 2)).astype(np.int64),
+        size=layout.size,
+        move_rms=move_rms,
+        move_max=move_max,
+        energy_before=found.energy_before,
+        energy=found.energy,
+        qc_before=_distortion(layout, smooth)[0],
+        qc_mean=_distortion(layout, points)[0],
+        least_area=_distortion(layout, points)[1],
+        notes=notes,
+    )
+
+
+def _across(layout: Layout, points: ComplexArray) -> tuple[IntArray, IntArray]:
+    """Return (3m,) quarter turns and (3m, 2) shifts of half-edges: from the triangle across to their own."""
+    mesh, corners = layout.mesh, layout.corners
+    starts, ends = corners[:, NEXT].ravel(), corners[:, PREVIOUS].ravel()
+    turns = np.full(len(starts), -1, dtype=np.int64)
+    shifts = np.zeros(len(starts), dtype=np.complex128)
+    pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
+    for h, t in (pairs.T, pairs[:, ::-1].T):
+        own, other = points[ends[h]] - points[starts[h]], points[starts[t]] - points[ends[t]]
+        turns[h] = np.rint(np.angle(own / other) / (np.pi / 2)).astype(np.int64) % 4
+        shifts[h] = points[starts[h]] - UNITS[turns[h]] * points[ends[t]]
+    return turns, np.rint(_pairs(shifts)).astype(np.int64)
+
+
+def _moves(layout: Layout, smooth: ComplexArray, points: ComplexArray) -> tuple[float, float]:
+    """Return the root mean square and the largest move of cones, in units, beside one that all points share."""
+    at = np.isin(layout.mesh.faces, layout.cones)
+    if not at.any():
+        return 0.0, 0.0
+    move = (points - smooth)[np.unique(layout.corners[at])]
+    size = np.abs(move - move.mean())
+    return float(np.sqrt((size**2).mean())), float(size.max())
+
+
+def _distortion(layout: Layout, points: ComplexArray) -> tuple[float, float]:
+    """Return the mean quasi-conformal distortion by area, and the least area of a triangle over what it should be."""
+    areas = double_areas(layout.lengths) / 2
+    real = areas > 0
+    along, across = map_factors(rest_sides(layout.lengths[real] / layout.size))
+    places = points[layout.corners[real]]
+    places = places - places[:, :1]
+    one, two = np.abs((along * places).sum(axis=1)), np.abs((across * places).sum(axis=1))
+    ratio = (one + two) / (one - two)
+    return float(np.average(ratio, weights=areas[real])), float((one**2 - two**2).min())
+
+
+def _area(layout: Layout) -> float:
+    return float(signed_double_areas(_pairs(layout.points)[layout.corners]).sum()) / 2
+
+
+def _pairs(points: ComplexArray) -> FloatArray:
+    return np.stack([points.real, points.imag], axis=-1)

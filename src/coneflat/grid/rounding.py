@@ -1,0 +1,187 @@
+"""Whole translations of seams and whole places of cones near those of a smooth layout (quantisation)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from .._arrays import ComplexArray, FloatArray, IntArray
+from ..errors import GridError
+from ..mesh import NEXT, PREVIOUS, TriangleMesh
+from .lattice import nearest_points, reduced, whole_solutions
+from .stiffness import Stiffness
+from .transitions import TURNS, Transitions
+
+# Units: cones that are farther from each other along the surface are not rounded onto each other.
+NEAR = 3.0
+# Lattice points that are looked at for each set of pairs kept apart, and sets of such at most.
+CANDIDATES, REPAIRS = 64, 200
+
+
+@dataclass(frozen=True, eq=False)
+class ConePairs:
+    """Vectors between cones that are near each other, along the surface.
+
+    Attributes:
+        rows: (p, 2, d) the vector from the one to the other, by coordinates of the lattice.
+        before: (p, 2) as it is in the smooth layout.
+    """
+
+    rows: IntArray
+    before: FloatArray
+
+    def collapsed(self, coordinates: IntArray) -> IntArray:
+        """Return the pairs that a lattice point puts on one place or exchanges, the nearest ones first."""
+        after = self.rows @ coordinates
+        is_bad = (after * self.before).sum(axis=1) <= 0
+        order = np.argsort((self.before**2).sum(axis=1), kind="stable")
+        bad: IntArray = order[is_bad[order]]
+        return bad
+
+
+@dataclass(frozen=True, eq=False)
+class Rounding:
+    """The lattice of whole solutions, and where in it the smooth layout is.
+
+    Attributes:
+        basis: (v, d) of the lattice.
+        start: (d,) coordinates of the smooth layout.
+        metric: scalar products (d, d) of the basis.
+        pairs: of cones that must not fall together.
+    """
+
+    basis: IntArray
+    start: FloatArray
+    metric: FloatArray
+    pairs: ConePairs
+
+    @property
+    def smooth(self) -> FloatArray:
+        """(v,) the variables of the smooth layout, made to satisfy the equations."""
+        values: FloatArray = self.basis @ self.start
+        return values
+
+    def candidates(self) -> Iterator[IntArray]:
+        """Yield whole values (v,) of the variables, the nearest first, that put no two cones on one place."""
+        size = self.basis.shape[1]
+        rows, right = np.zeros((0, size), dtype=np.int64), np.zeros(0, dtype=np.int64)
+        for _ in range(REPAIRS):
+            found = self._nearest(rows, right)
+            bad = self.pairs.collapsed(found[0])
+            if not len(bad):
+                break
+            rows, right = self._kept_apart(int(bad[0]), rows, right)
+        else:
+            raise GridError(f"cones fall together in spite of {REPAIRS} equations between them")
+        for coordinates in found:
+            if not len(self.pairs.collapsed(coordinates)):
+                yield self.basis @ coordinates
+
+    def _nearest(self, rows: IntArray, right: IntArray) -> IntArray:
+        """Return (k, d) coordinates of lattice points that satisfy equations, the nearest first."""
+        solutions = whole_solutions(rows, right)
+        assert solutions is not None
+        one, basis = solutions
+        pull = basis.T @ self.metric
+        gram = pull @ basis
+        metric = reduced(gram)
+        place = np.linalg.solve(gram, pull @ (self.start - one)) if len(gram) else np.zeros(0)
+        points, _ = nearest_points(metric, place, CANDIDATES)
+        found: IntArray = one + points @ basis.T
+        return found
+
+    def _kept_apart(self, pair: int, rows: IntArray, right: IntArray) -> tuple[IntArray, IntArray]:
+        """Return equations with one more: two cones are as far apart along an axis as they were, a unit at least."""
+        before = self.pairs.before[pair]
+        for axis in np.argsort(-np.abs(before), kind="stable").tolist():
+            distance = max(1, round(abs(before[axis]))) * (1 if before[axis] >= 0 else -1)
+            more = np.concatenate([rows, self.pairs.rows[pair, [axis]]]), np.append(right, distance)
+            if whole_solutions(*more) is not None:
+                return more
+        raise GridError(
+            f"two cones {np.hypot(*before):.2g} units from each other cannot be kept apart: ask for more quads"
+        )
+
+
+def find_rounding(
+    mesh: TriangleMesh, corners: IntArray, points: ComplexArray, cones: IntArray, transitions: Transitions
+) -> Rounding:
+    """Return the lattice that a layout's translations and cones are to be rounded to."""
+    zeros = np.zeros(len(transitions.equations), dtype=np.int64)
+    solutions = whole_solutions(transitions.equations, zeros)
+    assert solutions is not None
+    basis = solutions.basis
+    fitted = np.linalg.lstsq(basis.astype(np.float64), transitions.values, rcond=None)[0]
+    start = np.asarray(fitted, dtype=np.float64)
+    metric = Stiffness(corners, points, transitions).gram(basis)
+    pairs = _near_pairs(mesh, corners, points, cones, transitions, basis, start)
+    return Rounding(basis, start, metric, pairs)
+
+
+def _near_pairs(
+    mesh: TriangleMesh,
+    corners: IntArray,
+    points: ComplexArray,
+    cones: IntArray,
+    transitions: Transitions,
+    basis: IntArray,
+    start: FloatArray,
+) -> ConePairs:
+    """Return the vectors between cones along the shortest paths over edges, where these are short."""
+    starts, ends = corners[:, NEXT].ravel(), corners[:, PREVIOUS].ravel()
+    tails, heads = mesh.tails, mesh.heads
+    graph = csr_matrix(
+        (np.abs(points[ends] - points[starts]), (tails, heads)), shape=(len(mesh.vertices),) * 2
+    )
+    graph = graph.maximum(graph.T)
+    found, before = dijkstra(graph, indices=cones, limit=NEAR, return_predecessors=True)
+    halfedge = csr_matrix((np.arange(1, len(tails) + 1), (tails, heads)), shape=graph.shape)
+    is_cone = np.zeros(len(mesh.vertices), dtype=bool)
+    is_cone[cones] = True
+    rows = []
+    for i, j in np.argwhere(np.isfinite(found[:, cones])).tolist():
+        if i >= j:
+            continue
+        path = [int(cones[j])]
+        while path[-1] != cones[i]:
+            path.append(int(before[i, path[-1]]))
+        path.reverse()
+        if is_cone[path[1:-1]].any():
+            continue
+        sides = [_side(int(halfedge[a, b]), int(halfedge[b, a]), starts, ends) for a, b in pairwise(path)]
+        rows.append(_vector(sides, transitions))
+    joined = np.array(rows, dtype=np.int64).reshape(-1, 2, basis.shape[0]) @ basis
+    return ConePairs(joined, joined @ start)
+
+
+def _side(forth: int, back: int, starts: IntArray, ends: IntArray) -> tuple[int, int]:
+    """Return the points at the ends of an edge, in a triangle beside it; half-edges from 1, 0 for none."""
+    if forth:
+        return int(starts[forth - 1]), int(ends[forth - 1])
+    return int(ends[back - 1]), int(starts[back - 1])
+
+
+def _vector(sides: list[tuple[int, int]], transitions: Transitions) -> IntArray:
+    """Return (2, v) the vector along a path, in the frame of its first edge, by the variables.
+
+    The places of vertices on the way cancel: of two copies of one, i^turn base + shift each, the difference is left
+    between their shifts, seen from one frame.
+    """
+
+    def shift(point: int) -> IntArray:
+        rows: IntArray = transitions.shifts[2 * point : 2 * point + 2].toarray()
+        return rows
+
+    turn, total = 0, -shift(sides[0][0])
+    for (_, here), (there, _) in pairwise(sides):
+        if here != there:
+            across = int(transitions.turn[here] - transitions.turn[there]) % 4
+            total = total + TURNS[turn] @ (shift(here) - TURNS[across] @ shift(there))
+            turn = (turn + across) % 4
+    last: IntArray = total + TURNS[turn] @ shift(sides[-1][1])
+    return last

@@ -1,0 +1,242 @@
+"""Seams whose two sides are quarter turns of each other, as equations between whole numbers.
+
+Copies of a vertex in the plane are moved onto each other by the motions of seams, z_right = i^q z_left + t. All that
+may vary are the translations t of the chains of seam edges, and the places of cones; around each vertex within the
+surface the motions must compose to one that keeps its place, which is an equation between these with the coefficients
+0, 1 and -1.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ..errors import GridError
+from ..layout.relax.seam_chains import SeamChains, find_chains
+from ..mesh import TriangleMesh, label_components, label_faces
+
+# Radians by which seams may turn beside quarter turns; those of quantised cones do so by 1e-11 at most.
+QUARTER = 1e-6
+UNITS = np.array([1, 1j, -1, -1j])
+# The same as matrices of whole numbers.
+TURNS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]])
+
+
+@dataclass(frozen=True, eq=False)
+class Transitions:
+    """The motions of a layout's seams, and what may vary of them.
+
+    The variables are x and y of the translation of each chain and of the place of one copy of each cone.
+
+    Attributes:
+        chains: the seams.
+        quarters: (c,) quarter turns of each chain.
+        base: (u,) the copy that each point is given by: i^turn times that plus its shift. Itself where it is the only
+            one, or of a cone.
+        turn: (u,) from 0 to 3.
+        shifts: (2u, v) x and y of the shift of each point, by the variables.
+        is_cone: (u,) copies of cones, whose places are their shifts alone.
+        equations: (r, v) that make 0 of the variables.
+        values: (v,) the variables of the layout as it is, up to rounding.
+    """
+
+    chains: SeamChains
+    quarters: IntArray
+    base: IntArray
+    turn: IntArray
+    shifts: csr_matrix
+    is_cone: BoolArray
+    equations: IntArray
+    values: FloatArray
+
+    def places(self, points: ComplexArray, values: FloatArray) -> ComplexArray:
+        """Return (u,) points with seams and cones as variables say; copies follow the ones that they are given by."""
+        shift = self.shifts @ values
+        own = np.where(self.is_cone, 0, UNITS[self.turn] * points[self.base])
+        moved: ComplexArray = own + (shift[0::2] + 1j * shift[1::2])
+        return moved
+
+
+def find_transitions(
+    mesh: TriangleMesh, corners: IntArray, points: ComplexArray, cones: IntArray
+) -> Transitions:
+    """Return the transitions of a layout.
+
+    Args:
+        mesh: the mesh.
+        corners: (m, 3) the point at each triangle corner.
+        points: (u,) of the plane.
+        cones: vertices whose places are variables.
+
+    Raises:
+        SeamError: the sides of a seam are no rigid copies of each other.
+        GridError: they are no quarter turns of each other.
+    """
+    chains = find_chains(mesh, corners, points, cones)
+    angle = np.angle(chains.rotation) / (np.pi / 2)
+    quarters = np.rint(angle).astype(np.int64)
+    off = float(np.abs(angle - quarters).max(initial=0.0)) * np.pi / 2
+    if off > QUARTER:
+        raise GridError(
+            f"seams turn by up to {off:.2g} rad beside quarter turns: flatten with quantise=pi/2 and correct_handles, "
+            "and a mesh with several boundaries with boundary='straight'"
+        )
+    builder = _Builder(mesh, corners, points, cones, chains, quarters % 4)
+    return builder.transitions()
+
+
+class _Builder:
+    def __init__(
+        self,
+        mesh: TriangleMesh,
+        corners: IntArray,
+        points: ComplexArray,
+        cones: IntArray,
+        chains: SeamChains,
+        quarters: IntArray,
+    ) -> None:
+        self.chains, self.quarters, self.points, self.cones = chains, quarters, points, cones
+        self.vertex = np.zeros(len(points), dtype=np.int64)
+        self.vertex[corners.ravel()] = mesh.faces.ravel()
+        self.base = np.arange(len(points))
+        self.turn = np.zeros(len(points), dtype=np.int64)
+        self.chain_count = len(quarters)
+        self.size = 2 * (self.chain_count + len(cones))
+        self.entries: list[tuple[IntArray, IntArray, IntArray]] = []
+        self.equations: list[IntArray] = []
+        self.corners = corners
+
+    def transitions(self) -> Transitions:
+        """Return the transitions."""
+        chains, points = self.chains, self.points
+        self._add_regular()
+        self._add_nodes()
+        self._fix_charts()
+        row, column, value = (np.concatenate(parts) for parts in zip(*self.entries, strict=True))
+        shifts = coo_matrix((value, (row, column)), shape=(2 * len(points), self.size)).tocsr()
+        translation = np.zeros(self.chain_count, dtype=np.complex128)
+        off = points[chains.right] - UNITS[self.quarters[chains.chain], None] * points[chains.left]
+        np.add.at(translation, chains.chain, off.mean(axis=1))
+        translation /= np.maximum(np.bincount(chains.chain, minlength=self.chain_count), 1)
+        of_cones = points[self.cone_points]
+        both = np.concatenate([translation, of_cones])
+        return Transitions(
+            chains,
+            self.quarters,
+            self.base,
+            self.turn,
+            shifts,
+            np.isin(self.vertex, self.cones),
+            np.array(self.equations, dtype=np.int64).reshape(-1, self.size),
+            np.stack([both.real, both.imag], axis=1).ravel(),
+        )
+
+    def _add_regular(self) -> None:
+        """Give the right points within chains by the left ones."""
+        chains = self.chains
+        inside = ~chains.is_node[chains.vertices]
+        right, at = np.unique(chains.right[inside], return_index=True)
+        chain = np.broadcast_to(chains.chain[:, None], chains.left.shape)[inside][at]
+        self.base[right] = chains.left[inside][at]
+        self.turn[right] = self.quarters[chain]
+        for axis in range(2):
+            self.entries.append((2 * right + axis, 2 * chain + axis, np.ones(len(right), dtype=np.int64)))
+
+    def _add_nodes(self) -> None:
+        """Give the copies of each node by one of them, and close the circle around it."""
+        chains = self.chains
+        relations: dict[int, set[tuple[int, int, int]]] = defaultdict(set)
+        for k, end in np.argwhere(chains.is_node[chains.vertices]).tolist():
+            triple = (int(chains.left[k, end]), int(chains.right[k, end]), int(chains.chain[k]))
+            relations[int(chains.vertices[k, end])].add(triple)
+        of_cone = {int(v): i for i, v in enumerate(self.cones)}
+        first = first_points(self.vertex)
+        self.cone_points = first[self.cones]
+        for v in sorted(set(relations) | set(of_cone)):
+            self._add_node(v, int(first[v]), sorted(relations.get(v, ())), of_cone.get(v))
+
+    def _add_node(self, v: int, start: int, relations: list[tuple[int, int, int]], cone: int | None) -> None:
+        shift = np.zeros((2, self.size), dtype=np.int64)
+        if cone is not None:
+            at = 2 * (self.chain_count + cone)
+            shift[:, at : at + 2] = np.eye(2)
+        known = {start: (0, shift)}
+        left_over = list(relations)
+        while left_over:
+            later = []
+            for left, right, chain in left_over:
+                quarter, across = int(self.quarters[chain]), np.zeros((2, self.size), dtype=np.int64)
+                across[:, 2 * chain : 2 * chain + 2] = np.eye(2)
+                if left in known:
+                    turn, shift = known[left]
+                    turn, shift = (turn + quarter) % 4, TURNS[quarter] @ shift + across
+                    if right not in known:
+                        known[right] = turn, shift
+                        continue
+                    self._close(v, known[right], (turn, shift), cone is not None)
+                elif right in known:
+                    turn, shift = known[right]
+                    known[left] = (turn - quarter) % 4, TURNS[-quarter % 4] @ (shift - across)
+                else:
+                    later.append((left, right, chain))
+            if len(later) == len(left_over):
+                raise GridError(f"the seams at vertex {v} do not connect all its copies")
+            left_over = later
+        for point, (turn, shift) in known.items():
+            if cone is None:
+                self.base[point], self.turn[point] = start, turn
+            axis, column = np.nonzero(shift)
+            self.entries.append((2 * point + axis, column, shift[axis, column]))
+
+    def _close(self, v: int, one: tuple[int, IntArray], two: tuple[int, IntArray], is_cone: bool) -> None:
+        if not is_cone and one[0] != two[0]:
+            raise GridError(f"vertex {v} has an angle of {4 + one[0] - two[0]} quarter turns, but is no cone")
+        self.equations.extend(row for row in two[1] - one[1] if row.any())
+
+    def _fix_charts(self) -> None:
+        """Let charts not move by themselves: some seams between them stay, and one cone of each component."""
+        chart, component = charts_of(self.corners, len(self.points), self.chains)
+        for chain in joining_chains(self.chains, chart).tolist():
+            self._fix(chain)
+        _, firsts = np.unique(component[chart[self.cone_points]], return_index=True)
+        for cone in firsts.tolist():
+            self._fix(self.chain_count + cone)
+
+    def _fix(self, variable: int) -> None:
+        for axis in range(2):
+            row = np.zeros(self.size, dtype=np.int64)
+            row[2 * variable + axis] = 1
+            self.equations.append(row)
+
+
+def charts_of(corners: IntArray, count: int, chains: SeamChains) -> tuple[IntArray, IntArray]:
+    """Return (u,) the chart of each point and (charts,) the component of each chart."""
+    charts, chart = label_faces(corners, count)
+    of_point = np.zeros(count, dtype=np.int64)
+    of_point[corners.ravel()] = chart.repeat(3)
+    _, component = label_components(charts, of_point[chains.left[:, 0]], of_point[chains.right[:, 0]])
+    return of_point, component
+
+
+def joining_chains(chains: SeamChains, chart: IntArray) -> IntArray:
+    """Return chains that join the charts of each component, and none too many; chart: (u,) that of each point."""
+    joined = np.arange(int(chart.max(initial=-1)) + 1)
+    kept = []
+    _, firsts = np.unique(chains.chain, return_index=True)
+    for chain, k in enumerate(firsts.tolist()):
+        one, two = int(joined[chart[chains.left[k, 0]]]), int(joined[chart[chains.right[k, 0]]])
+        if one != two:
+            joined[joined == two] = one
+            kept.append(chain)
+    return np.array(kept, dtype=np.int64)
+
+
+def first_points(vertex: IntArray) -> IntArray:
+    """Return (n,) the first point of each vertex; vertex: (u,) that of each point."""
+    first = np.zeros(int(vertex.max(initial=-1)) + 1, dtype=np.int64)
+    first[vertex[::-1]] = np.arange(len(vertex))[::-1]
+    return first
