@@ -77,7 +77,7 @@ def test_polycubes(name, cells, inside):
     count = len(squares) * cells**2
     assert len(mesh.quads) == count
     assert len(mesh.vertices) == count + euler  # E is 2 F
-    assert mesh.euler_characteristic == mesh.surface.euler_characteristic == euler
+    assert mesh.euler_characteristic == mesh.surface_euler == euler
     which, many = np.unique(mesh.valences[mesh.irregular], return_counts=True)
     assert dict(zip(which.tolist(), many.tolist(), strict=True)) == valences
     # On flat squares all quads are squares, at corners that are whole multiples, and they cover all.

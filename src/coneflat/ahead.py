@@ -10,6 +10,8 @@ import numpy as np
 
 from ._arrays import FloatArray, IntArray
 from .geometry.visibility import visible_share
+from .grid import measure_quads
+from .grid.quads import quads
 from .input.polygons import Polygons
 from .layout.convex import make_convex
 from .pipeline import flatten
@@ -34,6 +36,7 @@ def compile_kernels() -> None:
     flatten(*_tube(closed=True), quantise=np.pi / 2)
     visible_share(*_tube(closed=True))
     flatten(*_tube(closed=False), boundary="disk", best_effort=True)
+    measure_quads(quads(*_tube(closed=True), quads=400))
     _make_a_dart_convex()
 
 

@@ -77,8 +77,14 @@ class QuadMesh:
 
     @property
     def euler_characteristic(self) -> int:
-        """Vertices minus edges plus quads: that of the surface, unless squares were left out."""
+        """Vertices minus edges plus quads."""
         return len(self.vertices) - len(self.edges) + len(self.quads)
+
+    @property
+    def surface_euler(self) -> int:
+        """That of the surface, which is the same unless squares were left out; vertices without a face do not count."""
+        unused = len(self.surface.vertices) - len(np.unique(self.surface.faces))
+        return self.surface.euler_characteristic - unused
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the mesh as .obj or .ply, in full or not at all, and return the path; see `write_quads`.

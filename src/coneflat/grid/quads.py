@@ -62,11 +62,10 @@ def _notes(found: QuadMesh) -> Iterator[str]:
             f"Left out {plural(found.left_out, 'square')} that the boundary cuts, and with them {share:.1f} % of the "
             "surface as the grid has it."
         )
-    euler = found.surface.euler_characteristic
-    if found.euler_characteristic != euler:
+    if found.euler_characteristic != found.surface_euler:
         yield (
-            f"The Euler characteristic of the quads is {found.euler_characteristic}, that of the surface {euler}: what was "
-            "left out has opened or parted it."
+            f"The Euler characteristic of the quads is {found.euler_characteristic}, that of the "
+            f"surface {found.surface_euler}: what was left out has opened or parted it."
         )
     turned = int((least_jacobians(found.vertices, found.quads) <= 0).sum())
     if turned:
