@@ -290,3 +290,36 @@ def test_sides_that_are_no_copies_are_refused():
     bent[:, 0] *= 1.3
     with pytest.raises(errors.SeamError, match="no copies"):
         relax(mesh, bent, corners)
+
+
+def test_tied_seams_get_their_translations():
+    """A seam's motion is asked for at one half-edge, from the triangle across to its own."""
+    mesh, points, corners, _ = laid_out(shapes.torus(24, 12), cones="none")
+    starts, ends = corners[:, [1, 2, 0]].ravel(), corners[:, [2, 0, 1]].ravel()
+    h, t = mesh.edge_halfedges[~mesh.is_boundary_edge].T
+    cut = np.flatnonzero((starts[h] != ends[t]) | (ends[h] != starts[t]))
+    z = points @ [1, 1j]
+    move = z[starts[h]] - z[ends[t]]  # a torus without cones has translations alone
+    first, wanted = h[cut[0]], move[cut[0]] * 1.1 + 0.02j
+    found = relax(
+        mesh,
+        points,
+        corners,
+        constraints=PointConstraints(tied=[first], translations=[[wanted.real, wanted.imag]]),
+    )
+    after = found.points @ [1, 1j]
+    moved = after[starts[h]] - after[ends[t]]
+    same = np.abs(move - move[cut[0]]) < 1e-9
+    assert same[cut].sum() > 1
+    assert np.abs(moved - wanted)[same & np.isin(np.arange(len(h)), cut)].max() < 1e-9
+    assert signed_double_areas(found.points[corners]).min() > 0
+
+
+@pytest.mark.parametrize(
+    ("tied", "translations", "message"),
+    [([0], [], "1 half-edge tied, but 0 translations"), ([0], [[0, 0]], "tied half-edge 0 is on no seam")],
+)
+def test_ties_that_make_no_sense(tied, translations, message):
+    mesh, points, corners, _ = laid_out(shapes.hill(), cones="none")
+    with pytest.raises(errors.OptionError, match=message):
+        relax(mesh, points, corners, constraints=PointConstraints(tied=tied, translations=translations))

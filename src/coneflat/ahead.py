@@ -34,9 +34,9 @@ def compile_kernels() -> None:
     for method in ("ricci", "circle-patterns"):
         flatten(*_tube(closed=True), method=method)
     flatten(*_tube(closed=True), quantise=np.pi / 2)
+    measure_quads(quads(*_tube(closed=True), quads=300))
     visible_share(*_tube(closed=True))
     flatten(*_tube(closed=False), boundary="disk", best_effort=True)
-    measure_quads(quads(*_tube(closed=True), quads=400))
     _make_a_dart_convex()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from ..result.flattening import Flattening
 from ..text import plural
 from ..threads import one_blas_thread
 from .aligned import Layout, aligned
-from .rounding import Rounding, find_rounding
+from .rounding import find_rounding
 from .transitions import UNITS, Transitions, find_transitions
 
 # What the grid wants of a flattening: three, five or six quads at a cone, and rotations that are quarter turns.
@@ -34,6 +34,10 @@ OPTIONS = {
 }
 # Lattice points that are tried, one after the other.
 TRIES = 6
+# Newton steps at most, and how many times that of an isometry the energy may become: cones fall together then.
+STEPS, HOPELESS = 200, 1e3
+# Part of the squares wanted by which there may be more or fewer without a note.
+NOTED = 0.1
 # Bits after the point that coordinates have at most: so seams fit exactly, and no triangle notices.
 BITS = 40
 
@@ -125,29 +129,41 @@ def integer_grid(
 
 
 def _whole(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
-    """Return the grid of a smooth layout."""
+    """Return the grid of a smooth layout, or say which count of quads has one."""
+    found, why = _attempt(layout, energy)
+    if found is not None:
+        return found
+    advice = "none with up to 16 times as many was found, either"
+    for factor in (2, 4, 8, 16):
+        finer = replace(layout, points=np.sqrt(factor) * layout.points, size=layout.size / np.sqrt(factor))
+        if _attempt(finer, energy)[0] is not None:
+            advice = f"{_area(finer):,.0f} would do"
+            break
+    raise GridError(f"no grid of about {_area(layout):,.0f} quads was found: {why}; {advice}")
+
+
+def _attempt(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None, str]:
+    """Return a grid, if one of the nearest lattice points has one, or else why the last has none."""
     mesh, corners = layout.mesh, layout.corners
     transitions = find_transitions(mesh, corners, layout.points, layout.cones)
-    rounding = find_rounding(mesh, corners, layout.points, layout.cones, transitions)
+    try:
+        rounding = find_rounding(mesh, corners, layout.points, layout.cones, transitions)
+        candidates = rounding.candidates()
+    except GridError as error:
+        return None, str(error)
     smooth = transitions.places(layout.points, rounding.smooth)
-    tries = 0
-    furthest = "it has none that keeps cones apart"
-    for values in rounding.candidates():
+    tries, why = 0, "all lattice points near it put cones on each other"
+    for values in candidates[:TRIES]:
         try:
             found = _relaxed(layout, smooth, transitions, values, energy)
         except ConvergenceError as error:
-            tries, furthest = tries + 1, str(error)
-            if tries == TRIES:
-                break
+            tries, why = tries + 1, str(error)
             continue
         points = _snapped(found, transitions, values)
         if (signed_double_areas(_pairs(points)[corners]) > 0).all():
-            return _described(layout, smooth, points, found, transitions, rounding, values, tries)
-        furthest = "a triangle was turned over by rounding"
-    raise GridError(
-        f"no grid of about {_area(layout):,.0f} quads was found in {plural(tries, 'try', 'tries')}, the last: "
-        f"{furthest}"
-    )
+            return _described(layout, smooth, points, found, transitions, tries), ""
+        tries, why = tries + 1, "a triangle so small was left that rounding turned it over"
+    return None, why
 
 
 def _relaxed(
@@ -166,8 +182,16 @@ def _relaxed(
     constraints = PointConstraints(
         pinned=cones, places=_pairs(places[cones]), tied=tied, translations=values[:count].reshape(-1, 2)
     )
+    highest = HOPELESS * float(energy.values(np.ones(1), np.ones(1))[0]) * _model_area(layout)
     return relax(
-        layout.mesh, _pairs(smooth), layout.corners, energy, constraints, lengths=layout.lengths, steps=200
+        layout.mesh,
+        _pairs(smooth),
+        layout.corners,
+        energy,
+        constraints,
+        lengths=layout.lengths,
+        steps=STEPS,
+        progress=lambda _, total: total > highest,
     )
 
 
@@ -189,8 +213,6 @@ def _described(
     points: ComplexArray,
     found: Relaxed,
     transitions: Transitions,
-    rounding: Rounding,
-    values: IntArray,
     tries: int,
 ) -> IntegerGrid:
     mesh, corners = layout.mesh, layout.corners
@@ -198,12 +220,15 @@ def _described(
     angles = signed_angles(sides_between(_pairs(points)[corners]))
     sums = np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
     move_rms, move_max = _moves(layout, smooth, points)
-    notes: tuple[str, ...] = ()
+    notes = []
     if tries:
-        notes = (
-            f"The {plural(tries, 'nearest lattice point', 'nearest lattice points')} could not be reached without "
-            "turning triangles over; the next one could.",
+        notes.append(
+            f"The {plural(tries, 'nearest lattice point')} could not be reached without turning triangles over; the "
+            "next one could."
         )
+    squares, wanted = _area(replace(layout, points=points)), _model_area(layout) / layout.size**2
+    if abs(squares - wanted) > NOTED * wanted:
+        notes.append(f"The grid has an area of {squares:,.0f} squares, not {wanted:,.0f}.")
     return IntegerGrid(
         vertices=mesh.vertices,
         faces=mesh.faces,
@@ -220,7 +245,7 @@ def _described(
         qc_before=_distortion(layout, smooth)[0],
         qc_mean=_distortion(layout, points)[0],
         least_area=_distortion(layout, points)[1],
-        notes=notes,
+        notes=tuple(notes),
     )
 
 
@@ -258,6 +283,10 @@ def _distortion(layout: Layout, points: ComplexArray) -> tuple[float, float]:
     one, two = np.abs((along * places).sum(axis=1)), np.abs((across * places).sum(axis=1))
     ratio = (one + two) / (one - two)
     return float(np.average(ratio, weights=areas[real])), float((one**2 - two**2).min())
+
+
+def _model_area(layout: Layout) -> float:
+    return float(double_areas(layout.lengths).sum()) / 2
 
 
 def _area(layout: Layout) -> float:

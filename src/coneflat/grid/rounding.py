@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -21,6 +20,8 @@ from .transitions import TURNS, Transitions
 NEAR = 3.0
 # Lattice points that are looked at for each set of pairs kept apart, and sets of such at most.
 CANDIDATES, REPAIRS = 64, 200
+# Of these, whether they turn triangles over is looked at beforehand.
+FORESEEN = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +54,17 @@ class Rounding:
         start: (d,) coordinates of the smooth layout.
         metric: scalar products (d, d) of the basis.
         pairs: of cones that must not fall together.
+        stiffness: what that is from.
+        corners, points: the smooth layout.
     """
 
     basis: IntArray
     start: FloatArray
     metric: FloatArray
     pairs: ConePairs
+    stiffness: Stiffness
+    corners: IntArray
+    points: ComplexArray
 
     @property
     def smooth(self) -> FloatArray:
@@ -66,8 +72,14 @@ class Rounding:
         values: FloatArray = self.basis @ self.start
         return values
 
-    def candidates(self) -> Iterator[IntArray]:
-        """Yield whole values (v,) of the variables, the nearest first, that put no two cones on one place."""
+    def candidates(self) -> list[IntArray]:
+        """Return whole values (v,) of the variables near the smooth ones that put no two cones on one place.
+
+        First those that turn no triangle over as far as the second order tells, each kind the nearest first.
+
+        Raises:
+            GridError: cones cannot be kept apart.
+        """
         size = self.basis.shape[1]
         rows, right = np.zeros((0, size), dtype=np.int64), np.zeros(0, dtype=np.int64)
         for _ in range(REPAIRS):
@@ -78,9 +90,19 @@ class Rounding:
             rows, right = self._kept_apart(int(bad[0]), rows, right)
         else:
             raise GridError(f"cones fall together in spite of {REPAIRS} equations between them")
-        for coordinates in found:
-            if not len(self.pairs.collapsed(coordinates)):
-                yield self.basis @ coordinates
+        apart = [each for each in found if not len(self.pairs.collapsed(each))][:FORESEEN]
+        values = [np.asarray(self.basis @ each) for each in apart]
+        turned = self.turned_over(np.stack(values, axis=1) - self.smooth[:, None])
+        return [values[i] for i in np.argsort(turned, kind="stable")]
+
+    def turned_over(self, changes: FloatArray) -> FloatArray:
+        """Return (k,) the area of triangles that the shifts of least energy turn over, for changes (v, k)."""
+        shifts = self.stiffness.displacement(changes)
+        moved = self.points[:, None] + shifts[0::2] + 1j * shifts[1::2]
+        a, b, c = (moved[self.corners[:, i]] for i in range(3))
+        doubled = (np.conj(b - a) * (c - a)).imag
+        areas: FloatArray = -np.minimum(doubled, 0.0).sum(axis=0)
+        return areas
 
     def _nearest(self, rows: IntArray, right: IntArray) -> IntArray:
         """Return (k, d) coordinates of lattice points that satisfy equations, the nearest first."""
@@ -118,9 +140,10 @@ def find_rounding(
     basis = solutions.basis
     fitted = np.linalg.lstsq(basis.astype(np.float64), transitions.values, rcond=None)[0]
     start = np.asarray(fitted, dtype=np.float64)
-    metric = Stiffness(corners, points, transitions).gram(basis)
+    stiffness = Stiffness(corners, points, transitions)
+    metric = stiffness.gram(basis)
     pairs = _near_pairs(mesh, corners, points, cones, transitions, basis, start)
-    return Rounding(basis, start, metric, pairs)
+    return Rounding(basis, start, metric, pairs, stiffness, corners, points)
 
 
 def _near_pairs(

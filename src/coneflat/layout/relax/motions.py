@@ -109,6 +109,11 @@ class _Builder:
         shifting = np.flatnonzero(np.isnan(constraints.offsets))
         self.of_line[shifting] = 2 * (len(special) + len(loose)) + np.arange(len(shifting))
         self.size = 2 * (len(special) + len(loose)) + len(shifting)
+        c = constraints
+        self.ties = [
+            self._tie(side, shift)
+            for side, shift in zip(c.tied.tolist(), self._complex(c.translations).tolist(), strict=True)
+        ]
 
     def _loose_chains(self) -> IntArray:
         """Return the chains whose translations may change."""
@@ -269,12 +274,8 @@ class _Builder:
         for point, place in zip(c.pinned.tolist(), self._complex(c.places).tolist(), strict=True):
             if self.of_point[point] >= 0:
                 add([(int(self.of_point[point]), 1.0 + 0.0j)], place - complex(self.points[point]))
-        for side, shift in zip(c.tied.tolist(), self._complex(c.translations).tolist(), strict=True):
-            chain, value = self._tie(side, shift)
-            if self.of_chain[chain] >= 0:
-                add([(int(self.of_chain[chain]), 1.0 + 0.0j)], value)
-            elif abs(value) > ROUNDING * max(1.0, abs(shift)):
-                raise OptionError(f"the seam at half-edge {side} is tied, but cannot move")
+        for chain, value in self.ties:
+            add([(int(self.of_chain[chain]), 1.0 + 0.0j)], value)
         off = self._off_line(c.on_line, c.line)
         for point, line, value in zip(c.on_line.tolist(), c.line.tolist(), off.tolist(), strict=True):
             if self.of_point[point] >= 0:
@@ -295,6 +296,8 @@ class _Builder:
             raise OptionError(f"tied half-edge {side} is on no seam")
         k, is_right = at[0].tolist()
         chain = int(chains.chain[k])
+        if self.of_chain[chain] < 0:
+            raise OptionError(f"tied half-edge {side} is on a seam that is held")
         turn = complex(chains.rotation[chain])
         wanted = shift if is_right else -turn * shift
         return chain, wanted - complex(

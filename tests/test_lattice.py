@@ -1,0 +1,68 @@
+"""Whole solutions of equations, and the lattice points nearest to a place, against brute force."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from coneflat.grid.lattice import nearest_points, reduced, whole_solutions
+
+
+def random_gram(rng, size):
+    root = rng.normal(size=(size, size)) @ np.diag(np.logspace(0, 1.5, size))
+    return root.T @ root
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_solutions_are_all_solutions(seed):
+    """Whatever solves the equations is the one plus whole multiples of the basis, in one way."""
+    rng = np.random.default_rng(seed)
+    rows = rng.integers(-2, 3, size=(3, 6))
+    rows[2] = rows[0] + rows[1]  # one depends on the others
+    known = rng.integers(-5, 6, size=6)
+    found = whole_solutions(rows, rows @ known)
+    assert found is not None
+    assert (rows @ found.one == rows @ known).all()
+    assert not (rows @ found.basis).any()
+    assert np.linalg.matrix_rank(found.basis) == found.basis.shape[1] == 6 - np.linalg.matrix_rank(rows)
+    steps = np.linalg.lstsq(found.basis.astype(float), (known - found.one).astype(float), rcond=None)[0]
+    assert (found.basis @ np.rint(steps).astype(int) == known - found.one).all()
+
+
+def test_what_has_no_whole_solution():
+    assert whole_solutions(np.array([[2, 4]]), np.array([3])) is None
+    assert whole_solutions(np.array([[1, 1], [2, 2]]), np.array([1, 3])) is None
+    assert whole_solutions(np.zeros((1, 2), dtype=int), np.array([1])) is None
+
+
+def test_a_basis_spans_no_sublattice():
+    """2x + 3y = 0: multiples of (3, -2), not of (6, -4)."""
+    found = whole_solutions(np.array([[2, 3]]), np.array([0]))
+    assert sorted(np.abs(found.basis.ravel()).tolist()) == [2, 3]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_reduced_bases_keep_the_lattice_and_its_lengths(seed):
+    rng = np.random.default_rng(seed)
+    gram = random_gram(rng, 7)
+    basis, root = reduced(gram)
+    assert abs(round(np.linalg.det(basis))) == 1
+    assert root.T @ root == pytest.approx(basis.T @ gram @ basis, rel=1e-8, abs=1e-6 * gram.max())
+    assert (np.abs(np.triu(root, 1)) <= 0.51 * np.abs(np.diag(root))[:, None]).all()
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_nearest_points_are_those_of_brute_force(seed):
+    rng = np.random.default_rng(seed)
+    gram = random_gram(rng, 4)
+    place = rng.uniform(-2, 2, size=4)
+    points, squares = nearest_points(reduced(gram), place, 5)
+    every = np.array(list(product(range(-9, 10), repeat=4)))
+    off = every - place
+    distances = np.sort(np.einsum("ki,ij,kj->k", off, gram, off))[:5]
+    if np.abs(points).max() < 9:  # else there may be nearer ones outside the box
+        assert squares == pytest.approx(distances)
+    assert (np.diff(squares) >= 0).all()
+    assert np.einsum("ki,ij,kj->k", points - place, gram, points - place) == pytest.approx(squares)
