@@ -29,11 +29,13 @@ from shapes import renumber
 
 from coneflat import read_mesh
 from coneflat.errors import GridError, OptionError, UnknownFormatError
-from coneflat.geometry.nearest import surface_distances
+from coneflat.geometry.nearest import Stars, slide_near, surface_distances
 from coneflat.grid.exact_grid import exact_grid
 from coneflat.grid.extract import extract_quads
+from coneflat.grid.jacobians import least_jacobians
 from coneflat.grid.quality import measure_quads
-from coneflat.grid.smooth import least_jacobians, smooth_quads
+from coneflat.grid.smooth import smooth_quads
+from coneflat.grid.worst import lift_worst
 
 TOOL = Path(__file__).resolve().parents[2] / "shared" / "tools" / "quads.py"
 
@@ -310,8 +312,55 @@ def test_smoothing_inverts_nothing():
     mesh = extract_quads(grid)
     before = least_jacobians(mesh.vertices, mesh.quads)
     after = least_jacobians(smooth_quads(mesh, 30).vertices, mesh.quads)
-    assert (after >= np.minimum(before, 0.5) - 1e-12).all()
-    assert np.abs(after - before).max() > 0.01
+    assert (before <= 0).any()
+    assert (after[before > 0] > 0).all()
+    assert after.min() > before.min()
+
+
+@pytest.mark.parametrize("turn", [2.0, 3.0])
+def test_smoothing_turns_quads_back(turn):
+    """A sheet turned around a point, the more the nearer: its quads are turned over there, its triangles are not."""
+    points, faces = rectangle(90, 90)
+    grid = flat(points[:, :2] * 12, faces)
+    z = (points[:, :2] * 12 - [6.3, 5.8]) @ [1, 1j]
+    z *= np.exp(1j * turn * np.exp(-(np.abs(z) ** 2)))
+    grid.vertices = np.column_stack([z.real, z.imag, 0 * z.real])
+    mesh = extract_quads(grid)
+    assert least_jacobians(mesh.vertices, mesh.quads).min() < 0
+    smooth = smooth_quads(mesh)
+    assert least_jacobians(smooth.vertices, smooth.quads).min() > 0.9
+    assert quad_areas(smooth).sum() == pytest.approx(144)
+
+
+def test_worst_quads_are_lifted():
+    """One corner of a sheet of squares is moved over to the other side of its neighbour."""
+    points, faces = rectangle(24, 24)
+    mesh = extract_quads(flat(points[:, :2] * 6, faces))
+    at = int(np.flatnonzero((mesh.vertices == [3, 3, 0]).all(axis=1))[0])
+    surface = Stars.of(mesh.surface.vertices, mesh.surface.faces)
+    on, weights = mesh.faces.copy(), mesh.barycentric.copy()
+    slide_near(surface, np.array([[4.6, 3.1, 0.0]]), on[at : at + 1], weights[at : at + 1])
+    places = surface.at(on, weights)
+    np.testing.assert_allclose(places[at], [4.6, 3.1, 0])
+    assert least_jacobians(places, mesh.quads).min() < 0
+    others = np.arange(len(places)) != at
+    before = places.copy()
+    lift_worst(places, mesh.quads, on, weights, ~others, surface)
+    assert least_jacobians(places, mesh.quads).min() > 0.5
+    np.testing.assert_array_equal(places[others], before[others])
+    np.testing.assert_allclose(surface.at(on, weights), places, atol=1e-12)
+    lift_worst(before, mesh.quads, on, weights, np.zeros(len(places), dtype=bool), surface)
+    np.testing.assert_allclose(before[at], [4.6, 3.1, 0])
+
+
+def test_sliding_stays_on_its_sheet():
+    """Of two sheets close together, a point that is to go through to the other stays on its own."""
+    points, faces = rectangle(10, 10)
+    above = points + np.array([0, 0, 0.01])
+    surface = Stars.of(np.concatenate([points, above]), np.concatenate([faces, faces + len(points)]))
+    on, weights = np.array([0]), np.array([[1.0, 0, 0]])
+    slide_near(surface, np.array([[0.63, 0.41, 0.009]]), on, weights)
+    np.testing.assert_allclose(surface.at(on, weights), [[0.63, 0.41, 0.0]], atol=1e-12)
 
 
 def test_measures_by_hand():

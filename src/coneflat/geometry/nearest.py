@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
@@ -134,27 +136,66 @@ def nearest_in_triangle(
     return best
 
 
-@compiled
-def slide_near(
-    vertices: FloatArray,
-    faces: IntArray,
-    star_start: IntArray,
-    star: IntArray,
-    targets: FloatArray,
-    on_faces: IntArray,
-    barycentric: FloatArray,
-) -> None:
+@dataclass(frozen=True, eq=False)
+class Stars:
+    """A triangle mesh with the triangles around each vertex.
+
+    Attributes:
+        vertices, faces: (n, 3), (m, 3) the mesh.
+        start, star: (n + 1,), (3m,) vertex v is in the faces star[start[v]:start[v + 1]].
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    start: IntArray
+    star: IntArray
+
+    @classmethod
+    def of(cls, vertices: FloatArray, faces: IntArray) -> Stars:
+        """Return a mesh with its stars."""
+        degree = np.bincount(faces.ravel(), minlength=len(vertices))
+        star = np.argsort(faces.ravel(), kind="stable") // 3
+        return cls(vertices, faces, np.concatenate([[0], np.cumsum(degree)]), star)
+
+    def at(self, on_faces: IntArray, barycentric: FloatArray) -> FloatArray:
+        """Return (q, 3) the points that lie in triangles (q,) at barycentric coordinates (q, 3)."""
+        places: FloatArray = np.einsum("qi,qix->qx", barycentric, self.vertices[self.faces[on_faces]])
+        return places
+
+    def axes(self, face: int) -> FloatArray:
+        """Return (2, 3) orthonormal axes of a triangle's plane, the first along its longest side."""
+        corners = self.vertices[self.faces[face]]
+        sides = np.roll(corners, -1, axis=0) - corners
+        longest = int(np.argmax(np.linalg.norm(sides, axis=1)))
+        along = sides[longest] / np.linalg.norm(sides[longest])
+        across = sides[longest - 1] - (sides[longest - 1] @ along) * along
+        return np.stack([along, -across / max(float(np.linalg.norm(across)), np.finfo(float).tiny)])
+
+
+def slide_near(surface: Stars, targets: FloatArray, on_faces: IntArray, barycentric: FloatArray) -> None:
     """Move points of a surface to where they are nearest to targets, from triangle to triangle, downhill.
 
     A point goes on to a triangle with a common vertex while that is nearer to its target; so it never jumps to
     another sheet of the surface that happens to be near.
 
     Args:
-        vertices, faces: (n, 3), (m, 3) the surface.
-        star_start, star: (n + 1,), (3m,) vertex v is in the faces star[star_start[v]:star_start[v + 1]].
+        surface: the triangles.
         targets: (q, 3).
         on_faces, barycentric: (q,), (q, 3) the points, changed.
     """
+    _slide(surface.vertices, surface.faces, surface.start, surface.star, targets, on_faces, barycentric)
+
+
+@compiled
+def _slide(
+    vertices: FloatArray,
+    faces: IntArray,
+    start: IntArray,
+    star: IntArray,
+    targets: FloatArray,
+    on_faces: IntArray,
+    barycentric: FloatArray,
+) -> None:
     weights = np.empty(3)
     for q in range(len(targets)):
         best, f = np.inf, on_faces[q]
@@ -163,7 +204,7 @@ def slide_near(
             moved = False
             for i in range(3):
                 v = faces[f, i]
-                for k in range(star_start[v], star_start[v + 1]):
+                for k in range(start[v], start[v + 1]):
                     g = star[k]
                     square = nearest_in_triangle(
                         targets[q],

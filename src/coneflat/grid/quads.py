@@ -12,8 +12,9 @@ from ..errors import OptionError
 from ..text import plural
 from .extract import extract_quads
 from .integer_grid import IntegerGrid, integer_grid
+from .jacobians import least_jacobians
 from .quad_mesh import QuadMesh
-from .smooth import least_jacobians, smooth_quads
+from .smooth import smooth_quads
 
 # Rounds of smoothing by default: more change little.
 ROUNDS = 10

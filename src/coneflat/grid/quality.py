@@ -11,8 +11,8 @@ from .._arrays import FloatArray, dots
 from ..geometry import edge_lengths
 from ..geometry.nearest import surface_distances
 from ..mesh import TriangleMesh
+from .jacobians import least_jacobians
 from .quad_mesh import QuadMesh
-from .smooth import least_jacobians
 
 # Points along each side of a quad at which distances are measured, and rows of them in a triangle at most.
 SAMPLES, MOST_ROWS = 5, 64

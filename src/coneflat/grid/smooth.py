@@ -8,9 +8,11 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray, dots
 from ..errors import OptionError
-from ..geometry.nearest import slide_near
+from ..geometry.nearest import Stars, slide_near
 from ..mesh import NEXT
+from .jacobians import least_jacobians
 from .quad_mesh import QuadMesh
+from .worst import lift_worst
 
 # Scaled Jacobian below which no quad goes that was above, nor any deeper that was below.
 LEAST = 0.5
@@ -24,7 +26,8 @@ def smooth_quads(quads: QuadMesh, rounds: int = 10) -> QuadMesh:
     Each quad asks its corners to go to the nearest square (S. Bouaziz, M. Deuss, Y. Schwartzburg, T. Weise, M. Pauly,
     "Shape-Up: shaping discrete geometry with projections", 2012, Section 4). Each vertex goes to the mean of what its
     quads ask for, and from there to the nearest point of the surface nearby. A quad whose scaled Jacobian would fall
-    too low keeps its corners where they were. Vertices of the boundary stay, and those on sharp edges.
+    too low keeps its corners where they were. Quads that are bad in the end are made better by moving single vertices.
+    Vertices of the boundary stay, and those on sharp edges.
 
     Args:
         quads: the quad mesh.
@@ -35,25 +38,21 @@ def smooth_quads(quads: QuadMesh, rounds: int = 10) -> QuadMesh:
     """
     if rounds < 0:
         raise OptionError(f"smoothing takes 0 rounds or more, not {rounds}")
-    mesh = quads.surface
     movable = ~(quads.is_boundary_vertex | _is_held(quads))
-    order = np.argsort(mesh.faces.ravel(), kind="stable")
-    star_start = np.concatenate(
-        [[0], np.cumsum(np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)))]
-    )
-    points, faces, barycentric = quads.vertices, quads.faces.copy(), quads.barycentric.copy()
+    surface = Stars.of(quads.surface.vertices, quads.surface.faces)
+    points, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
     for _ in range(rounds):
-        wanted = _squared(points, quads.quads)
+        wanted = _squared(points, quads.quads)[movable]
         new_faces, new_barycentric = faces[movable], barycentric[movable]
-        slide_near(
-            mesh.vertices, mesh.faces, star_start, order // 3, wanted[movable], new_faces, new_barycentric
-        )
+        slide_near(surface, wanted, new_faces, new_barycentric)
         new = points.copy()
-        new[movable] = np.einsum("qi,qix->qx", new_barycentric, mesh.vertices[mesh.faces[new_faces]])
+        new[movable] = surface.at(new_faces, new_barycentric)
         stays = _held_back(points, new, quads.quads)
         gone = movable & ~stays
         faces[gone], barycentric[gone] = new_faces[gone[movable]], new_barycentric[gone[movable]]
-        points = np.where(stays[:, None], points, new)
+        points[gone] = new[gone]
+    if rounds:
+        lift_worst(points, quads.quads, faces, barycentric, movable, surface)
     return replace(quads, vertices=points, faces=faces, barycentric=barycentric)
 
 
@@ -74,19 +73,6 @@ def _squared(points: FloatArray, quads: IntArray) -> FloatArray:
     count = np.maximum(np.bincount(quads.ravel(), minlength=len(points)), 1)
     sums = [np.bincount(quads.ravel(), asked[..., x].ravel(), len(points)) for x in range(3)]
     return np.stack(sums, axis=1) / count[:, None]
-
-
-def least_jacobians(points: FloatArray, quads: IntArray) -> FloatArray:
-    """Return (p,) the least scaled Jacobian of each quad: sines of its angles, seen along the normal."""
-    corners = points[quads]
-    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    normal /= np.maximum(np.sqrt(dots(normal, normal)), np.finfo(float).tiny)[:, None]
-    least = np.full(len(quads), np.inf)
-    for i in range(4):
-        a, b = corners[:, i - 1] - corners[:, i], corners[:, (i + 1) % 4] - corners[:, i]
-        scale = np.maximum(np.sqrt(dots(a, a) * dots(b, b)), np.finfo(float).tiny)
-        least = np.minimum(least, dots(np.cross(b, a), normal) / scale)
-    return least
 
 
 def _held_back(old: FloatArray, new: FloatArray, quads: IntArray) -> BoolArray:
