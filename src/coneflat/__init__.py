@@ -66,6 +66,9 @@ _HOMES = {
     "FlatTriangles": "geometry.straight",
     "flat_triangles": "geometry.straight",
     "integer_grid": "grid",
+    "quads": "grid.quads",
+    "QuadMesh": "grid",
+    "measure_quads": "grid",
     "IntegerGrid": "grid",
     "find_overlaps": "geometry.overlap",
     "Overlaps": "geometry.overlap",
@@ -101,6 +104,7 @@ __all__ = [
     "PAPER",
     "Packed",
     "PointConstraints",
+    "QuadMesh",
     "Relaxed",
     "SeamData",
     "SparseCones",
@@ -137,11 +141,13 @@ __all__ = [
     "least_squares_layout",
     "make_figure",
     "measure",
+    "measure_quads",
     "measure_uv",
     "mollify",
     "overlap_regions",
     "pack_charts",
     "pack_together",
+    "quads",
     "read_flattening",
     "read_mesh",
     "relax",
@@ -166,7 +172,8 @@ if TYPE_CHECKING:
     from .geometry.overlap import Overlaps, find_overlaps
     from .geometry.straight import FlatTriangles, flat_triangles
     from .geometry.visibility import visible_share
-    from .grid import IntegerGrid, integer_grid
+    from .grid import IntegerGrid, QuadMesh, integer_grid, measure_quads
+    from .grid.quads import quads
     from .input.mesh_file import MeshFile
     from .input.validation import CheckedMesh, check_mesh
     from .layout import least_squares_layout

@@ -10,7 +10,8 @@ import numpy as np
 
 from ._arrays import FloatArray, IntArray
 from .geometry.visibility import visible_share
-from .grid import integer_grid
+from .grid import measure_quads
+from .grid.quads import quads
 from .input.polygons import Polygons
 from .layout.convex import make_convex
 from .pipeline import flatten
@@ -35,7 +36,7 @@ def compile_kernels() -> None:
     for method in ("ricci", "circle-patterns"):
         flatten(*_tube(closed=True), method=method)
     flatten(*_tube(closed=True), quantise=np.pi / 2)
-    integer_grid(*_tube(closed=True), quads=300)
+    measure_quads(quads(*_tube(closed=True), quads=300))
     visible_share(*_tube(closed=True))
     flatten(*_tube(closed=False), boundary="disk", best_effort=True)
     _make_a_dart_convex()

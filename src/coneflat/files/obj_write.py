@@ -78,7 +78,7 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
             stream.write(_face_lines(to_write.sizes[first:stop], rows, newline))
 
 
-def lines_of(begin: str, rows: FloatArray, newline: bytes) -> Iterator[bytes]:
+def lines_of(begin: str, rows: FloatArray | IntArray, newline: bytes) -> Iterator[bytes]:
     """Yield a text with a line for each of (r, k) rows: the fewest digits from which the same numbers are read."""
     line = begin + " %r" * rows.shape[1] + newline.decode()
     for i in range(0, len(rows), _LINES):

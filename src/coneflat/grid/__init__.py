@@ -1,5 +1,17 @@
-"""Integer grids: layouts whose grid lines close up on the surface."""
+"""Integer grids: layouts whose grid lines close up on the surface, and the quads that they are."""
 
+from .extract import extract_quads
 from .integer_grid import IntegerGrid, integer_grid
+from .quad_mesh import QuadMesh
+from .quality import QuadMeasures, measure_quads
+from .smooth import smooth_quads
 
-__all__ = ["IntegerGrid", "integer_grid"]
+__all__ = [
+    "IntegerGrid",
+    "QuadMeasures",
+    "QuadMesh",
+    "extract_quads",
+    "integer_grid",
+    "measure_quads",
+    "smooth_quads",
+]

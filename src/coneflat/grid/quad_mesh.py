@@ -1,0 +1,120 @@
+"""A mesh of quads on a triangle mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..errors import GridError
+from ..mesh import TriangleMesh, sort_pairs
+from ..text import list_some, plural
+
+
+@dataclass(frozen=True, eq=False)
+class QuadMesh:
+    """A manifold mesh of quads whose vertices lie on a triangle mesh.
+
+    Attributes:
+        vertices: (q, 3) positions, on the surface.
+        quads: (p, 4) vertex indices, oriented as the surface is.
+        faces: (q,) the triangle of the surface that each vertex lies in.
+        barycentric: (q, 3) where in it.
+        left_out: squares of the grid that were left out, as the boundary of the surface cuts them.
+        area_left_out: of the grid on the surface that is under no quad, in squares: beside boundaries that are not
+            on grid lines; negative, should a quad lie over a hole.
+        surface: the triangle mesh.
+        notes: what was done, and what falls short, one sentence each.
+    """
+
+    vertices: FloatArray
+    quads: IntArray
+    faces: IntArray
+    barycentric: FloatArray
+    left_out: int
+    area_left_out: float
+    surface: TriangleMesh
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def _edges(self) -> tuple[IntArray, IntArray]:
+        """Edges as vertex pairs (e, 2), the smaller index first, and the number of quads beside each (e,)."""
+        tails, heads = self.quads.ravel(), np.roll(self.quads, -1, axis=1).ravel()
+        order, first = sort_pairs(tails, heads, len(self.vertices))
+        pairs = np.sort(np.stack([tails, heads], axis=1)[order[first]], axis=1)
+        return pairs, np.diff(np.flatnonzero(np.append(first, True)))
+
+    @property
+    def edges(self) -> IntArray:
+        """(e, 2) vertex pairs, the smaller index first."""
+        return self._edges[0]
+
+    @property
+    def is_boundary_edge(self) -> BoolArray:
+        """(e,) True for edges with one quad."""
+        return self._edges[1] == 1
+
+    @cached_property
+    def is_boundary_vertex(self) -> BoolArray:
+        """(q,) True for vertices on the boundary."""
+        mask = np.zeros(len(self.vertices), dtype=bool)
+        mask[self.edges[self.is_boundary_edge]] = True
+        return mask
+
+    @cached_property
+    def valences(self) -> IntArray:
+        """(q,) the number of edges at each vertex."""
+        return np.bincount(self.edges.ravel(), minlength=len(self.vertices))
+
+    @property
+    def irregular(self) -> IntArray:
+        """(s,) the inner vertices whose valence is not 4."""
+        return np.flatnonzero((self.valences != 4) & ~self.is_boundary_vertex)
+
+    @property
+    def euler_characteristic(self) -> int:
+        """Vertices minus edges plus quads."""
+        return len(self.vertices) - len(self.edges) + len(self.quads)
+
+    @property
+    def surface_euler(self) -> int:
+        """That of the surface, which is the same unless squares were left out; vertices without a face do not count."""
+        unused = len(self.surface.vertices) - len(np.unique(self.surface.faces))
+        return self.surface.euler_characteristic - unused
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the mesh as .obj or .ply, in full or not at all, and return the path; see `write_quads`.
+
+        Raises:
+            UnknownFormatError: the ending is another.
+            MeshFileError: the file cannot be written.
+        """
+        from ..files.quads import write_quads
+
+        return write_quads(path, self.vertices, self.quads)
+
+
+def require_manifold(quads: IntArray, vertex_count: int, edge_count: int) -> None:
+    """Raise GridError unless all quads have four vertices, and all edges a pair of vertices of their own.
+
+    Args:
+        quads: (p, 4) vertex indices.
+        vertex_count, edge_count: how many there are on the surface.
+    """
+    again = np.flatnonzero((np.diff(np.sort(quads, axis=1), axis=1) == 0).any(axis=1))
+    if len(again):
+        raise GridError(
+            f"{plural(len(again), 'quad')} of {len(quads):,} with a vertex twice ({list_some(again)}): the grid is too "
+            "coarse; ask for more quads"
+        )
+    _, first = sort_pairs(quads.ravel(), np.roll(quads, -1, axis=1).ravel(), vertex_count)
+    missing = edge_count - int(first.sum())
+    if missing:
+        raise GridError(
+            f"{plural(missing, 'edge')} of {edge_count:,} between vertices that have one already: the grid is too "
+            "coarse; ask for more quads"
+        )

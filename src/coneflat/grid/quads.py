@@ -1,0 +1,73 @@
+"""Quad meshes of surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from ..errors import OptionError
+from ..text import plural
+from .extract import extract_quads
+from .integer_grid import IntegerGrid, integer_grid
+from .jacobians import least_jacobians
+from .quad_mesh import QuadMesh
+from .smooth import smooth_quads
+
+# Rounds of smoothing by default: more change little.
+ROUNDS = 10
+
+
+def quads(
+    mesh: Any,
+    faces: ArrayLike | None = None,
+    *,
+    quads: int | None = None,
+    size: float | None = None,
+    stretch: float = 0.0,
+    smooth: int = ROUNDS,
+    **options: Any,
+) -> QuadMesh:
+    """Return a quad mesh of a surface: all faces are quads, and irregular vertices are the cones of a flattening.
+
+    Args:
+        mesh, faces: as `coneflat.flatten` takes them; or an `IntegerGrid`, and none of the options but `smooth`.
+        quads: about how many; None: 10,000, unless a size is given.
+        size: of a quad's edges in model units, instead.
+        stretch: from angles, 0, to areas, 1: what quads are to be alike in; see `integer_grid`.
+        smooth: rounds of smoothing on the surface, see `smooth_quads`; 0 for none.
+        options: of `coneflat.flatten`; by default cones have three, five or six quads.
+
+    Raises:
+        GridError: no grid of this size was found that turns no triangle over, or it is too coarse for quads.
+        OptionError: an option makes no sense.
+        MeshError, CurvatureError, SeamError, MetricError: as `coneflat.flatten`.
+    """
+    if isinstance(mesh, IntegerGrid):
+        if faces is not None or quads is not None or size is not None or options:
+            raise OptionError("a grid has its faces, size and options: none can be given beside it")
+        grid = mesh
+    else:
+        grid = integer_grid(mesh, faces, quads=quads, size=size, stretch=stretch, **options)
+    found = smooth_quads(extract_quads(grid), smooth)
+    return replace(found, notes=(*grid.notes, *_notes(found)))
+
+
+def _notes(found: QuadMesh) -> Iterator[str]:
+    """Yield what falls short."""
+    if found.left_out:
+        share = 100 * found.area_left_out / (found.area_left_out + len(found.quads))
+        yield (
+            f"Left out {plural(found.left_out, 'square')} that the boundary cuts, and with them {share:.1f} % of the "
+            "surface as the grid has it."
+        )
+    if found.euler_characteristic != found.surface_euler:
+        yield (
+            f"The Euler characteristic of the quads is {found.euler_characteristic}, that of the "
+            f"surface {found.surface_euler}: what was left out has opened or parted it."
+        )
+    turned = int((least_jacobians(found.vertices, found.quads) <= 0).sum())
+    if turned:
+        yield f"{plural(turned, 'quad')} with an angle of 180 degrees or more: more quads would help."
