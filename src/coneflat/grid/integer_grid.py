@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 
 from .._arrays import ComplexArray, FloatArray, IntArray
 from ..errors import ConvergenceError, GridError, OptionError
-from ..geometry.planar import sides_between, signed_angles, signed_double_areas
+from ..geometry.planar import map_factors, sides_between, signed_angles, signed_double_areas
 from ..geometry.triangles import double_areas
 from ..layout.relax import Lines, PointConstraints, Relaxed, StretchEnergy, relax
-from ..layout.relax.elements import map_factors
 from ..layout.relax.relax import rest_sides
 from ..mesh import NEXT, PREVIOUS
 from ..pipeline import flatten

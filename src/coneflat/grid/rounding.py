@@ -178,7 +178,7 @@ def _near_pairs(
             continue
         sides = [_side(int(halfedge[a, b]), int(halfedge[b, a]), starts, ends) for a, b in pairwise(path)]
         rows.append(_vector(sides, transitions))
-    joined = np.array(rows, dtype=np.int64).reshape(-1, 2, basis.shape[0]) @ basis
+    joined = np.array(rows, dtype=np.int64).reshape(len(rows), 2, basis.shape[0]) @ basis
     return ConePairs(joined, joined @ start)
 
 

@@ -144,7 +144,7 @@ class _Builder:
             shifts,
             self.held,
             self.sides,
-            np.array(self.equations, dtype=np.int64).reshape(-1, self.size),
+            np.array(self.equations, dtype=np.int64).reshape(len(self.equations), self.size),
             values,
         )
 

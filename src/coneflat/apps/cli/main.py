@@ -18,6 +18,7 @@ from .demo import demo
 from .figure import figure
 from .flatten import flatten
 from .measure import measure
+from .quads import quads
 from .view import view
 
 USER_ERROR = 2
@@ -33,6 +34,7 @@ def cli() -> None:
 
 cli.add_command(flatten)
 cli.add_command(batch)
+cli.add_command(quads)
 cli.add_command(measure)
 cli.add_command(cones)
 cli.add_command(figure)
