@@ -170,6 +170,88 @@ def test_stretch_keeps_areas():
     assert spread[1] < 0.8 * spread[0]
 
 
+def annulus(around=40, across=12):
+    """A bumpy cylinder, wider above than below."""
+    points, faces = shapes.grid(around, across, wrap=(True, False))
+    s, t = 2 * np.pi * points[:, 0], points[:, 1]
+    r = 1 + 0.3 * t + 0.2 * t * np.sin(2 * s + 1)
+    return np.stack([r * np.cos(s), r * np.sin(s), 2 * t], axis=1), faces
+
+
+def check_sides(grid):
+    """Boundary edges lie on grid lines, corners on grid points; a whole number of squares is covered."""
+    mesh = TriangleMesh(grid.vertices, grid.faces)
+    border = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
+    starts = grid.corner_grid[:, [1, 2, 0]].reshape(-1, 2)[border]
+    ends = grid.corner_grid[:, [2, 0, 1]].reshape(-1, 2)[border]
+    assert ((starts == ends) & (starts == np.rint(starts))).any(axis=1).all()
+    at = grid.corner_grid[np.isin(grid.faces, grid.corners)]
+    assert (at == np.rint(at)).all()
+    on = np.flatnonzero(mesh.is_boundary_vertex)
+    quarters = np.full(len(mesh.vertices), 2)
+    quarters[grid.corners] = grid.corner_quarters
+    assert (grid.corner_quarters != 2).all()
+    assert angle_sums(grid)[on] == pytest.approx(np.pi / 2 * quarters[on], abs=1e-6)
+    assert (4 - grid.quarters).sum() + (2 - grid.corner_quarters).sum() == 4 * mesh.euler_characteristic
+    area = double_areas(grid).sum() / 2
+    assert area == pytest.approx(round(area), abs=1e-6)
+
+
+@pytest.mark.parametrize("quads", [20, 100, 1000])
+@pytest.mark.parametrize("shape", [shapes.hill(), annulus()], ids=["hill", "annulus"])
+def test_straight_sides_lie_on_grid_lines(shape, quads):
+    grid = integer_grid(*shape, quads=quads, boundary="straight")
+    check_laws(grid)
+    check_sides(grid)
+
+
+@pytest.mark.parametrize("quads", [500, 5000])
+def test_straight_sides_of_a_face(shared, quads):
+    grid = integer_grid(shared("face.obj"), quads=quads, boundary="straight")
+    check_laws(grid)
+    check_sides(grid)
+
+
+def test_a_flat_rectangle_keeps_its_shape():
+    """Three by two, asked for 24 squares: six by four, each of half a unit."""
+    vertices, faces = shapes.grid(9, 6)
+    grid = integer_grid(vertices * [3, 2, 0], faces, quads=24, boundary="straight")
+    check_laws(grid)
+    check_sides(grid)
+    assert len(grid.corners) == 4
+    assert grid.corner_quarters.tolist() == [1] * 4
+    assert sorted(np.ptp(grid.corner_grid.reshape(-1, 2), axis=0)) == [4, 6]
+    assert grid.qc_mean == pytest.approx(1)
+    assert grid.least_area == pytest.approx(1)
+
+
+def test_sides_of_loops_that_are_askew_are_said_to_be_on_no_line(shared):
+    """The holes of this plate are straight each, but seams between them turn by any angle."""
+    grid = integer_grid(shared("plane-holes.obj"), quads=3000, boundary="straight", refine=True)
+    check_laws(grid)
+    assert not len(grid.corners)
+    assert "of the boundary are on no grid line" in " ".join(grid.notes)
+
+
+def test_what_is_too_coarse_is_told_what_would_do():
+    """The torus' smooth layout is a hundred times smaller in one place than it should be, with cones there."""
+    shape = pair(shapes.sphere(2), shapes.torus(24, 12))
+    with pytest.raises(
+        errors.GridError, match=r"no grid of about 1,000 quads was found: .*would do"
+    ) as caught:
+        integer_grid(*shape, quads=1000)
+    advised = int(str(caught.value).rsplit("; ", 1)[1].split()[0].replace(",", ""))
+    check_laws(integer_grid(*shape, quads=advised))
+
+
+def test_numbering_changes_nothing():
+    vertices, faces = shapes.sphere(3)
+    shuffled, turned, new = shapes.renumber(vertices, faces)
+    one, two = (integer_grid(*shape, quads=300) for shape in ((vertices, faces), (shuffled, turned)))
+    assert sorted(new[one.cones]) == sorted(two.cones)
+    assert np.sort(double_areas(one)) == pytest.approx(np.sort(double_areas(two)), rel=1e-6)
+
+
 def test_grids_are_the_same_every_time():
     one, two = (integer_grid(*shapes.sphere(3), quads=123) for _ in range(2))
     assert (one.corner_grid == two.corner_grid).all()

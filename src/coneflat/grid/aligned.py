@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..geometry.triangles import double_areas, edge_lengths
 from ..layout.relax.seam_chains import find_chains
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from ..result.flattening import Flattening
+from .sides import Sides, find_sides, side_angles
 from .transitions import charts_of, first_points, joining_chains
 
 
@@ -26,6 +27,7 @@ class Layout:
         corners: (m, 3) the point at each triangle corner.
         points: (u,) of the plane.
         cones: (s,) vertices, inside the surface.
+        sides: straight ones of the boundary, along the axes.
         size: of a square of the grid, in model units.
     """
 
@@ -34,7 +36,13 @@ class Layout:
     corners: IntArray
     points: ComplexArray
     cones: IntArray
+    sides: Sides
     size: float
+
+    @property
+    def whole(self) -> IntArray:
+        """Vertices that are to lie on grid points: cones, and corners of straight sides."""
+        return np.concatenate([self.cones, self.sides.corners])
 
 
 def aligned(result: Flattening, quads: float | None, size: float | None) -> Layout:
@@ -64,7 +72,7 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Layo
     points = scale * (result.uv[:, 0] + 1j * result.uv[:, 1])
     cones = np.asarray(result.cones, dtype=np.int64)
     cones = cones[~mesh.is_boundary_vertex[cones]]
-    layout = Layout(mesh, lengths, result.uv_faces, points, cones, size)
+    layout = Layout(mesh, lengths, result.uv_faces, points, cones, Sides(), size)
     return _turned(layout)
 
 
@@ -92,13 +100,21 @@ def _turned(layout: Layout) -> Layout:
             done[chart[moving[0]]] = True
         left_over = later
     of_point = component[chart]
-    points *= np.exp(-1j * _crease_angles(layout, points, of_point))[of_point]
-    vertex = np.zeros(len(points), dtype=np.int64)
-    vertex[corners.ravel()] = mesh.faces.ravel()
-    at = first_points(vertex)[layout.cones]
-    origin = np.zeros(int(component.max(initial=-1)) + 1, dtype=np.complex128)
-    origin[of_point[at][::-1]] = points[at[::-1]]  # the first cone's stays
-    return Layout(mesh, layout.lengths, corners, points - origin[of_point], layout.cones, layout.size)
+    is_straight, angles = side_angles(mesh, corners, points, of_point)
+    angles = np.where(is_straight, angles, _crease_angles(layout, points, of_point))
+    points *= np.exp(-1j * angles)[of_point]
+    turned = replace(layout, points=points, sides=find_sides(mesh, corners, points, is_straight[of_point]))
+    return replace(turned, points=points - _origins(turned, of_point)[of_point])
+
+
+def _origins(layout: Layout, component: IntArray) -> ComplexArray:
+    """Return (c,) the place of the first cone or corner of each component, or else of the first point on a side."""
+    vertex = np.zeros(len(layout.points), dtype=np.int64)
+    vertex[layout.corners.ravel()] = layout.mesh.faces.ravel()
+    at = np.concatenate([first_points(vertex)[layout.whole], layout.sides.points])[::-1]
+    origins = np.zeros(int(component.max(initial=-1)) + 1, dtype=np.complex128)
+    origins[component[at]] = layout.points[at]  # the first one stays, as the last to be written
+    return origins
 
 
 def _crease_angles(layout: Layout, points: ComplexArray, of_point: IntArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from .._arrays import ComplexArray, FloatArray, IntArray
 from ..errors import ConvergenceError, GridError, OptionError
 from ..geometry.planar import sides_between, signed_angles, signed_double_areas
 from ..geometry.triangles import double_areas
-from ..layout.relax import PointConstraints, Relaxed, StretchEnergy, relax
+from ..layout.relax import Lines, PointConstraints, Relaxed, StretchEnergy, relax
 from ..layout.relax.elements import map_factors
 from ..layout.relax.relax import rest_sides
 from ..mesh import NEXT, PREVIOUS
@@ -22,6 +22,7 @@ from ..text import plural
 from ..threads import one_blas_thread
 from .aligned import Layout, aligned
 from .rounding import find_rounding
+from .sides import Sides
 from .transitions import UNITS, Transitions, find_transitions
 
 # What the grid wants of a flattening: three, five or six quads at a cone, and rotations that are quarter turns.
@@ -32,6 +33,9 @@ OPTIONS = {
     "min_cone_angle": 1.5 * np.pi,
     "max_cone_angle": 3 * np.pi,
 }
+# With straight sides, what is said of cones holds for both copies of the surface, glued to each other at the boundary:
+# a corner of pi/2 is a cone of pi there.
+STRAIGHT = {"min_cone_angle": np.pi / 2}
 # Lattice points that are tried, one after the other.
 TRIES = 6
 # Newton steps at most, and how many times that of an isometry the energy may become: cones fall together then.
@@ -64,6 +68,8 @@ class IntegerGrid:
         qc_before, qc_mean: quasi-conformal distortion, the mean by area, likewise.
         least_area: of any triangle, over what it should have.
         notes: what was done, one sentence each.
+        corners: (k,) vertices on grid points where straight sides of the boundary meet; sides lie on grid lines.
+        corner_quarters: (k,) the quarter turns of their angle: 1, 3 or more.
     """
 
     vertices: FloatArray
@@ -82,6 +88,8 @@ class IntegerGrid:
     qc_mean: float
     least_area: float
     notes: tuple[str, ...] = ()
+    corners: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    corner_quarters: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
 def integer_grid(
@@ -122,10 +130,26 @@ def integer_grid(
             raise OptionError("a flattening has its faces and options: none can be given beside it")
         result = mesh
     else:
-        result = flatten(mesh, faces, **{**OPTIONS, **options})
+        defaults = OPTIONS if options.get("boundary") != "straight" else {**OPTIONS, **STRAIGHT}
+        result = flatten(mesh, faces, **{**defaults, **options})
     layout = aligned(result, None if size is not None else wanted, size)
     with one_blas_thread():
-        return _whole(layout, StretchEnergy(stretch))
+        found = _whole(layout, StretchEnergy(stretch))
+    loose = _loose_border(layout) if result.settings.get("boundary") == "straight" else 0
+    if not loose:
+        return found
+    note = (
+        f"{plural(loose, 'edge')} of the boundary {'is' if loose == 1 else 'are'} on no grid line: straight sides of "
+        "different loops do not point in the same directions, up to quarter turns."
+    )
+    return replace(found, notes=(*found.notes, note))
+
+
+def _loose_border(layout: Layout) -> int:
+    """Return how many edges of the boundary are not parts of sides on grid lines."""
+    border = layout.mesh.edge_halfedges[layout.mesh.is_boundary_edge, 0]
+    starts = layout.corners[:, NEXT].ravel()[border]
+    return int(np.count_nonzero(~np.isin(starts, layout.sides.points)))
 
 
 def _whole(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
@@ -145,9 +169,9 @@ def _whole(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
 def _attempt(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None, str]:
     """Return a grid, if one of the nearest lattice points has one, or else why the last has none."""
     mesh, corners = layout.mesh, layout.corners
-    transitions = find_transitions(mesh, corners, layout.points, layout.cones)
+    transitions = find_transitions(mesh, corners, layout.points, layout.whole, layout.sides)
     try:
-        rounding = find_rounding(mesh, corners, layout.points, layout.cones, transitions)
+        rounding = find_rounding(mesh, corners, layout.points, layout.whole, transitions)
         candidates = rounding.candidates()
     except GridError as error:
         return None, str(error)
@@ -176,11 +200,14 @@ def _relaxed(
     """
     chains, count = transitions.chains, 2 * len(transitions.quarters)
     places = transitions.places(smooth, values.astype(np.float64))
-    cones = np.flatnonzero(transitions.is_cone)
+    pinned = np.flatnonzero(transitions.held.all(axis=1))
     _, one_of = np.unique(chains.chain, return_index=True)
-    tied = chains.halfedges[one_of, 1]
     constraints = PointConstraints(
-        pinned=cones, places=_pairs(places[cones]), tied=tied, translations=values[:count].reshape(-1, 2)
+        pinned=pinned,
+        places=_pairs(places[pinned]),
+        lines=_lines(layout.sides, pinned, values),
+        tied=chains.halfedges[one_of, 1],
+        translations=values[:count].reshape(-1, 2),
     )
     highest = HOPELESS * float(energy.values(np.ones(1), np.ones(1))[0]) * _model_area(layout)
     return relax(
@@ -193,6 +220,18 @@ def _relaxed(
         steps=STEPS,
         progress=lambda _, total: total > highest,
     )
+
+
+def _lines(sides: Sides, pinned: IntArray, values: IntArray) -> Lines | None:
+    """Return the grid lines that sides of the boundary come to lie on."""
+    if not len(sides.axis):
+        return None
+    loose = ~np.isin(sides.points, pinned)
+    is_upright = sides.axis == 0
+    # To the left of upwards is where x falls.
+    offsets = np.where(is_upright, -1.0, 1.0) * values[len(values) - len(sides.axis) :]
+    directions = np.stack([~is_upright, is_upright], axis=1).astype(np.float64)
+    return Lines(sides.points[loose], sides.side[loose], directions, offsets)
 
 
 def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> ComplexArray:
@@ -219,6 +258,7 @@ def _described(
     turns, shifts = _across(layout, points)
     angles = signed_angles(sides_between(_pairs(points)[corners]))
     sums = np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
+    quarters = np.rint(sums / (np.pi / 2)).astype(np.int64)
     move_rms, move_max = _moves(layout, smooth, points)
     notes = []
     if tries:
@@ -236,7 +276,9 @@ def _described(
         turns=turns,
         shifts=shifts,
         cones=layout.cones,
-        quarters=np.rint(sums[layout.cones] / (np.pi / 2)).astype(np.int64),
+        quarters=quarters[layout.cones],
+        corners=layout.sides.corners,
+        corner_quarters=quarters[layout.sides.corners],
         size=layout.size,
         move_rms=move_rms,
         move_max=move_max,
@@ -265,7 +307,7 @@ def _across(layout: Layout, points: ComplexArray) -> tuple[IntArray, IntArray]:
 
 def _moves(layout: Layout, smooth: ComplexArray, points: ComplexArray) -> tuple[float, float]:
     """Return the root mean square and the largest move of cones, in units, beside one that all points share."""
-    at = np.isin(layout.mesh.faces, layout.cones)
+    at = np.isin(layout.mesh.faces, layout.whole)
     if not at.any():
         return 0.0, 0.0
     move = (points - smooth)[np.unique(layout.corners[at])]

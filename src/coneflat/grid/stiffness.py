@@ -47,7 +47,8 @@ class Stiffness:
         """Return (d, d) the energies of changes that columns of a basis (v, d) span, as scalar products."""
         count = basis.shape[1]
         gram = np.zeros((count, count))
-        pulls = self._energy @ (self._shifts @ basis)
+        # Few points are on seams: as a sparse matrix this stays small.
+        pulls = self._energy @ (self._shifts @ csr_matrix(basis))
         for start in range(0, count, BLOCK):
             block = slice(start, min(start + BLOCK, count))
             gram[:, block] = pulls.T @ self.displacement(basis[:, block].astype(np.float64))
@@ -66,12 +67,12 @@ def _laplacian(corners: IntArray, points: ComplexArray) -> csr_matrix:
 
 
 def _turned_copies(transitions: Transitions) -> csr_matrix:
-    """Return (2u, 2b) how the shifts of points follow those of the ones that they are given by; cones by none."""
-    points = np.flatnonzero(~transitions.is_cone)
-    bases, column = np.unique(transitions.base[points], return_inverse=True)
-    turns = TURNS[transitions.turn[points]]
-    axes = np.arange(2)
-    rows = np.broadcast_to(2 * points[:, None, None] + axes[:, None], turns.shape)
-    columns = np.broadcast_to(2 * column.ravel()[:, None, None] + axes, turns.shape)
-    shape = (2 * len(transitions.base), 2 * len(bases))
-    return coo_matrix((turns.ravel(), (rows.ravel(), columns.ravel())), shape=shape).tocsr()
+    """Return (2u, b) how the shifts of points follow those of the ones that they are given by, if loose."""
+    count = len(transitions.base)
+    turns, axes = TURNS[transitions.turn], np.arange(2)
+    rows = np.broadcast_to(2 * np.arange(count)[:, None, None] + axes[:, None], turns.shape)
+    columns = np.broadcast_to(2 * transitions.base[:, None, None] + axes, turns.shape)
+    every = coo_matrix((turns.ravel(), (rows.ravel(), columns.ravel())), shape=(2 * count, 2 * count)).tocsc()
+    every.eliminate_zeros()
+    is_base = transitions.base == np.arange(count)
+    return every[:, np.flatnonzero((is_base[:, None] & ~transitions.held).ravel())].tocsr()

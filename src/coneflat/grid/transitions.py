@@ -18,6 +18,7 @@ from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..errors import GridError
 from ..layout.relax.seam_chains import SeamChains, find_chains
 from ..mesh import TriangleMesh, label_components, label_faces
+from .sides import Sides
 
 # Radians by which seams may turn beside quarter turns; those of quantised cones do so by 1e-11 at most.
 QUARTER = 1e-6
@@ -30,7 +31,8 @@ TURNS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 
 class Transitions:
     """The motions of a layout's seams, and what may vary of them.
 
-    The variables are x and y of the translation of each chain and of the place of one copy of each cone.
+    The variables are x and y of the translation of each chain, x and y of the place of one copy of each cone, and the
+    one coordinate that points of a side of the boundary have in common.
 
     Attributes:
         chains: the seams.
@@ -39,7 +41,8 @@ class Transitions:
             one, or of a cone.
         turn: (u,) from 0 to 3.
         shifts: (2u, v) x and y of the shift of each point, by the variables.
-        is_cone: (u,) copies of cones, whose places are their shifts alone.
+        held: (u, 2) coordinates that are their shifts alone: both of cones, one on sides of the boundary.
+        sides: of the boundary.
         equations: (r, v) that make 0 of the variables.
         values: (v,) the variables of the layout as it is, up to rounding.
     """
@@ -49,20 +52,21 @@ class Transitions:
     base: IntArray
     turn: IntArray
     shifts: csr_matrix
-    is_cone: BoolArray
+    held: BoolArray
+    sides: Sides
     equations: IntArray
     values: FloatArray
 
     def places(self, points: ComplexArray, values: FloatArray) -> ComplexArray:
         """Return (u,) points with seams and cones as variables say; copies follow the ones that they are given by."""
         shift = self.shifts @ values
-        own = np.where(self.is_cone, 0, UNITS[self.turn] * points[self.base])
-        moved: ComplexArray = own + (shift[0::2] + 1j * shift[1::2])
+        loose = np.where(self.held[:, 0], 0, points.real) + 1j * np.where(self.held[:, 1], 0, points.imag)
+        moved: ComplexArray = UNITS[self.turn] * loose[self.base] + (shift[0::2] + 1j * shift[1::2])
         return moved
 
 
 def find_transitions(
-    mesh: TriangleMesh, corners: IntArray, points: ComplexArray, cones: IntArray
+    mesh: TriangleMesh, corners: IntArray, points: ComplexArray, cones: IntArray, sides: Sides
 ) -> Transitions:
     """Return the transitions of a layout.
 
@@ -70,7 +74,8 @@ def find_transitions(
         mesh: the mesh.
         corners: (m, 3) the point at each triangle corner.
         points: (u,) of the plane.
-        cones: vertices whose places are variables.
+        cones: vertices whose places are variables, corners of sides among them.
+        sides: of the boundary, along the axes.
 
     Raises:
         SeamError: the sides of a seam are no rigid copies of each other.
@@ -85,7 +90,7 @@ def find_transitions(
             f"seams turn by up to {off:.2g} rad beside quarter turns: flatten with quantise=pi/2 and correct_handles, "
             "and a mesh with several boundaries with boundary='straight'"
         )
-    builder = _Builder(mesh, corners, points, cones, chains, quarters % 4)
+    builder = _Builder(mesh, corners, points, cones, chains, quarters % 4, sides)
     return builder.transitions()
 
 
@@ -98,14 +103,19 @@ class _Builder:
         cones: IntArray,
         chains: SeamChains,
         quarters: IntArray,
+        sides: Sides,
     ) -> None:
+        self.sides = sides
         self.chains, self.quarters, self.points, self.cones = chains, quarters, points, cones
         self.vertex = np.zeros(len(points), dtype=np.int64)
         self.vertex[corners.ravel()] = mesh.faces.ravel()
         self.base = np.arange(len(points))
         self.turn = np.zeros(len(points), dtype=np.int64)
         self.chain_count = len(quarters)
-        self.size = 2 * (self.chain_count + len(cones))
+        self.first_side = 2 * (self.chain_count + len(cones))
+        self.size = self.first_side + len(sides.axis)
+        self.held = np.zeros((len(points), 2), dtype=bool)
+        self.sides_at: dict[int, list[int]] = defaultdict(list)
         self.entries: list[tuple[IntArray, IntArray, IntArray]] = []
         self.equations: list[IntArray] = []
         self.corners = corners
@@ -113,7 +123,9 @@ class _Builder:
     def transitions(self) -> Transitions:
         """Return the transitions."""
         chains, points = self.chains, self.points
+        self.held[np.isin(self.vertex, self.cones)] = True
         self._add_regular()
+        self._add_sides()
         self._add_nodes()
         self._fix_charts()
         row, column, value = (np.concatenate(parts) for parts in zip(*self.entries, strict=True))
@@ -122,18 +134,28 @@ class _Builder:
         off = points[chains.right] - UNITS[self.quarters[chains.chain], None] * points[chains.left]
         np.add.at(translation, chains.chain, off.mean(axis=1))
         translation /= np.maximum(np.bincount(chains.chain, minlength=self.chain_count), 1)
-        of_cones = points[self.cone_points]
-        both = np.concatenate([translation, of_cones])
+        both = np.concatenate([translation, points[self.cone_points]])
+        values = np.concatenate([np.stack([both.real, both.imag], axis=1).ravel(), self._side_values()])
         return Transitions(
             chains,
             self.quarters,
             self.base,
             self.turn,
             shifts,
-            np.isin(self.vertex, self.cones),
+            self.held,
+            self.sides,
             np.array(self.equations, dtype=np.int64).reshape(-1, self.size),
-            np.stack([both.real, both.imag], axis=1).ravel(),
+            values,
         )
+
+    def _side_values(self) -> FloatArray:
+        """Return (l,) the mean of the coordinate that points of each side have in common."""
+        at, side, count = self.points[self.sides.points], self.sides.side, len(self.sides.axis)
+        common = np.where(self.sides.axis[side] == 0, at.real, at.imag)
+        mean: FloatArray = np.bincount(side, common, count) / np.maximum(
+            np.bincount(side, minlength=count), 1
+        )
+        return mean
 
     def _add_regular(self) -> None:
         """Give the right points within chains by the left ones."""
@@ -146,6 +168,19 @@ class _Builder:
         for axis in range(2):
             self.entries.append((2 * right + axis, 2 * chain + axis, np.ones(len(right), dtype=np.int64)))
 
+    def _add_sides(self) -> None:
+        """Give a coordinate of points on sides where no seam ends, by that of the side; remember the others."""
+        on_seam = np.zeros(len(self.points), dtype=bool)
+        on_seam[self.chains.left] = on_seam[self.chains.right] = True
+        points, side = self.sides.points, self.sides.side
+        special = on_seam[points] | self.held[points, 0]
+        for point, one in zip(points[special].tolist(), side[special].tolist(), strict=True):
+            self.sides_at[point].append(one)
+        points, side = points[~special], side[~special]
+        axis = self.sides.axis[side]
+        self.held[points, axis] = True
+        self.entries.append((2 * points + axis, self.first_side + side, np.ones(len(points), dtype=np.int64)))
+
     def _add_nodes(self) -> None:
         """Give the copies of each node by one of them, and close the circle around it."""
         chains = self.chains
@@ -156,14 +191,23 @@ class _Builder:
         of_cone = {int(v): i for i, v in enumerate(self.cones)}
         first = first_points(self.vertex)
         self.cone_points = first[self.cones]
+        start = first.copy()
+        on_side = np.array(sorted(self.sides_at, reverse=True), dtype=np.int64)
+        start[self.vertex[on_side]] = on_side
+        start[self.cones] = self.cone_points
         for v in sorted(set(relations) | set(of_cone)):
-            self._add_node(v, int(first[v]), sorted(relations.get(v, ())), of_cone.get(v))
+            self._add_node(v, int(start[v]), sorted(relations.get(v, ())), of_cone.get(v))
 
     def _add_node(self, v: int, start: int, relations: list[tuple[int, int, int]], cone: int | None) -> None:
         shift = np.zeros((2, self.size), dtype=np.int64)
         if cone is not None:
             at = 2 * (self.chain_count + cone)
             shift[:, at : at + 2] = np.eye(2)
+        elif start in self.sides_at:
+            side = self.sides_at[start][0]
+            axis = int(self.sides.axis[side])
+            shift[axis, self.first_side + side] = 1
+            self.held[start, axis] = True
         known = {start: (0, shift)}
         left_over = list(relations)
         while left_over:
@@ -189,22 +233,36 @@ class _Builder:
         for point, (turn, shift) in known.items():
             if cone is None:
                 self.base[point], self.turn[point] = start, turn
-            axis, column = np.nonzero(shift)
-            self.entries.append((2 * point + axis, column, shift[axis, column]))
+            self._close_sides(point, shift)
+            row, column = np.nonzero(shift)
+            self.entries.append((2 * point + row, column, shift[row, column]))
 
     def _close(self, v: int, one: tuple[int, IntArray], two: tuple[int, IntArray], is_cone: bool) -> None:
         if not is_cone and one[0] != two[0]:
             raise GridError(f"vertex {v} has an angle of {4 + one[0] - two[0]} quarter turns, but is no cone")
         self.equations.extend(row for row in two[1] - one[1] if row.any())
 
+    def _close_sides(self, point: int, shift: IntArray) -> None:
+        """Have a point where a seam or a side ends lie on its sides."""
+        for side in self.sides_at.get(point, ()):
+            row = shift[self.sides.axis[side]].copy()
+            row[self.first_side + side] -= 1
+            if row.any():
+                self.equations.append(row)
+
     def _fix_charts(self) -> None:
-        """Let charts not move by themselves: some seams between them stay, and one cone of each component."""
+        """Let charts not move by themselves: some seams between them stay, and a cone or side of each component."""
         chart, component = charts_of(self.corners, len(self.points), self.chains)
         for chain in joining_chains(self.chains, chart).tolist():
             self._fix(chain)
-        _, firsts = np.unique(component[chart[self.cone_points]], return_index=True)
+        coned, firsts = np.unique(component[chart[self.cone_points]], return_index=True)
         for cone in firsts.tolist():
             self._fix(self.chain_count + cone)
+        straight, firsts = np.unique(component[chart[self.sides.points]], return_index=True)
+        for side in self.sides.side[firsts[~np.isin(straight, coned)]].tolist():
+            row = np.zeros(self.size, dtype=np.int64)
+            row[self.first_side + side] = 1
+            self.equations.append(row)
 
     def _fix(self, variable: int) -> None:
         for axis in range(2):
