@@ -216,3 +216,19 @@ def _clipped(polygon, height):
             share = height[k] / (height[k] - height[following])
             kept.append(polygon[k] + share * (polygon[following] - polygon[k]))
     return np.array(kept)
+
+
+def broken(grid, **changes):
+    return SimpleNamespace(**{**vars(grid), **changes})
+
+
+def bumpy(seed=0, cells=5):
+    grid = on_squares(*polycube(TWO_RINGS), cells, inside=12, seed=seed)
+    p = grid.vertices
+    return broken(grid, vertices=p + 0.06 * np.sin(3 * p[:, [1, 2, 0]]) + 0.03 * np.sin(9 * p[:, [2, 0, 1]]))
+
+
+def quad_areas(mesh):
+    corners = mesh.vertices[mesh.quads]
+    cross = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    return np.linalg.norm(cross, axis=1) / 2
