@@ -142,7 +142,8 @@ class _Surface:
         along, across = self._factors
         corners = laid_out.points[laid_out.corners]
         places = (corners - corners[:, :1]) @ np.array([1.0, 1j])
-        one, two = np.abs((along * places).sum(axis=1)), np.abs((across * places).sum(axis=1))
+        with np.errstate(invalid="ignore"):
+            one, two = np.abs((along * places).sum(axis=1)), np.abs((across * places).sum(axis=1))
         return np.divide(one + two, one - two, out=np.full(len(one), np.inf), where=one > two)
 
     def mean(self, ratios: FloatArray) -> float:

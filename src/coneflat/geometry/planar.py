@@ -38,12 +38,13 @@ def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     """Return (m, 3) the derivatives, by the places of the corners, of a and b in the map z -> a z + b conj(z).
 
     The map takes triangles from the shapes that they should have, of which `rest` (m, 3) has the sides, to the plane.
-    Its singular values are |a| + |b| and |a| - |b|.
+    Its singular values are |a| + |b| and |a| - |b|. Of triangles without area there is none: not numbers.
     """
     r0, r1 = rest[:, 0], rest[:, 1]
     area = r0 * np.conj(r1) - np.conj(r0) * r1
     found = []
-    for c0, c1 in ((np.conj(r1) / area, -np.conj(r0) / area), (-r1 / area, r0 / area)):
-        # Side 0 runs from corner 1 to corner 2, side 1 from corner 2 to corner 0.
-        found.append(np.stack([c1, -c0, c0 - c1], axis=1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for c0, c1 in ((np.conj(r1) / area, -np.conj(r0) / area), (-r1 / area, r0 / area)):
+            # Side 0 runs from corner 1 to corner 2, side 1 from corner 2 to corner 0.
+            found.append(np.stack([c1, -c0, c0 - c1], axis=1))
     return found[0], found[1]

@@ -111,13 +111,15 @@ def relax(
     areas = double_areas(own) / 2
     share = areas * _weights(weights, len(mesh.faces))
     doubled = signed_double_areas(places[corner])
-    is_free[mesh.faces[(doubled <= 0) | (areas <= 0)]] = False
+    rest = rest_sides(own)
+    is_thin = (np.conj(rest[:, 0]) * rest[:, 1]).imag <= 0  # but for rounding
+    is_free[mesh.faces[(doubled <= 0) | (areas <= 0) | is_thin]] = False
     if not is_free.any():
         return Relaxed(places, 0.0, 0.0, 0, is_free)
     unit = float(np.sqrt(np.abs(doubled).sum() / (2 * areas.sum())))
     z = places[:, 0] + 1j * places[:, 1]
     motions = find_motions(mesh, corner, z, is_free, checked)
-    elements = Elements(motions, corner, unit * rest_sides(own), share)
+    elements = Elements(motions, corner, unit * rest, share)
     if not elements.count and not motions.has_offset:
         return Relaxed(places, 0.0, 0.0, 0, is_free)
     found = descend(z, motions, elements, energy, tolerance, steps, progress)

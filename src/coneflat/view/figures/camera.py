@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..._arrays import FloatArray
 from ...errors import OptionError
+from ...text import shown
 
 SIDES = ("front", "back", "left", "right", "top", "bottom")
 """Words for directions; left and right are those of who stands in front of the model."""
@@ -121,8 +122,8 @@ def eye_direction(eye: Eye, up: str = "y") -> FloatArray:
 
 
 def _upward(up: str) -> FloatArray:
-    if up not in ("x", "y", "z"):
-        raise OptionError(f'the upward axis must be "x", "y" or "z", not {up!r}')
+    if not isinstance(up, str) or up not in ("x", "y", "z"):  # arrays cannot be compared with words
+        raise OptionError(f'the upward axis must be "x", "y" or "z", not {shown(up)}')
     axis: FloatArray = np.eye(3)["xyz".index(up)]
     return axis
 
