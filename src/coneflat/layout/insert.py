@@ -11,7 +11,7 @@ from ..compiled import compiled
 from ..geometry.delaunay import relink
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..geometry.straight import find_turns, place_triangles
-from .overlay import corner_counts, count_crossings, flipped_crossings, next_around
+from .overlay import corner_counts, count_crossings, first_beside, flipped_crossings, next_around
 
 # Height over longest side that triangles must have after a flip: far above rounding, and above what counts as
 # degenerate.
@@ -153,13 +153,7 @@ def flip(
     turns[h], turns[t] = turn, turn.conjugate()
     counts[h] = counts[t] = count
     for one, before in ((t, h1), (h, t1)):
-        _, steps = corner_counts(counts, before - before % 3, (before + 1) % 3)
-        if counts[before] < 0:
-            steps += 1
-        start = first[before]
-        for _ in range(steps):
-            start = next_around(given_twin, start)
-        first[one] = start
+        first[one] = first_beside(given_twin, counts, first, before)
 
 
 @compiled

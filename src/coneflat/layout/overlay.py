@@ -168,6 +168,18 @@ def next_around(twin: IntArray, h: int) -> int:
 
 
 @compiled
+def first_beside(given_twin: IntArray, counts: IntArray, first: IntArray, before: int) -> int:
+    """Return the first half-edge of the input beside a diagonal that was flipped in, from the half-edge before it."""
+    _, steps = corner_counts(counts, before - before % 3, (before + 1) % 3)
+    if counts[before] < 0:
+        steps += 1
+    start = first[before]
+    for _ in range(steps):
+        start = next_around(given_twin, start)
+    return start
+
+
+@compiled
 def replay_flips(
     given_twin: IntArray,
     twin: IntArray,
@@ -209,13 +221,7 @@ def replay_flips(
         counts[h] = counts[t] = count
         # Now t runs from p to q with p -> u (slot h1) before it, h from q to p with q -> v (slot t1) before it.
         for new, before in ((t, h1), (h, t1)):
-            _, steps = corner_counts(counts, before - before % 3, (before + 1) % 3)
-            if counts[before] < 0:
-                steps += 1
-            start = first[before]
-            for _ in range(steps):
-                start = next_around(given_twin, start)
-            first[new] = start
+            first[new] = first_beside(given_twin, counts, first, before)
     return True
 
 
