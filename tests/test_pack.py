@@ -401,13 +401,3 @@ def test_bad_options(options, said):
     corners, chart = a_few()
     with pytest.raises(OptionError, match=said):
         pack_charts(corners, chart, **options)
-
-
-def test_bad_up():
-    corners, chart = a_few()
-    with pytest.raises(OptionError, match="not all 0"):
-        orient_charts(corners, chart, corners=np.zeros((*corners.shape[:2], 3)), up=(0, 0, 0))
-    with pytest.raises(OptionError, match="needs the corners"):
-        orient_charts(corners, chart, up=(0, 0, 1))
-    with pytest.raises(OptionError, match="shape"):
-        orient_charts(corners, chart, corners=np.zeros((2, 3, 3)), up=(0, 0, 1))

@@ -182,7 +182,7 @@ def _check_angles(trial: Trial) -> None:
     error = np.maximum(error - _angle_rounding(trial), 0.0)
     at = topology.is_used & ~topology.is_border
     if trial.is_marked:  # the sides of a marked seam are a boundary
-        at[topology.edges[topology.inner[_is_seam(trial)]]] = False
+        at[topology.edges[topology.inner[trial.topology.is_seam(trial.result.uv_faces)]]] = False
         at[result.cones] = True
     off = np.flatnonzero(at & (error > ANGLE))
     if len(off):
@@ -230,7 +230,9 @@ def _check_boundary_lengths(trial: Trial) -> None:
     exponent = int(np.frexp(np.abs(at).max())[1])
     at = np.ldexp(at, -exponent)
     space, flat = plane.side_lengths(at).ravel(), trial.sides.ravel()
-    border = np.isin(_edge_of_halfedge(trial), np.flatnonzero(trial.topology.count == 1))
+    border = np.isin(
+        trial.topology.edge_of_halfedges(trial.result.faces), np.flatnonzero(trial.topology.count == 1)
+    )
     wanted = space[border] * np.ldexp(trial.result.uv_scale, exponent)
     coarse = EPS * np.abs(at).max() / np.maximum(space[border], np.finfo(float).tiny)
     off = np.abs(flat[border] - wanted) / np.maximum(wanted, np.finfo(float).tiny)
@@ -264,7 +266,7 @@ def _check_boundary_turns(trial: Trial) -> None:
     share = np.zeros(len(curvature))
     edge_at = topology.edges[topology.count == 1]
     length = np.empty(len(topology.edges))
-    length[_edge_of_halfedge(trial)] = trial.sides.ravel()
+    length[trial.topology.edge_of_halfedges(trial.result.faces)] = trial.sides.ravel()
     np.add.at(share, edge_at.ravel(), np.repeat(length[topology.count == 1] / 2, 2))
     for loop in topology.border_loops():
         if np.isin(corner_at, loop).any():
@@ -387,14 +389,6 @@ def _method(trial: Trial) -> str:
     return f"{kind}, polygon"
 
 
-def _is_seam(trial: Trial) -> np.ndarray:
-    """Return (k,) whether the sides of each inner edge have different points."""
-    uv_faces = trial.result.uv_faces
-    tails, heads = uv_faces.ravel(), np.roll(uv_faces, -1, axis=1).ravel()
-    here, there = trial.topology.sides.T
-    return (tails[here] != heads[there]) | (heads[here] != tails[there])
-
-
 def _angle_sums(trial: Trial) -> np.ndarray:
     return _spread(trial, trial.result.faces.ravel(), plane.angles(trial.corners).ravel())
 
@@ -407,10 +401,3 @@ def _angle_rounding(trial: Trial) -> np.ndarray:
 
 def _spread(trial: Trial, at: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.bincount(at, values, minlength=len(trial.result.vertices))
-
-
-def _edge_of_halfedge(trial: Trial) -> np.ndarray:
-    size = len(trial.result.vertices)
-    tails, heads = trial.result.faces.ravel(), np.roll(trial.result.faces, -1, axis=1).ravel()
-    keys = trial.topology.edges[:, 0] * size + trial.topology.edges[:, 1]
-    return np.searchsorted(keys, np.minimum(tails, heads) * size + np.maximum(tails, heads))

@@ -31,6 +31,19 @@ class Topology:
     is_used: np.ndarray
     component: np.ndarray
 
+    def is_seam(self, uv_faces: np.ndarray) -> np.ndarray:
+        """Return (k,) whether the sides of each inner edge have different points, (m, 3) those of the corners."""
+        tails, heads = uv_faces.ravel(), np.roll(uv_faces, -1, axis=1).ravel()
+        here, there = self.sides.T
+        return (tails[here] != heads[there]) | (heads[here] != tails[there])
+
+    def edge_of_halfedges(self, faces: np.ndarray) -> np.ndarray:
+        """Return (3m,) the edge of each half-edge of the faces."""
+        size = len(self.is_used)
+        tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+        keys = self.edges[:, 0] * size + self.edges[:, 1]
+        return np.searchsorted(keys, np.minimum(tails, heads) * size + np.maximum(tails, heads))
+
     @classmethod
     def of(cls, faces: np.ndarray, vertices: int) -> Topology:
         tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
