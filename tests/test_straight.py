@@ -12,7 +12,6 @@ from coneflat.atlas.arrange import arrange_charts
 from coneflat.atlas.charts import read_charts
 from coneflat.atlas.orient import border_directions
 from coneflat.atlas.straight import straight_directions, straight_runs
-from coneflat.errors import OptionError
 
 CROSS = ((1, 0), (0, 1), (1, 1), (2, 1), (3, 1), (1, 2))
 ANGLES = (0.0, 0.1, np.pi / 4, 1.234, -2.5)
@@ -204,14 +203,3 @@ def test_turned_and_renumbered_before_makes_no_difference(turn):
     again = pack_charts(turned(corners, turn)[order][:, [1, 2, 0]] * 3 + 5, chart[order])
     assert 3 * again.scale == pytest.approx(packed.scale, rel=1e-9)
     np.testing.assert_allclose(again.corner_uv[:, [2, 0, 1]], packed.corner_uv[order], atol=1e-9)
-
-
-def test_bad_up():
-    corners = squares(CROSS)
-    chart = np.zeros(len(corners), dtype=int)
-    with pytest.raises(OptionError, match="not all 0"):
-        orient_charts(corners, chart, corners=np.zeros((*corners.shape[:2], 3)), up=(0, 0, 0))
-    with pytest.raises(OptionError, match="needs the corners"):
-        orient_charts(corners, chart, up=(0, 0, 1))
-    with pytest.raises(OptionError, match="shape"):
-        orient_charts(corners, chart, corners=np.zeros((2, 3, 3)), up=(0, 0, 1))

@@ -106,22 +106,18 @@ def _check_origin(trial: Trial) -> None:
         if whole.all() != (result.solve.split_triangles == 0):
             trial.outcome.breach("origin: faces were cut in secret", f"{np.count_nonzero(~whole)} pieces")
         pieces = np.bincount(
-            result.face_origin[~whole], _areas(result.vertices, result.faces[~whole]), len(faces)
+            result.face_origin[~whole],
+            plane.areas_in_space(result.vertices, result.faces[~whole]),
+            len(faces),
         )
         cut = np.unique(result.face_origin[~whole])
-        before = _areas(vertices, faces[cut])
+        before = plane.areas_in_space(vertices, faces[cut])
         if not (np.abs(pieces[cut] - before) <= 1e-9 * before.max(initial=0.0)).all():
             trial.outcome.breach(
                 "origin: pieces are not those of their faces", np.abs(pieces[cut] - before).max()
             )
     if (trial.topology.count > 2).any():
         trial.outcome.breach("origin: the result is no manifold", "")
-
-
-def _areas(vertices: Any, faces: Any) -> Any:
-    """Return (m,) the areas of triangles in space."""
-    one, two, three = np.moveaxis(vertices[faces], 1, 0)
-    return np.linalg.norm(np.cross(two - one, three - one), axis=1) / 2
 
 
 def _check_place(trial: Trial) -> None:
@@ -163,7 +159,7 @@ def _check_overlap(trial: Trial) -> None:
         is_found[tuple(found.pairs.T)] = True
         # The normals of shorter sides are not known well enough, nor is the orientation of what has hardly an area.
         short = trial.sides.min(axis=1) < plane.SHORT * extent
-        short |= np.abs(plane.double_areas(trial.corners)) < plane.NO_AREA * extent**2
+        short |= np.abs(plane.doubleplane.areas_in_space(trial.corners)) < plane.NO_AREA * extent**2
         depth[short], depth[:, short], is_found[short], is_found[:, short] = -1.0, -1.0, False, False
         if ((np.triu(depth, 1) > plane.DEEP * extent) & ~is_found).any():
             trial.outcome.breach("overlap: missed by find_overlaps", "")
