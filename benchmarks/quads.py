@@ -112,8 +112,8 @@ def trial(mesh: TriangleMesh, count: int, make: Maker, tool: Path) -> tuple[dict
     if found["nonmanifold"]:
         euler += f"; {found['nonmanifold']} edges of three"
     return found, (
-        f"{found['quads']:,} | {found['faces'] - found['quads']:,} | {found['irregular']} | {found['angle_mean']:.2f} | "
-        f"{found['edge_cv']:.3f} | {found['jacobian_min']:.2f} | {euler} | {seconds:.1f} |"
+        f"{found['quads']:,} | {found['faces'] - found['quads']:,} | {found['irregular']} | "
+        f"{found['angle_mean']:.2f} | {found['edge_cv']:.3f} | {found['jacobian_min']:.2f} | {euler} | {seconds:.1f} |"
     )
 
 

@@ -159,7 +159,7 @@ def _check_overlap(trial: Trial) -> None:
         is_found[tuple(found.pairs.T)] = True
         # The normals of shorter sides are not known well enough, nor is the orientation of what has hardly an area.
         short = trial.sides.min(axis=1) < plane.SHORT * extent
-        short |= np.abs(plane.doubleplane.areas_in_space(trial.corners)) < plane.NO_AREA * extent**2
+        short |= np.abs(plane.double_areas(trial.corners)) < plane.NO_AREA * extent**2
         depth[short], depth[:, short], is_found[short], is_found[:, short] = -1.0, -1.0, False, False
         if ((np.triu(depth, 1) > plane.DEEP * extent) & ~is_found).any():
             trial.outcome.breach("overlap: missed by find_overlaps", "")

@@ -1,44 +1,23 @@
-"""Sets of cones whose curvatures are whole multiples of a quantum, on a dense model, and the moves that improve them.
-
-All moves transfer d quanta from cone s to vertex t, which changes E^2 by
-2 d q (slope_t - slope_s) + d^2 q^2 (gram_ss + gram_tt - 2 gram_st), slopes taken at the current curvatures.
-"""
+"""Sets of cones whose curvatures are whole multiples of a quantum, on a dense model, and how they are improved."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
-from ..._arrays import BoolArray, FloatArray, IntArray
-from ...compiled import compiled
+from ..._arrays import FloatArray, IntArray
 from ..sparse.best_sets import BestSets
 from ..sparse.dense_model import DenseModel, above_rounding
 from ..sparse.fit_curvatures import fit_curvatures
-from ..sparse.scores import gradients
+from .moves import NOBODY, Quanta, best_merge, best_pair, best_split, descend, energy_of
 
-# A move must lower E^2 by this share, and an exchange of cones by that, or rounding could make them go in circles.
-GAIN, EXCHANGE_GAIN = 1e-9, 1e-6
-# Changes that differ by less, relatively, are equal, and the first met is taken.
-TIE = 1e-9
-# Transfers of up to so many quanta at once, either way: of the quarter turns there is room for no more in a cone.
-REACH = 3
-
-
-class Quanta(NamedTuple):
-    """What the cone indices may be.
-
-    Attributes:
-        quantum: radians.
-        least, most: bounds of each index.
-        has_sum: whether the indices have a sum to keep.
-    """
-
-    quantum: float
-    least: int
-    most: int
-    has_sum: bool
+# An exchange of cones must lower E^2 by this share, or rounding could make them go in circles.
+EXCHANGE_GAIN = 1e-6
+# Pairs of opposite cones that are looked at closely before one is left out.
+PAIRS = 8
+# Exchanges tried at a time: for more than a hundred cones, what comes later gains little.
+EXCHANGES = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +77,7 @@ class Lattice:
     def grown(self, cones: IndexedCones) -> IndexedCones | None:
         """Return cones with one more (two more, of opposite sign, if there were none and the sum is 0)."""
         if not len(cones) and self.total is not None:
-            return self._dipole()
+            return self.grown_by_pair(cones)
         model, indices = self.model, cones.indices
         chosen, amount, giver = best_split(
             model.gram, model.slope, cones.members, indices, self.quanta, model.usable
@@ -110,18 +89,37 @@ class Lattice:
             indices[giver] -= amount
         return self.descended(np.append(cones.members, chosen), indices)
 
-    def _dipole(self) -> IndexedCones | None:
-        gram, slope, quantum = self.model.gram, self.model.slope, self.quanta.quantum
-        allowed = np.flatnonzero(self.model.usable)
-        if self.total != 0 or self.quanta.least > -1 or self.quanta.most < 1 or len(allowed) < 2:
+    def grown_by_pair(self, cones: IndexedCones) -> IndexedCones | None:
+        """Return cones with two more, of a quantum each and of opposite sign."""
+        model, (quantum, least, most, _) = self.model, self.quanta
+        if least > -1 or most < 1:
             return None
-        norm = np.diag(gram)[allowed]
-        change = 2 * quantum * (slope[allowed][:, None] - slope[allowed]) + quantum**2 * (
-            norm[:, None] + norm - 2 * gram[np.ix_(allowed, allowed)]
-        )
-        np.fill_diagonal(change, np.inf)
-        pair = np.array(np.unravel_index(np.argmin(change), change.shape))
-        return self.descended(allowed[pair], np.array([1, -1]))
+        one, two = best_pair(model.gram, model.slope, cones.members, cones.indices, quantum, model.usable)
+        if one < 0:
+            return None
+        return self.descended(np.append(cones.members, [one, two]), np.append(cones.indices, [1, -1]))
+
+    def shrunk_by_pair(self, cones: IndexedCones) -> IndexedCones | None:
+        """Return cones with two less, of opposite indices, the best after moves of the best before them."""
+        moved = [self.descended(each.members, each.indices) for each in self._without_pairs(cones)[:PAIRS]]
+        return min(moved, key=lambda each: each.energy, default=None)
+
+    def _without_pairs(self, cones: IndexedCones) -> list[IndexedCones]:
+        """Return cones without each pair of opposite ones, the least energy first."""
+        fixed, found = len(self.model.fixed), []
+        for i in range(fixed, len(cones)):
+            for j in range(fixed, i):
+                if cones.indices[i] == -cones.indices[j]:
+                    found.append(
+                        self._left(np.delete(cones.members, [i, j]), np.delete(cones.indices, [i, j]))
+                    )
+        return sorted(found, key=lambda each: each.energy)
+
+    def _left(self, members: IntArray, indices: IntArray) -> IndexedCones:
+        """Return cones with their energy."""
+        model = self.model
+        energy = energy_of(model.gram, model.slope, model.constant, members, indices, self.quanta.quantum)
+        return IndexedCones(above_rounding(energy), members, indices)
 
     def without(self, cones: IndexedCones, place: int) -> IndexedCones | None:
         """Return cones with the one at a place merged into the one that takes its quanta best."""
@@ -132,9 +130,7 @@ class Lattice:
         indices = cones.indices.copy()
         if heir >= 0:
             indices[heir] += indices[place]
-        members, indices = np.delete(cones.members, place), np.delete(indices, place)
-        energy = energy_of(model.gram, model.slope, model.constant, members, indices, self.quanta.quantum)
-        return IndexedCones(above_rounding(energy), members, indices)
+        return self._left(np.delete(cones.members, place), np.delete(indices, place))
 
     def shrunk(self, cones: IndexedCones) -> IndexedCones | None:
         """Return cones with one less, the best after moves."""
@@ -148,10 +144,12 @@ class Lattice:
         return found
 
     def exchanged(self, cones: IndexedCones) -> IndexedCones:
-        """Return cones after merging and splitting, one pair at a time, has come to rest."""
+        """Return cones after merging and splitting, one pair at a time, has come to rest, or has taken long."""
         fixed = len(self.model.fixed)
         place, unchanged = fixed, 0
-        while unchanged < len(cones) - fixed:
+        for _ in range(EXCHANGES):
+            if unchanged >= len(cones) - fixed:
+                break
             rest = self.without(cones, place)
             again = None if rest is None or not len(rest) else self.grown(rest)
             if again is not None and again.energy < cones.energy * (1 - EXCHANGE_GAIN):
@@ -205,166 +203,3 @@ class Lattice:
         if (share == 0).any() or share.max() > most or share.min() < least:
             return None
         return self.descended(members, share)
-
-
-@compiled
-def energy_of(
-    gram: FloatArray, slope: FloatArray, constant: float, members: IntArray, indices: IntArray, quantum: float
-) -> float:
-    """Return E^2."""
-    energy = constant
-    for i in range(len(members)):
-        k = quantum * indices[i]
-        energy += 2 * k * slope[members[i]]
-        for j in range(len(members)):
-            energy += k * gram[members[i], members[j]] * quantum * indices[j]
-    return energy
-
-
-@compiled
-def slopes(
-    gram: FloatArray, slope: FloatArray, members: IntArray, quantum: float, indices: IntArray
-) -> FloatArray:
-    """Return (m,) half the derivative of E^2 by the curvature of each candidate."""
-    return gradients(gram, slope, members, quantum * indices.astype(np.float64), 0.0)
-
-
-@compiled
-def transfer(gram: FloatArray, gradient: FloatArray, s: int, t: int, k: float) -> float:
-    """Return the change of E^2 if curvature k goes from vertex s to vertex t."""
-    norm = gram[s, s] + gram[t, t] - 2 * gram[s, t]
-    return (2 * (gradient[t] - gradient[s]) + k * norm) * k
-
-
-@compiled
-def is_within(index: int, quanta: Quanta) -> bool:
-    """Whether a cone may have this index."""
-    return index != 0 and quanta.least <= index <= quanta.most
-
-
-@compiled
-def without_members(usable: BoolArray, members: IntArray) -> BoolArray:
-    """Return a mask of the usable candidates that are no members."""
-    free = usable.copy()
-    for member in members:
-        free[member] = False
-    return free
-
-
-@compiled
-def descend(
-    gram: FloatArray,
-    slope: FloatArray,
-    constant: float,
-    members: IntArray,
-    indices: IntArray,
-    fixed: int,
-    quanta: Quanta,
-    usable: BoolArray,
-) -> float:
-    """Make the best move over and over, in place, until none lowers E^2; return it. The number of cones stays.
-
-    Moves: quanta go from one cone to another; a cone goes to another candidate; without a sum to keep, a cone gains
-    or loses quanta.
-    """
-    size, count, quantum = len(members), len(slope), quanta.quantum
-    energy = energy_of(gram, slope, constant, members, indices, quantum)
-    free = without_members(usable, members)
-    for _ in range(100 + 20 * size):  # comes to rest in a few per cone
-        gradient = slopes(gram, slope, members, quantum, indices)
-        best, kind, one, other, amount = -GAIN * abs(energy), 0, -1, -1, 0
-        for i in range(size):
-            s = members[i]
-            if not quanta.has_sum:
-                for d in range(-REACH, REACH + 1):
-                    k = quantum * d
-                    change = (2 * gradient[s] + k * gram[s, s]) * k
-                    if change < best - TIE * abs(best) and is_within(indices[i] + d, quanta):
-                        best, kind, one, amount = change, 1, i, d
-            for j in range(size):
-                for d in range(1, REACH + 1 if i != j else 0):
-                    change = transfer(gram, gradient, s, members[j], quantum * d)
-                    if (
-                        change < best - TIE * abs(best)
-                        and is_within(indices[i] - d, quanta)
-                        and is_within(indices[j] + d, quanta)
-                    ):
-                        best, kind, one, other, amount = change, 2, i, j, d
-            for t in range(count if i >= fixed else 0):
-                if free[t]:
-                    change = transfer(gram, gradient, s, t, quantum * indices[i])
-                    if change < best - TIE * abs(best):
-                        best, kind, one, other = change, 3, i, t
-        if kind == 0:
-            break
-        if kind == 1:
-            indices[one] += amount
-        elif kind == 2:
-            indices[one] -= amount
-            indices[other] += amount
-        else:
-            free[members[one]] = usable[members[one]]
-            members[one] = other
-            free[other] = False
-        energy = energy_of(gram, slope, constant, members, indices, quantum)
-    return energy
-
-
-@compiled
-def best_split(
-    gram: FloatArray,
-    slope: FloatArray,
-    members: IntArray,
-    indices: IntArray,
-    quanta: Quanta,
-    usable: BoolArray,
-) -> tuple[int, int, int]:
-    """Return the best further cone: the candidate, its index, and the place of the cone it takes that from.
-
-    The place is -1 where there is no sum to keep. The candidate is -1 if nothing can be split.
-    """
-    free = without_members(usable, members)
-    gradient = slopes(gram, slope, members, quanta.quantum, indices)
-    best, chosen, amount, giver = np.inf, -1, 0, -1
-    for d in range(-REACH, REACH + 1):
-        if not is_within(d, quanta):
-            continue
-        k = quanta.quantum * d
-        for i in range(len(members) if quanta.has_sum else 1):
-            if quanta.has_sum and not is_within(indices[i] - d, quanta):
-                continue
-            for t in range(len(slope)):
-                if free[t]:
-                    if quanta.has_sum:
-                        change = transfer(gram, gradient, members[i], t, k)
-                    else:
-                        change = (2 * gradient[t] + k * gram[t, t]) * k
-                    if chosen < 0 or change < best - TIE * abs(best):
-                        best, chosen, amount, giver = change, t, d, i if quanta.has_sum else -1
-    return chosen, amount, giver
-
-
-# What `best_merge` returns where no cone can take the quanta, and where they just go.
-NOBODY, NOWHERE = -2, -1
-
-
-@compiled
-def best_merge(
-    gram: FloatArray, slope: FloatArray, members: IntArray, indices: IntArray, place: int, quanta: Quanta
-) -> int:
-    """Return the place of the cone that best takes all quanta of the one at `place`.
-
-    NOBODY if none can; NOWHERE if it is best that they just go, without a sum to keep.
-    """
-    gradient = slopes(gram, slope, members, quanta.quantum, indices)
-    s = members[place]
-    k = quanta.quantum * indices[place]
-    best, chosen = np.inf, NOBODY
-    if not quanta.has_sum:
-        best, chosen = (k * gram[s, s] - 2 * gradient[s]) * k, NOWHERE
-    for j in range(len(members)):
-        if j != place and is_within(indices[j] + indices[place], quanta):
-            change = transfer(gram, gradient, s, members[j], k)
-            if chosen == NOBODY or change < best - TIE * abs(best):
-                best, chosen = change, j
-    return chosen

@@ -17,7 +17,8 @@ from ...options import LEAST_QUANTUM
 from ..solution import FULL_TURN, ConeSolution
 from ..sparse.exact_model import ROUNDS, WORTHWHILE
 from ..sparse.search import COARSE_DOUBT, ConeSearch
-from .lattice import Lattice, Quanta
+from .lattice import IndexedCones, Lattice
+from .moves import Quanta
 
 # How far, relative, 2 pi chi may be from a multiple of the quantum: what a quantum typed with seven digits is off by.
 WHOLE = 1e-6
@@ -26,6 +27,9 @@ UNBOUNDED = 2000 * math.pi
 # The survey ends so many sizes after the goal is met, or after E has ceased to fall: more cones of whole quanta need
 # not be better.
 BEYOND, STALLED = 2, 5
+# Cones whose E^2 is more than so many times that of the best of their number are not improved by exchanges, nor fewer
+# cones sought from a number whose E^2 is so many times the goal.
+PROMISING, HOPELESS = 1.5, 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +84,9 @@ def quantise_cones(
             f"{most} cones cannot carry the total curvature in multiples of {lattice.quanta.quantum / np.pi:.4g} pi: "
             f"{needed} or more are needed"
         )
-    first = next((size for size in sizes if lattice.best.energy(size) <= goal), sizes[-1])
+    first = next(
+        (size for size in sizes if lattice.best.energy(size) <= goal), min(sizes, key=lattice.best.energy)
+    )
     for size in sizes[sizes.index(first) :]:
         if polish(search, lattice, exact, size) <= goal:
             break
@@ -140,18 +146,27 @@ def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None
         best.offer(lattice.exchanged(start))
     size, beyond, stalled, least = min(best.sizes), 0, 0, math.inf
     while size < most and beyond < BEYOND and stalled < STALLED:
-        grown = lattice.grown(best[size])
-        if grown is None:
-            break
-        best.offer(lattice.exchanged(grown))
-        size = len(grown)
+        _offer(lattice, lattice.grown(best[size]), most)
+        _offer(lattice, lattice.grown_by_pair(best[size]), most)
+        size = min((other for other in best.sizes if other > size), default=most)
         beyond += best.energy(size) <= goal
         stalled = 0 if best.energy(size) < least * (1 - WORTHWHILE) else stalled + 1
         least = min(least, best.energy(size))
     for size in reversed(best.sizes):
-        shrunk = lattice.shrunk(best[size])
-        if shrunk is not None:
-            best.offer(lattice.exchanged(shrunk))
+        if best.energy(size) > goal * HOPELESS and size < most:
+            break
+        _offer(lattice, lattice.shrunk(best[size]), most)
+        _offer(lattice, lattice.shrunk_by_pair(best[size]), most)
+
+
+def _offer(lattice: Lattice, cones: IndexedCones | None, most: int) -> None:
+    """Keep cones after exchanges, if these are worth the time."""
+    if (
+        cones is not None
+        and len(cones) <= most
+        and cones.energy < PROMISING * lattice.best.energy(len(cones))
+    ):
+        lattice.best.offer(lattice.exchanged(cones))
 
 
 def polish(search: ConeSearch, lattice: Lattice, exact: Lattice, size: int) -> float:

@@ -1,0 +1,222 @@
+"""Moves of cones whose curvatures are whole multiples of a quantum.
+
+All moves transfer d quanta from cone s to vertex t, which changes E^2 by
+2 d q (slope_t - slope_s) + d^2 q^2 (gram_ss + gram_tt - 2 gram_st), slopes taken at the current curvatures.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..._arrays import BoolArray, FloatArray, IntArray
+from ...compiled import compiled
+from ..sparse.scores import gradients
+
+# A move must lower E^2 by this share, or rounding could make them go in circles.
+GAIN = 1e-9
+# Changes that differ by less, relatively, are equal, and the first met is taken.
+TIE = 1e-9
+# Transfers of up to so many quanta at once, either way: of the quarter turns there is room for no more in a cone.
+REACH = 3
+
+
+class Quanta(NamedTuple):
+    """What the cone indices may be.
+
+    Attributes:
+        quantum: radians.
+        least, most: bounds of each index.
+        has_sum: whether the indices have a sum to keep.
+    """
+
+    quantum: float
+    least: int
+    most: int
+    has_sum: bool
+
+
+@compiled
+def energy_of(
+    gram: FloatArray, slope: FloatArray, constant: float, members: IntArray, indices: IntArray, quantum: float
+) -> float:
+    """Return E^2."""
+    energy = constant
+    for i in range(len(members)):
+        k = quantum * indices[i]
+        energy += 2 * k * slope[members[i]]
+        for j in range(len(members)):
+            energy += k * gram[members[i], members[j]] * quantum * indices[j]
+    return energy
+
+
+@compiled
+def slopes(
+    gram: FloatArray, slope: FloatArray, members: IntArray, quantum: float, indices: IntArray
+) -> FloatArray:
+    """Return (m,) half the derivative of E^2 by the curvature of each candidate."""
+    return gradients(gram, slope, members, quantum * indices.astype(np.float64), 0.0)
+
+
+@compiled
+def transfer(gram: FloatArray, gradient: FloatArray, s: int, t: int, k: float) -> float:
+    """Return the change of E^2 if curvature k goes from vertex s to vertex t."""
+    norm = gram[s, s] + gram[t, t] - 2 * gram[s, t]
+    return (2 * (gradient[t] - gradient[s]) + k * norm) * k
+
+
+@compiled
+def is_within(index: int, quanta: Quanta) -> bool:
+    """Whether a cone may have this index."""
+    return index != 0 and quanta.least <= index <= quanta.most
+
+
+@compiled
+def without_members(usable: BoolArray, members: IntArray) -> BoolArray:
+    """Return a mask of the usable candidates that are no members."""
+    free = usable.copy()
+    for member in members:
+        free[member] = False
+    return free
+
+
+@compiled
+def descend(
+    gram: FloatArray,
+    slope: FloatArray,
+    constant: float,
+    members: IntArray,
+    indices: IntArray,
+    fixed: int,
+    quanta: Quanta,
+    usable: BoolArray,
+) -> float:
+    """Make the best move over and over, in place, until none lowers E^2; return it. The number of cones stays.
+
+    Moves: quanta go from one cone to another; a cone goes to another candidate; without a sum to keep, a cone gains
+    or loses quanta.
+    """
+    size, count, quantum = len(members), len(slope), quanta.quantum
+    energy = energy_of(gram, slope, constant, members, indices, quantum)
+    free = without_members(usable, members)
+    for _ in range(100 + 20 * size):  # comes to rest in a few per cone
+        gradient = slopes(gram, slope, members, quantum, indices)
+        best, kind, one, other, amount = -GAIN * abs(energy), 0, -1, -1, 0
+        for i in range(size):
+            s = members[i]
+            if not quanta.has_sum:
+                for d in range(-REACH, REACH + 1):
+                    k = quantum * d
+                    change = (2 * gradient[s] + k * gram[s, s]) * k
+                    if change < best - TIE * abs(best) and is_within(indices[i] + d, quanta):
+                        best, kind, one, amount = change, 1, i, d
+            for j in range(size):
+                for d in range(1, REACH + 1 if i != j else 0):
+                    change = transfer(gram, gradient, s, members[j], quantum * d)
+                    if (
+                        change < best - TIE * abs(best)
+                        and is_within(indices[i] - d, quanta)
+                        and is_within(indices[j] + d, quanta)
+                    ):
+                        best, kind, one, other, amount = change, 2, i, j, d
+            for t in range(count if i >= fixed else 0):
+                if free[t]:
+                    change = transfer(gram, gradient, s, t, quantum * indices[i])
+                    if change < best - TIE * abs(best):
+                        best, kind, one, other = change, 3, i, t
+        if kind == 0:
+            break
+        if kind == 1:
+            indices[one] += amount
+        elif kind == 2:
+            indices[one] -= amount
+            indices[other] += amount
+        else:
+            free[members[one]] = usable[members[one]]
+            members[one] = other
+            free[other] = False
+        energy = energy_of(gram, slope, constant, members, indices, quantum)
+    return energy
+
+
+@compiled
+def best_split(
+    gram: FloatArray,
+    slope: FloatArray,
+    members: IntArray,
+    indices: IntArray,
+    quanta: Quanta,
+    usable: BoolArray,
+) -> tuple[int, int, int]:
+    """Return the best further cone: the candidate, its index, and the place of the cone it takes that from.
+
+    The place is -1 where there is no sum to keep. The candidate is -1 if nothing can be split.
+    """
+    free = without_members(usable, members)
+    gradient = slopes(gram, slope, members, quanta.quantum, indices)
+    best, chosen, amount, giver = np.inf, -1, 0, -1
+    for d in range(-REACH, REACH + 1):
+        if not is_within(d, quanta):
+            continue
+        k = quanta.quantum * d
+        for i in range(len(members) if quanta.has_sum else 1):
+            if quanta.has_sum and not is_within(indices[i] - d, quanta):
+                continue
+            for t in range(len(slope)):
+                if free[t]:
+                    if quanta.has_sum:
+                        change = transfer(gram, gradient, members[i], t, k)
+                    else:
+                        change = (2 * gradient[t] + k * gram[t, t]) * k
+                    if chosen < 0 or change < best - TIE * abs(best):
+                        best, chosen, amount, giver = change, t, d, i if quanta.has_sum else -1
+    return chosen, amount, giver
+
+
+@compiled
+def best_pair(
+    gram: FloatArray,
+    slope: FloatArray,
+    members: IntArray,
+    indices: IntArray,
+    quantum: float,
+    usable: BoolArray,
+) -> tuple[int, int]:
+    """Return the two further cones, of a quantum and of minus that, which lower E^2 most; -1 if there is no room."""
+    free = without_members(usable, members)
+    gradient = slopes(gram, slope, members, quantum, indices)
+    best, one, two = np.inf, -1, -1
+    for s in range(len(slope)):
+        for t in range(len(slope)):
+            if free[s] and free[t] and s != t:
+                change = transfer(gram, gradient, s, t, quantum)
+                if one < 0 or change < best - TIE * abs(best):
+                    best, one, two = change, t, s
+    return one, two
+
+
+# What `best_merge` returns where no cone can take the quanta, and where they just go.
+NOBODY, NOWHERE = -2, -1
+
+
+@compiled
+def best_merge(
+    gram: FloatArray, slope: FloatArray, members: IntArray, indices: IntArray, place: int, quanta: Quanta
+) -> int:
+    """Return the place of the cone that best takes all quanta of the one at `place`.
+
+    NOBODY if none can; NOWHERE if it is best that they just go, without a sum to keep.
+    """
+    gradient = slopes(gram, slope, members, quanta.quantum, indices)
+    s = members[place]
+    k = quanta.quantum * indices[place]
+    best, chosen = np.inf, NOBODY
+    if not quanta.has_sum:
+        best, chosen = (k * gram[s, s] - 2 * gradient[s]) * k, NOWHERE
+    for j in range(len(members)):
+        if j != place and is_within(indices[j] + indices[place], quanta):
+            change = transfer(gram, gradient, s, members[j], k)
+            if chosen == NOBODY or change < best - TIE * abs(best):
+                best, chosen = change, j
+    return chosen
