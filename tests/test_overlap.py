@@ -146,15 +146,29 @@ def test_a_triangulation_has_no_overlaps_at_any_scale():
         assert overlaps.fraction == 0
 
 
-def test_fan_around_a_cone_of_three_half_turns():
-    count = 17
+@pytest.mark.parametrize("seed", range(4))
+def test_fans_leave_the_pairs_as_they_are(seed, monkeypatch):
+    monkeypatch.setattr("coneflat.geometry.fans.MANY", 2)
+    rng = np.random.default_rng(seed)
+    corners = np.concatenate(
+        [
+            rng.integers(0, 5, (60, 3, 2)) / 8 + 0.5 + rng.integers(0, 2, (60, 3, 2)) * ULP,
+            -rng.random((20, 3, 2)),
+        ]
+    )
+    corners[60:70, 1] = corners[70:, 2] = corners[60, 1]
+    assert found(corners) == brute_force(corners)
+
+
+@pytest.mark.parametrize("count", [17, 1501])
+def test_fan_around_a_cone_of_three_half_turns(count):
     angles = np.linspace(0, 3 * np.pi, count + 1)
     points = np.concatenate([[[0, 0]], np.stack([np.cos(angles), np.sin(angles)], axis=1)])
     k = np.arange(count)
     overlaps = find_overlaps(points, np.stack([0 * k, k + 1, k + 2], axis=1))
-    # Triangle i covers the angles from 3 i / 17 to 3 (i + 1) / 17 half turns, so j covers some of them from
-    # 3 (j - i) > 31 on, that is two half turns less one triangle.
-    expected = [(i, j) for i, j in combinations(range(count), 2) if abs(3 * (j - i) - 34) < 3]
+    # Triangle i of n covers the angles from 3 i / n to 3 (i + 1) / n half turns, so j covers some of them from
+    # 3 (j - i) > 2 n - 3 on, that is two half turns less one triangle.
+    expected = [(i, j) for i, j in combinations(range(count), 2) if abs(3 * (j - i) - 2 * count) < 3]
     assert overlaps.pairs.tolist() == [list(pair) for pair in expected]
     assert 0.45 < overlaps.fraction < 0.51  # half, but for the corners of polygons
 

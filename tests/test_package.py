@@ -64,3 +64,44 @@ coneflat.flatten(coneflat.sample_path(), method="linear")
         [sys.executable, "-c", script, tmp_path / "mesh.npz"], capture_output=True, text=True, check=True
     )
     assert compiled.stdout.split() == []
+
+
+def test_flattening_a_file_loads_no_more_than_it_uses(tmp_path):
+    """Outside a terminal there are no tables of rich; and no search for symmetry asks for near points."""
+    script = """
+import sys
+from coneflat.apps.cli.main import cli
+cli.main(["flatten", sys.argv[1], "-o", sys.argv[2]], standalone_mode=False)
+print(*sys.modules)
+"""
+    command = [sys.executable, "-c", script, coneflat.sample_path(), tmp_path / "flat.obj"]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split("\n")
+    unused = {"trimesh", "matplotlib", "PIL", "rich", "scipy.spatial", "scipy.optimize", "pypardiso"}
+    assert "coneflat.pipeline" in printed[-2].split()
+    assert not unused & set(printed[-2].split())
+
+
+def test_a_kernel_that_was_loaded_is_compiled_into_others(tmp_path):
+    """To load one leaves out what only compiling needs; what is compiled with it has all of it."""
+    (tmp_path / "counting.py").write_text("""
+from coneflat.compiled import compiled
+from coneflat.mesh import label_nodes
+
+@compiled
+def count(nodes, tails, heads):
+    return label_nodes(nodes, tails, heads)[0]
+""")
+    script = """
+import sys
+import numpy as np
+from counting import count, label_nodes
+pairs = np.array([0, 3]), np.array([1, 4])
+if len(sys.argv) > 1:
+    label_nodes(6, *pairs)
+print(count(6, *pairs), count.stats.cache_hits.total(), label_nodes.stats.cache_hits.total())
+"""
+    command = [sys.executable, "-c", script]
+    runs = [[*command, "loaded"], [*command, "loaded"], command]
+    printed = [subprocess.run(run, capture_output=True, text=True, cwd=tmp_path).stdout for run in runs]
+    # Six nodes and two edges between them.
+    assert [line.split() for line in printed[1:]] == [["4", "1", "1"], ["4", "1", "0"]]

@@ -185,10 +185,6 @@ def _pursued(
     symmetry: Symmetry | None,
 ) -> ConeSolution:
     """Return the fewest cones for the distortion allowed, or the best of the number asked for."""
-    from ..geometry.handles import open_turning
-    from .integer.align import align_handles
-    from .integer.search import quantise_cones
-
     mesh = surface.mesh
     only = only_choice(surface, constraints, options)
     if only is not None:
@@ -202,6 +198,10 @@ def _pursued(
             sparse = mirrored_cones(search, sparse, symmetry, constraints, options)
         found = sparse.solution
     else:
+        from ..geometry.handles import open_turning
+        from .integer.align import align_handles
+        from .integer.search import quantise_cones
+
         quantised = quantise_cones(
             search, options.quantise, distortion=distortion, count=count, most=options.max_cones
         )

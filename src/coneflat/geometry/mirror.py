@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .._arrays import BoolArray, FloatArray, IntArray, dots
 from ..mesh import TriangleMesh, end_corners
 from .operators import vertex_areas
 from .ties import own_axes, tie_key
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 # Points of a surface by which planes are compared; more only tell the same.
 SAMPLES = 800
@@ -83,6 +86,8 @@ def find_mirror(
         tolerance: the largest deviation, as a share of the square root of the area; see `Mirror`.
         normal: (3,) of the plane, where that is known to some degrees.
     """
+    from scipy.spatial import cKDTree
+
     areas = vertex_areas(mesh.faces, lengths, len(mesh.vertices))
     share, size = areas / areas.sum(), float(np.sqrt(areas.sum()))
     centre = share @ mesh.vertices

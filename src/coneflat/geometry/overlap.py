@@ -16,6 +16,7 @@ from .._arrays import FloatArray, IntArray, as_faces, as_floats, require_finite,
 from ..compiled import compiled
 from ..errors import ArrayShapeError, OptionError
 from .coverage import covered_twice
+from .fans import find_fans, lie_apart
 
 # Of the largest coordinate: what is smaller counts as 0, lest products underflow.
 TINY = 2.0**-420
@@ -63,8 +64,8 @@ def find_overlaps(
         of a seam that should coincide, but are an ulp apart the wrong way, do overlap; `area` then is what
         rounding makes of it, about 1e-16 of the layout's extent times the length of the seam.
 
-        Candidates come from a binary tree of boxes, which takes n log n; large numbers of long triangles in many
-        directions, whose boxes all overlap, take more.
+        Candidates come from a binary tree of boxes, which takes n log n; so do those around one point, by their
+        angles. Large numbers of other long triangles in many directions, whose boxes all overlap, take more.
     """
     if limit is not None and limit < 1:
         raise OptionError(f"the limit must be 1 or more, not {limit}")
@@ -121,8 +122,15 @@ def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tup
         return np.empty((0, 2), dtype=np.int64), True
     boxes = snug_boxes(corners[chosen])
     order = z_order(boxes)
-    tree, chosen = box_tree(boxes[order]), chosen[order]
-    arrays = tree, corners[chosen].reshape(-1, 6), np.empty(12)
+    fans = find_fans(corners[chosen])
+    if fans is not None:
+        order = fans.sorted(order)
+    tree = box_tree(boxes[order])
+    around = (np.empty(0, dtype=np.int64), np.empty((0, 2)))
+    if fans is not None:
+        around = fans.tree(order, (len(tree) + 1) // 2)
+    chosen = chosen[order]
+    arrays = tree, *around, corners[chosen].reshape(-1, 6), np.empty(12)
     stack, top = np.zeros((4 * len(tree).bit_length(), 2), dtype=np.int64), 1
     keys, room, left = [], len(chosen), np.inf if limit is None else limit + 1
     while top > 0 and left > 0:
@@ -296,7 +304,14 @@ def _lies_outside(corners: FloatArray, one: int, two: int, parts: FloatArray) ->
 
 @compiled
 def join(
-    tree: FloatArray, corners: FloatArray, parts: FloatArray, stack: IntArray, top: int, found: IntArray
+    tree: FloatArray,
+    fans: IntArray,
+    angles: FloatArray,
+    corners: FloatArray,
+    parts: FloatArray,
+    stack: IntArray,
+    top: int,
+    found: IntArray,
 ) -> tuple[int, int]:
     """Fill in the pairs of triangles whose interiors meet, until there is no room left.
 
@@ -305,6 +320,7 @@ def join(
 
     Args:
         tree: (2 k - 1, 4) boxes: node i is above 2 i + 1 and 2 i + 2, the last k are the triangles' own.
+        fans, angles: (2 k - 1,) the fan of each node and (2 k - 1, 2) its angles, see `Fans`; empty if there is none.
         corners: (m, 6) of the triangles, counterclockwise.
         parts: (12,) room for exact sums.
         stack: (s, 2) pairs of nodes of one level, the lower first, to be searched yet: the first `top`.
@@ -327,7 +343,9 @@ def join(
             continue
         for a in range(2 * i + 1, 2 * i + 3):
             for b in range(2 * j + 1, 2 * j + 3):
-                if (a == b and a < first_leaf) or (a < b and _boxes_meet(tree, a, b)):
+                if (a == b and a < first_leaf) or (
+                    a < b and _boxes_meet(tree, a, b) and not (len(fans) and lie_apart(fans, angles, a, b))
+                ):
                     stack[top, 0] = a
                     stack[top, 1] = b
                     top += 1

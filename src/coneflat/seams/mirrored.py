@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..geometry.mirror import Mirror, mirrored_edges
@@ -278,6 +277,8 @@ def _half(mesh: TriangleMesh, part: TriangleMesh, vertices: IntArray, faces: Int
 
 def _astray(mesh: TriangleMesh, mirror: Mirror, seams: IntArray) -> FloatArray:
     """Return (e,) what edges cost of what they would, less near the mirror image of seams."""
+    from scipy.spatial import cKDTree
+
     if not len(seams):
         return np.ones(len(mesh.edges))
     ends = mesh.vertices[mesh.edges]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import textwrap
 import threading
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -10,19 +11,20 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 import click
-from rich.console import Console as RichConsole
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 from ...progress import Progress as Listener
 from ...progress import Stages
 from ...result.flattening import Flattening
 from .shared import QUIET, VERBOSE
 
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
 PATIENCE = 1.0  # seconds between the plain lines that say what is going on, and before the first of them
-PLAIN_WIDTH = 110
+PLAIN_WIDTH, LEAST_WIDTH = 110, 20  # of tables outside a terminal, and of their last column
 #: What an artist asks first, in this order; the other rows are printed if verbose.
 FIRST_ROWS = ("charts", "overlap", "flipped", "texel density", "seam length", "QC distortion", "cones")
 
@@ -48,14 +50,7 @@ class Console:
         self._over = threading.Event()
         self._bar: Progress | None = None
         if verbosity is None and sys.stderr.isatty():
-            self._bar = Progress(
-                SpinnerColumn(),
-                TextColumn("{task.description:28}"),
-                BarColumn(),
-                TimeElapsedColumn(),
-                console=RichConsole(stderr=True),
-                transient=True,
-            )
+            self._bar = _bar()
             self._task = self._bar.add_task("", total=1.0)
 
     def __enter__(self) -> Console:
@@ -166,11 +161,46 @@ class Console:
         if self._bar:
             self._bar.stop()
             self._bar = None
-        table = Table(box=None, show_header=False, pad_edge=False)
-        table.add_column(style="bold")
-        table.add_column()
-        table.add_column(style="dim")
-        for row in rows:
-            table.add_row(*row)
-        width = None if sys.stdout.isatty() else PLAIN_WIDTH
-        RichConsole(highlight=False, markup=False, width=width).print(table)
+        if sys.stdout.isatty():
+            _print_table(rows)
+        else:
+            self.say(_plain_table(list(rows)))
+
+
+def _bar() -> Progress:
+    from rich.console import Console as RichConsole
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    return Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description:28}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        console=RichConsole(stderr=True),
+        transient=True,
+    )
+
+
+def _print_table(rows: Iterable[tuple[str, str, str]]) -> None:
+    """Print a table on a terminal, as wide as that is."""
+    from rich.console import Console as RichConsole
+    from rich.table import Table
+
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(style="bold")
+    table.add_column()
+    table.add_column(style="dim")
+    for row in rows:
+        table.add_row(*row)
+    RichConsole(highlight=False, markup=False).print(table)
+
+
+def _plain_table(rows: Sequence[tuple[str, str, str]]) -> Iterator[str]:
+    """Yield the lines of a table, the last column of which is wrapped."""
+    names, values = (max((len(row[column]) for row in rows), default=0) for column in (0, 1))
+    rest = max(PLAIN_WIDTH - names - values - 4, LEAST_WIDTH)
+    for name, value, meaning in rows:
+        first, *more = textwrap.wrap(meaning, rest) or [""]
+        yield f"{name:{names}}  {value:{values}}  {first}".rstrip()
+        for line in more:
+            yield " " * (names + values + 4) + line

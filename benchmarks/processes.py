@@ -1,0 +1,112 @@
+"""What whole processes cost: `python benchmarks/processes.py` prints Markdown tables.
+
+First a single `coneflat flatten` of a model of 13,000 triangles from the command to its end, beside the work in it that
+is left once everything is loaded. Then `coneflat batch` of small meshes with one process and with two, beside the same
+meshes one after the other in one process that has loaded everything; and again with a fifth of them, for the memory.
+Seconds of the processor are those of all threads, and tell more where other work is going on beside.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from common import MODELS, shapes
+
+COMMAND = [sys.executable, "-m", "coneflat"]
+SINGLE = """
+import json, sys, time
+from coneflat.apps.batch.child import flatten_file
+jobs = [json.loads(line) for line in sys.stdin]
+flatten_file(jobs[0])
+start, used = time.perf_counter(), time.process_time()
+for job in jobs:
+    assert flatten_file(job)["status"] == "done"
+print(json.dumps([time.perf_counter() - start, time.process_time() - used]))
+"""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=5, help="of the single command; medians count")
+    parser.add_argument("--meshes", type=int, default=250)
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        print("| command | wall, s | processor, s | peak, MB |\n| --- | --- | --- | --- |")
+        model = next(iter(MODELS.glob("fandisk.*")), None) or write(
+            Path(folder) / "sphere.obj", shapes.sphere(5)
+        )
+        for words in (["--help"], ["flatten", str(model), "-o", str(Path(folder) / "flat.obj")]):
+            found = zip(*(costs([*COMMAND, *words]) for _ in range(arguments.runs)), strict=True)
+            wall, used, memory = (statistics.median(each) for each in found)
+            print(f"| {words[0]} | {wall:.2f} | {used:.2f} | {memory:.0f} |")
+        meshes = [write(Path(folder) / f"{i}.obj", small_mesh(i)) for i in range(arguments.meshes)]
+        print_batches(meshes, Path(folder))
+
+
+def print_batches(meshes: list[Path], folder: Path) -> None:
+    """Print what batches of meshes cost."""
+    jobs = [job(mesh, folder / "single.obj") for mesh in meshes]
+    alone = subprocess.run(
+        [sys.executable, "-c", SINGLE], input="\n".join(jobs), stdout=subprocess.PIPE, text=True
+    )
+    wall, used = json.loads(alone.stdout)
+    print("\n| meshes | | wall, s | processor, s | throughput | peak of a process, MB |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    print(f"| {len(meshes)} | one after the other, loaded | {wall:.1f} | {used:.1f} | 1 | |")
+    for count, processes in ((len(meshes), 1), (len(meshes), 2), (len(meshes) // 5, 2)):
+        words = ["batch", *map(str, meshes[:count]), "--out", str(folder / f"{count}-{processes}")]
+        taken, all_used, memory = costs([*COMMAND, *words, "--jobs", str(processes), "--quiet"])
+        gain = wall * count / len(meshes) / taken
+        print(f"| {count} | batch, {processes} | {taken:.1f} | {all_used:.1f} | {gain:.2f} | {memory:.0f} |")
+
+
+def costs(command: list[str]) -> tuple[float, float, float]:
+    """Return the wall time of a command, the time of the processor, and the peak memory of its largest process."""
+    # A process between, as only those that have ended count, and all of them together.
+    script = (
+        "import json, resource, subprocess, sys, time; start = time.perf_counter(); "
+        "subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL); taken = time.perf_counter() - start; "
+        "used = resource.getrusage(resource.RUSAGE_CHILDREN); "
+        "print(json.dumps([taken, used.ru_utime + used.ru_stime, used.ru_maxrss]))"
+    )
+    printed = subprocess.run([sys.executable, "-c", script, *command], check=True, stdout=subprocess.PIPE)
+    wall, used, memory = json.loads(printed.stdout)
+    return wall, used, memory * (1 if sys.platform == "darwin" else 1024) / 1e6
+
+
+def small_mesh(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return a bumpy torus, sheet or sphere of 300 to 2,000 triangles."""
+    random = np.random.default_rng(seed)
+    kind = seed % 3
+    if kind == 0:
+        vertices, faces = shapes.torus(int(random.integers(16, 44)), int(random.integers(10, 22)))
+    elif kind == 1:
+        vertices, faces = shapes.hill(int(random.integers(14, 40)), int(random.integers(12, 24)))
+    else:
+        vertices, faces = shapes.sphere(3, seed=seed)
+    return vertices * (1 + random.random(3)), faces
+
+
+def write(path: Path, mesh: tuple[np.ndarray, np.ndarray]) -> Path:
+    """Write a mesh as OBJ, and return the path."""
+    shapes.write_obj(path, *mesh)
+    return path
+
+
+def job(mesh: Path, output: Path) -> str:
+    """Return what a process of a batch is told of a mesh."""
+    return json.dumps(
+        {"mesh": os.fspath(mesh), "output": os.fspath(output), "options": {}, "weld": None, "required": []}
+    )
+
+
+if __name__ == "__main__":
+    main()
