@@ -106,7 +106,7 @@ def test_command_refuses_before_the_work(tmp_path, ball):
     assert run.exit_code == 2
     assert "leave one out" in run.output
     run = CliRunner().invoke(command, [str(path), "-o", str(tmp_path / "quads.stl")])
-    assert "quads are written as .obj, .ply" in str(run.exception)
+    assert "quads are written as .obj, .ply, .glb, .npz" in str(run.exception)
     run = CliRunner().invoke(command, [str(path), "-o", str(path)])
     assert "the input and the output" in str(run.exception)
 

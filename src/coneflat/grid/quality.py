@@ -114,12 +114,8 @@ def surface_gaps(quads: QuadMesh) -> tuple[float, float]:
     # Corners are the same for several quads.
     inner = np.einsum("si,pix->psx", patch[patch.max(axis=1) < 1], corners).reshape(-1, 3)
     there = surface_distances(mesh.vertices, mesh.faces, np.concatenate([quads.vertices, inner]))
-    one, two = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
-    turn = np.where(dots(one, one) <= dots(two, two), 0, 1)
-    rolled = np.take_along_axis(quads.quads, (np.arange(4) + turn[:, None]) % 4, axis=1)
-    halves = np.concatenate([rolled[:, [0, 1, 2]], rolled[:, [0, 2, 3]]])
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    back = surface_distances(quads.vertices, halves, _samples(mesh, float(sides.mean()) / 2))
+    back = surface_distances(quads.vertices, quads.triangles, _samples(mesh, float(sides.mean()) / 2))
     return float(there.max()), float(back.max())
 
 

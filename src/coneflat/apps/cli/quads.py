@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     "-o",
     "--output",
     type=click.Path(path_type=Path),
-    help="File to write: .obj or .ply.  [default: MESH's name with _quads, as .obj]",
+    help="File to write: .obj, .ply, .glb or .npz.  [default: MESH's name with _quads, as .obj]",
 )
 @click.option("--faces", type=int, help="About how many quads.  [default: 10000]")
 @click.option("--size", type=float, help="Length of a quad's edges in model units, instead of --faces.")
