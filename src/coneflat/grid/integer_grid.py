@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,15 +16,16 @@ from ..geometry.planar import map_factors, sides_between, signed_angles, signed_
 from ..geometry.triangles import double_areas
 from ..layout.relax import Lines, PointConstraints, Relaxed, StretchEnergy, relax
 from ..layout.relax.relax import rest_sides
-from ..mesh import NEXT, PREVIOUS
+from ..mesh import NEXT
 from ..pipeline import flatten
 from ..result.flattening import Flattening
 from ..text import plural
 from ..threads import one_blas_thread
 from .aligned import Layout, aligned
+from .motions import find_motions
 from .rounding import find_rounding
 from .sides import Sides
-from .transitions import UNITS, Transitions, find_transitions
+from .transitions import Transitions, find_transitions
 
 # What the grid wants of a flattening: three, five or six quads at a cone, and rotations that are quarter turns.
 OPTIONS = {
@@ -89,6 +92,30 @@ class IntegerGrid:
     notes: tuple[str, ...] = ()
     corners: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     corner_quarters: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the grid as .obj or .npz, in full or not at all, and return the path; see `write_grid`.
+
+        Raises:
+            UnknownFormatError: the ending is another.
+            MeshFileError: the file cannot be written.
+        """
+        from ..files.grid import write_grid
+
+        return write_grid(path, self)
+
+    @staticmethod
+    def load(path: str | PathLike[str]) -> IntegerGrid:
+        """Return the grid that an .npz or .obj file holds; see `read_grid`.
+
+        Raises:
+            UnknownFormatError: the ending is another.
+            MeshFileError: the file is not there, may not be read, or holds no manifold of triangles with UVs.
+            GridError: the UVs are no integer-grid map.
+        """
+        from ..files.grid import read_grid
+
+        return read_grid(path)
 
 
 def integer_grid(
@@ -254,7 +281,7 @@ def _described(
     tries: int,
 ) -> IntegerGrid:
     mesh, corners = layout.mesh, layout.corners
-    turns, shifts = _across(layout, points)
+    turns, shifts, _ = find_motions(mesh, _pairs(points)[corners])
     angles = signed_angles(sides_between(_pairs(points)[corners]))
     sums = np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
     quarters = np.rint(sums / (np.pi / 2)).astype(np.int64)
@@ -288,20 +315,6 @@ def _described(
         least_area=_distortion(layout, points)[1],
         notes=tuple(notes),
     )
-
-
-def _across(layout: Layout, points: ComplexArray) -> tuple[IntArray, IntArray]:
-    """Return (3m,) quarter turns and (3m, 2) shifts of half-edges: from the triangle across to their own."""
-    mesh, corners = layout.mesh, layout.corners
-    starts, ends = corners[:, NEXT].ravel(), corners[:, PREVIOUS].ravel()
-    turns = np.full(len(starts), -1, dtype=np.int64)
-    shifts = np.zeros(len(starts), dtype=np.complex128)
-    pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
-    for h, t in (pairs.T, pairs[:, ::-1].T):
-        own, other = points[ends[h]] - points[starts[h]], points[starts[t]] - points[ends[t]]
-        turns[h] = np.rint(np.angle(own / other) / (np.pi / 2)).astype(np.int64) % 4
-        shifts[h] = points[starts[h]] - UNITS[turns[h]] * points[ends[t]]
-    return turns, np.rint(_pairs(shifts)).astype(np.int64)
 
 
 def _moves(layout: Layout, smooth: ComplexArray, points: ComplexArray) -> tuple[float, float]:
