@@ -44,6 +44,8 @@ def sorted_cones(grid):
 def assert_same(one, other):
     """All fields, bit for bit."""
     for field in fields(one):
+        if field.name == "seconds":
+            continue
         np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name), field.name)
 
 

@@ -120,11 +120,6 @@ def number(value: Any) -> Any:
     return math.nan if value is None else value
 
 
-def plain(value: float) -> float | None:
-    """Return a number as a report has it: None for those that JSON does not know."""
-    return float(value) if math.isfinite(value) else None
-
-
 def read_archive(path: Path, names: Iterable[str], made: Callable[[CheckedArrays], Made]) -> Made:
     """Return what is made of the arrays of an .npz file; others than those named are left unread.
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..errors import MeshError, MeshFileError
-from .archive import CheckedArrays, number, plain, read_archive
+from .archive import CheckedArrays, number, read_archive
 from .atomic import as_path, atomic_write, check_target, known_ending
 from .obj import parse_obj
 from .obj_write import lines_of
@@ -87,7 +87,8 @@ def _write_obj(grid: IntegerGrid, stream: IO[bytes]) -> None:
     # A corner of the same vertex at the same place is the same point.
     keys = np.concatenate([grid.faces.reshape(-1, 1), grid.corner_grid.reshape(-1, 2)], axis=1)
     points, number_of = np.unique(keys, axis=0, return_inverse=True)
-    stream.write(("\n".join([*_HEAD, f"# grid {json.dumps(_report(grid))}"]) + "\n").encode("ascii"))
+    told = {**grid.report(), "notes": list(grid.notes)}
+    stream.write(("\n".join([*_HEAD, f"# grid {json.dumps(told)}"]) + "\n").encode("ascii"))
     edges, turns, shifts = _seams(grid)
     rows = np.concatenate([edges + 1, turns[:, None], shifts], axis=1)
     stream.writelines(lines_of("# seam", rows, b"\n"))
@@ -118,17 +119,13 @@ def _seams(grid: IntegerGrid) -> tuple[IntArray, IntArray, IntArray]:
     return edges, grid.turns[here], grid.shifts[here]
 
 
-def _report(grid: IntegerGrid) -> dict[str, Any]:
-    """Return all numbers and notes of a grid."""
-    return {**{name: plain(getattr(grid, name)) for name in _NUMBERS}, "notes": list(grid.notes)}
-
-
 def _write_npz(grid: IntegerGrid, stream: IO[bytes]) -> None:
     edges, turns, shifts = _seams(grid)
     values = {field.name: getattr(grid, field.name) for field in fields(grid)}
     arrays: dict[str, Any] = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
     arrays |= {"seams": edges, "seam_turns": turns, "seam_shifts": shifts}
-    np.savez(stream, **arrays, report=np.array(json.dumps(_report(grid))))
+    told = {**grid.report(), "notes": list(grid.notes)}
+    np.savez(stream, **arrays, report=np.array(json.dumps(told)))
 
 
 def read_grid(path: str | PathLike[str]) -> IntegerGrid:
@@ -207,6 +204,7 @@ def _grid_of_archive(reading: CheckedArrays) -> IntegerGrid:
     n = len(vertices)
     faces = reading.indices("faces", (None, 3), n)
     m = len(faces)
+    numbers: dict[str, Any] = {name: float(number(report[name])) for name in _NUMBERS}
     cones, corners = (reading.indices(name, (None,), n) for name in ("cones", "corners"))
     grid = IntegerGrid(
         vertices=vertices,
@@ -218,7 +216,7 @@ def _grid_of_archive(reading: CheckedArrays) -> IntegerGrid:
         quarters=reading.indices("quarters", (len(cones),), None),
         corners=corners,
         corner_quarters=reading.indices("corner_quarters", (len(corners),), None),
-        **{name: float(number(report[name])) for name in _NUMBERS},
+        **numbers,
         notes=reading.notes(report),
     )
     _require_mesh(reading.path, vertices, faces)

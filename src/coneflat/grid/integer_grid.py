@@ -18,6 +18,7 @@ from ..layout.relax import Lines, PointConstraints, Relaxed, StretchEnergy, rela
 from ..layout.relax.relax import rest_sides
 from ..mesh import NEXT
 from ..pipeline import flatten
+from ..progress import Stages
 from ..result.flattening import Flattening
 from ..text import plural
 from ..threads import one_blas_thread
@@ -72,6 +73,7 @@ class IntegerGrid:
         notes: what was done, one sentence each.
         corners: (k,) vertices on grid points where straight sides of the boundary meet; sides lie on grid lines.
         corner_quarters: (k,) the quarter turns of their angle: 1, 3 or more.
+        seconds: wall time of each stage; files do not keep it.
     """
 
     vertices: FloatArray
@@ -92,6 +94,12 @@ class IntegerGrid:
     notes: tuple[str, ...] = ()
     corners: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     corner_quarters: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def report(self) -> dict[str, float | None]:
+        """Return the numbers among the attributes by name, as JSON takes them: None for what is not known."""
+        numbers = {name: value for name, value in vars(self).items() if isinstance(value, float)}
+        return {name: float(value) if np.isfinite(value) else None for name, value in numbers.items()}
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the grid as .obj or .npz, in full or not at all, and return the path; see `write_grid`.
@@ -151,16 +159,20 @@ def integer_grid(
     wanted, name = (size, "size") if size is not None else (10_000 if quads is None else quads, "quads")
     if not (np.isfinite(wanted) and wanted > 0):
         raise OptionError(f"{name} must be a positive number, not {wanted!r}")
+    stages = Stages(options.get("progress"))
     if isinstance(mesh, Flattening):
         if faces is not None or options:
             raise OptionError("a flattening has its faces and options: none can be given beside it")
         result = mesh
     else:
         defaults = OPTIONS if options.get("boundary") != "straight" else {**OPTIONS, **STRAIGHT}
-        result = flatten(mesh, faces, **{**defaults, **options})
-    layout = aligned(result, None if size is not None else wanted, size)
-    with one_blas_thread():
+        with stages("flatten"):
+            result = flatten(mesh, faces, **{**defaults, **options})
+    stages.done = 1.0
+    with stages("grid"), one_blas_thread():
+        layout = aligned(result, None if size is not None else wanted, size)
         found = _whole(layout, StretchEnergy(stretch))
+    found = replace(found, seconds=stages.seconds)
     loose = _loose_border(layout) if result.settings.get("boundary") == "straight" else 0
     if not loose:
         return found

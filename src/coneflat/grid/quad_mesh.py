@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -29,6 +29,7 @@ class QuadMesh:
             on grid lines; negative, should a quad lie over a hole.
         surface: the triangle mesh.
         notes: what was done, and what falls short, one sentence each.
+        seconds: wall time of each stage; files do not keep it.
     """
 
     vertices: FloatArray
@@ -39,6 +40,7 @@ class QuadMesh:
     area_left_out: float
     surface: TriangleMesh
     notes: tuple[str, ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
 
     @cached_property
     def _edges(self) -> tuple[IntArray, IntArray]:

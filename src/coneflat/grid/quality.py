@@ -27,6 +27,7 @@ class QuadMeasures:
         irregular: inner vertices whose valence is not 4.
         irregular_valences: how many of each valence.
         euler_characteristic: vertices minus edges plus quads.
+        surface_euler: that of the surface, which it is unless squares were left out.
         boundary_edges: edges with one quad.
         angle_mean, angle_p95, angle_max: of all corner angles, degrees off 90.
         edge_mean, edge_cv: of edge lengths, the mean, and the standard deviation over it.
@@ -43,6 +44,7 @@ class QuadMeasures:
     irregular: int
     irregular_valences: dict[int, int]
     euler_characteristic: int
+    surface_euler: int
     boundary_edges: int
     angle_mean: float
     angle_p95: float
@@ -76,6 +78,7 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
         irregular=len(quads.irregular),
         irregular_valences=dict(zip(which.tolist(), many.tolist(), strict=True)),
         euler_characteristic=quads.euler_characteristic,
+        surface_euler=quads.surface_euler,
         boundary_edges=int(quads.is_boundary_edge.sum()),
         angle_mean=float(off.mean()),
         angle_p95=float(np.percentile(off, 95)),
