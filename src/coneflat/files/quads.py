@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
@@ -104,6 +105,16 @@ def _write_npz(mesh: QuadMesh, stream: IO[bytes]) -> None:
         valences=mesh.valences[mesh.irregular],
         report=np.array(json.dumps(report)),
     )
+
+
+def holds_quads(path: str | PathLike[str]) -> bool:
+    """Return whether a file is an archive with quads, whatever else may be wrong with it."""
+    path = as_path(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return path.suffix.lower() == ".npz" and "quads.npy" in archive.namelist()
+    except (OSError, ValueError, zipfile.BadZipFile):
+        return False
 
 
 def read_quads(path: str | PathLike[str]) -> QuadMesh:

@@ -68,13 +68,18 @@ class QuadMesh:
         return mask
 
     @cached_property
-    def triangles(self) -> IntArray:
-        """(2p, 3) the two triangles of each quad, one after the other, on either side of its shorter diagonal."""
+    def triangle_corners(self) -> IntArray:
+        """(2p, 3) corners of quads, 4 q + i, of the two triangles on either side of each quad's shorter diagonal."""
         corners = self.vertices[self.quads]
         one, two = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
         turn = np.where(dots(one, one) <= dots(two, two), 0, 1)
-        rolled = np.take_along_axis(self.quads, (np.arange(4) + turn[:, None]) % 4, axis=1)
+        rolled = 4 * np.arange(len(self.quads))[:, None] + (np.arange(4) + turn[:, None]) % 4
         return rolled[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+
+    @property
+    def triangles(self) -> IntArray:
+        """(2p, 3) vertex indices of these triangles, those of each quad one after the other."""
+        return self.quads.ravel()[self.triangle_corners]
 
     @cached_property
     def valences(self) -> IntArray:

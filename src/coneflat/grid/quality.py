@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -62,6 +63,43 @@ class QuadMeasures:
     def report(self) -> dict[str, Any]:
         """Return the measures by name, as JSON takes them."""
         return asdict(self)
+
+    def rows(self) -> Iterator[tuple[str, str, str]]:
+        """Yield what people are told: measure, value, meaning."""
+        valences = ", ".join(f"{count:,} of {valence}" for valence, count in self.irregular_valences.items())
+        apart = self.hausdorff / self.edge_mean
+        holds = self.euler_characteristic == self.surface_euler
+        yield (
+            "quads",
+            f"{self.quads:,}",
+            f"Euler characteristic {self.euler_characteristic}, "
+            + ("as the surface" if holds else f"not {self.surface_euler} as the surface"),
+        )
+        yield (
+            "irregular",
+            f"{self.irregular:,}",
+            f"inner vertices of other valence than 4: {valences or 'none'}",
+        )
+        yield (
+            "off 90 deg",
+            f"{self.angle_mean:.2f}",
+            f"mean; 95% below {self.angle_p95:.1f}, worst {self.angle_max:.1f}",
+        )
+        yield (
+            "edge cv",
+            f"{self.edge_cv:.3f}",
+            f"standard deviation of edge lengths over their mean, {self.edge_mean:.4g}",
+        )
+        yield (
+            "Jacobian",
+            f"{self.jacobian_mean:.3f}",
+            f"scaled, mean of each quad's least; least {self.jacobian_min:.3f}",
+        )
+        yield (
+            "distance",
+            f"{self.hausdorff:.3g}",
+            f"from the surface and back, the largest of samples; {apart:.2f} edges",
+        )
 
 
 def measure_quads(quads: QuadMesh) -> QuadMeasures:

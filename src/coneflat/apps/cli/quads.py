@@ -34,6 +34,11 @@ if TYPE_CHECKING:
     help="File to write the integer grid to that quads are made of: .obj, with texture coordinates in squares of the "
     "grid, or .npz.",
 )
+@click.option(
+    "--view",
+    type=click.Path(path_type=Path),
+    help="Page to write, .html, that shows the quads, their irregular vertices, and the rectangles that they form.",
+)
 @option_flags(QuadOptions, one_mesh=True)
 @input_options
 @click.option("--report", type=click.Path(path_type=Path), help="Write all measures to this JSON file.")
@@ -45,6 +50,7 @@ def quads(
     mesh: Path,
     output: Path | None,
     grid: Path | None,
+    view: Path | None,
     repair: bool,
     weld: bool | None,
     report: Path | None,
@@ -65,22 +71,25 @@ def quads(
     from ...files.atomic import check_target
     from ...files.grid import check_grid_output
     from ...files.quads import check_quads_output
+    from ...view.page.webpage import check_page
     from .console import Console
     from .run import FLATTENED, require_distinct
 
     _check_combinations(context, mesh)
     options = keywords(method, QuadOptions)
-    if output is None and grid is None:
+    if output is None and grid is None and view is None:
         output = Path(f"{mesh.stem}_quads.obj")
     # What can fail at the end is looked at before the work.
-    for path, check in ((output, check_quads_output), (grid, check_grid_output), (report, check_target)):
+    files = {"output": output, "grid": grid, "view": view, "report": report}
+    checks = (check_quads_output, check_grid_output, check_page, check_target)
+    for path, check in zip(files.values(), checks, strict=True):
         if path is not None:
             check(path)
-    require_distinct({"input": mesh, "output": output, "grid": grid, "report": report})
+    require_distinct({"input": mesh, **files})
     rounds = {"smooth": options.pop("smooth")} if "smooth" in options else {}
     with Console(verbosity) as console:
         whole, notes = _grid_of(mesh, console, {**options, **checking(repair)}, weld)
-        found = _quads_of(whole, console, rounds) if output is not None else None
+        found = None if output is None and view is None else _quads_of(whole, console, rounds)
         measures = None
         if found is not None:
             with console.stage("measure", FLATTENED):
@@ -90,12 +99,14 @@ def quads(
                 whole.save(grid)
             if found is not None and output is not None:
                 found.save(output)
+            if found is not None and view is not None:
+                _write_page(found, view, mesh.name)
         told = [*notes, *(whole if found is None else found).notes]
         if report is not None:
             _write_report(report, whole, measures, told, console.seconds)
         console.say(f"note: {note}" for note in told)
-        console.finish([path for path in (output, grid, report) if path is not None])
-        console.table([*_grid_rows(whole), *(() if measures is None else _rows(measures))])
+        console.finish([path for path in files.values() if path is not None])
+        console.table([*_grid_rows(whole), *(() if measures is None else measures.rows())])
 
 
 def _check_combinations(context: click.Context, mesh: Path) -> None:
@@ -111,7 +122,7 @@ def _check_combinations(context: click.Context, mesh: Path) -> None:
     if mesh.suffix.lower() != ".npz":
         return
     for parameter in context.command.params:
-        kept = ("mesh", "output", "grid", "smooth", "report", "verbosity")
+        kept = ("mesh", "output", "grid", "view", "smooth", "report", "verbosity")
         if parameter.name not in kept and parameter.name is not None and is_given(context, parameter.name):
             raise click.UsageError(f"{mesh} is a grid: leave out {parameter.opts[0]}", context)
 
@@ -150,6 +161,13 @@ def _measured(found: QuadMesh) -> QuadMeasures:
     return measure_quads(found)
 
 
+def _write_page(found: QuadMesh, path: Path, name: str) -> None:
+    from ...view.page.quads import page_of_quads
+    from ...view.page.webpage import write_page
+
+    write_page(page_of_quads(found, name=name), path)
+
+
 def _write_report(
     path: Path, grid: IntegerGrid, measures: QuadMeasures | None, notes: list[str], seconds: dict[str, float]
 ) -> None:
@@ -180,41 +198,3 @@ def _grid_rows(grid: IntegerGrid) -> Iterator[tuple[str, str, str]]:
             f"{grid.qc_mean:.4f}",
             f"mean distortion of the map; {grid.qc_before:.4f} before rounding",
         )
-
-
-def _rows(measures: QuadMeasures) -> Iterator[tuple[str, str, str]]:
-    """Yield what is printed of quads: measure, value, meaning."""
-    valences = ", ".join(f"{count:,} of {valence}" for valence, count in measures.irregular_valences.items())
-    apart = measures.hausdorff / measures.edge_mean
-    holds = measures.euler_characteristic == measures.surface_euler
-    yield (
-        "quads",
-        f"{measures.quads:,}",
-        f"Euler characteristic {measures.euler_characteristic}, "
-        + ("as the surface" if holds else f"not {measures.surface_euler} as the surface"),
-    )
-    yield (
-        "irregular",
-        f"{measures.irregular:,}",
-        f"inner vertices of other valence than 4: {valences or 'none'}",
-    )
-    yield (
-        "off 90 deg",
-        f"{measures.angle_mean:.2f}",
-        f"mean; 95% below {measures.angle_p95:.1f}, worst {measures.angle_max:.1f}",
-    )
-    yield (
-        "edge cv",
-        f"{measures.edge_cv:.3f}",
-        f"standard deviation of edge lengths over their mean, {measures.edge_mean:.4g}",
-    )
-    yield (
-        "Jacobian",
-        f"{measures.jacobian_mean:.3f}",
-        f"scaled, mean of each quad's least; least {measures.jacobian_min:.3f}",
-    )
-    yield (
-        "distance",
-        f"{measures.hausdorff:.3g}",
-        f"from the surface and back, the largest of samples; {apart:.2f} edges",
-    )
