@@ -140,6 +140,31 @@ def test_the_grid_is_written_and_made_into_the_same_quads(tmp_path, ball, quads_
     assert "is a grid: leave out --quads" in refused.output
 
 
+def test_repairs_are_told(tmp_path):
+    # A face the other way round, and a vertex of no face.
+    vertices, faces = sphere(3)
+    turned = faces.copy()
+    turned[5] = turned[5, ::-1]
+    path = write_obj(tmp_path / "ball.obj", np.concatenate([vertices, [[9.0, 9, 9]]]), turned)
+    done = run(path, "-o", tmp_path / "q.npz", "--quads", 300)
+    assert "note: Turned 1 face to agree with the rest." in done.output
+    assert "note: Left out 1 vertex without a face." in done.output
+    assert "Turned 1 face to agree with the rest." in QuadMesh.load(tmp_path / "q.npz").notes
+
+
+def test_squares_left_out_are_told_of_files_that_are_joined(tmp_path):
+    # Two halves of a cap, each with vertices of its own along the line where they meet.
+    vertices, faces = sphere(3, bumps=0.2)
+    middles = vertices[faces].mean(axis=1)
+    faces = faces[middles[:, 2] < 0.4]
+    half = vertices[faces].mean(axis=1)[:, 0] < 0
+    both = np.concatenate([faces[half], faces[~half] + len(vertices)])
+    path = write_obj(tmp_path / "cap.obj", np.concatenate([vertices, vertices]), both)
+    done = run(path, "-o", tmp_path / "q.npz", "--quads", 500)
+    assert "note: Closed" in done.output
+    assert f"note: Left out {QuadMesh.load(tmp_path / 'q.npz').left_out} squares" in done.output
+
+
 def test_the_report_has_all_measures(tmp_path, ball, quads_of_ball):
     path = write_obj(tmp_path / "ball.obj", *ball)
     done = run(path, "-o", tmp_path / "q.glb", "--quads", 600, "--report", tmp_path / "q.json")
@@ -174,6 +199,29 @@ def test_options_of_the_search(tmp_path, ball):
     refused = run(path, "--cone-count", 8, "--max-cones", 9)
     assert refused.exit_code == 2
     assert "leave out --max-cones" in refused.output
+
+
+def test_cones_that_are_given(tmp_path):
+    vertices, faces = sphere(3)
+    path = write_obj(tmp_path / "ball.obj", vertices, faces)
+    corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / np.sqrt(3)
+    near = [int(np.linalg.norm(vertices - corner, axis=1).argmin()) for corner in corners]
+    words = ",".join(f"{vertex}:pi/2" for vertex in near)
+    done = run(path, "-o", tmp_path / "q.npz", "--quads", 600, "--cones", words, "--smooth", 0)
+    assert done.exit_code == 0, done.output
+    mesh = QuadMesh.load(tmp_path / "q.npz")
+    assert mesh.valences[mesh.irregular].tolist() == [3] * 8
+    # They lie where they are asked for, to rounding: extraction has them at corners of triangles.
+    apart = np.linalg.norm(mesh.vertices[mesh.irregular][:, None] - vertices[near], axis=2)
+    assert (apart.min(axis=0) < 1e-12).all()
+    refused = run(path, "--cones", words, "--max-cones", 9)
+    assert "with cones given there is nothing to search: leave out --max-cones" in refused.output
+    for curvatures, what in ((None, "not given"), (1.0, "is 1")):
+        cones = near if curvatures is None else dict.fromkeys(near, curvatures)
+        with pytest.raises(
+            OptionError, match=f"multiples of pi/2; that of vertex {near[0]} is.*{what.split()[-1]}"
+        ):
+            coneflat.quads(vertices, faces, cones=cones)
 
 
 def test_a_straight_boundary_loses_nothing(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -20,9 +21,11 @@ from ..mesh import NEXT
 from ..pipeline import flatten
 from ..progress import Stages
 from ..result.flattening import Flattening
+from ..result.promises import broken_promises
 from ..text import plural
 from ..threads import one_blas_thread
 from .aligned import Layout, aligned
+from .given_cones import require_quarters
 from .motions import find_motions
 from .rounding import find_rounding
 from .sides import Sides
@@ -142,7 +145,8 @@ def integer_grid(
         quads: about so many unit squares cover the surface; None: 10,000, unless a size is given.
         size: of a square in model units, instead.
         stretch: from angles, 0, to areas, 1: what the map keeps; see `StretchEnergy`.
-        options: of `coneflat.flatten`; by default cones have three, five or six quads.
+        options: of `coneflat.flatten`; by default cones have three, five or six quads. Cones that are given have
+            curvatures, multiples of pi/2; on surfaces with handles, or several boundaries, few have a grid.
 
     Raises:
         GridError: no grid of this size was found that turns no triangle over.
@@ -160,19 +164,21 @@ def integer_grid(
     if not (np.isfinite(wanted) and wanted > 0):
         raise OptionError(f"{name} must be a positive number, not {wanted!r}")
     stages = Stages(options.get("progress"))
+    told: tuple[str, ...] = ()
     if isinstance(mesh, Flattening):
         if faces is not None or options:
             raise OptionError("a flattening has its faces and options: none can be given beside it")
         result = mesh
     else:
-        defaults = OPTIONS if options.get("boundary") != "straight" else {**OPTIONS, **STRAIGHT}
         with stages("flatten"):
-            result = flatten(mesh, faces, **{**defaults, **options})
+            result = flatten(mesh, faces, **{**_defaults(options), **options})
+        # What a map does not keep of its promises is not what the grid does not keep.
+        told = tuple(note for note in result.notes if note not in broken_promises(result))
     stages.done = 1.0
     with stages("grid"), one_blas_thread():
         layout = aligned(result, None if size is not None else wanted, size)
         found = _whole(layout, StretchEnergy(stretch))
-    found = replace(found, seconds=stages.seconds)
+    found = replace(found, notes=(*told, *found.notes), seconds=stages.seconds)
     loose = _loose_border(layout) if result.settings.get("boundary") == "straight" else 0
     if not loose:
         return found
@@ -181,6 +187,15 @@ def integer_grid(
         "different loops do not point in the same directions, up to quarter turns."
     )
     return replace(found, notes=(*found.notes, note))
+
+
+def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the grid wants of a flattening with these options; cones that are given are not searched for."""
+    given = options.get("cones", "auto")
+    if isinstance(given, str):
+        return OPTIONS if options.get("boundary") != "straight" else {**OPTIONS, **STRAIGHT}
+    require_quarters(given)
+    return {"charts": "one"}
 
 
 def _loose_border(layout: Layout) -> int:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from .declared import ConeBounds, ConeNumber, RunOptions, option
-from .kinds import Choice, Count, Number, Strength
+from .kinds import Choice, Count, Number, Strength, WordOrVertices
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +26,13 @@ class QuadOptions(RunOptions, ConeBounds, ConeNumber):
         0.0, Strength(1.0), "What quads are to be alike in: from angles, 0, to sizes as well, 1."
     )
     smooth: int = option(10, Count(), "Rounds of smoothing on the surface; 0 for none.")
+    cones: str | Mapping[int, float] = option(
+        "auto",
+        WordOrVertices(("auto",), "cone"),
+        "auto: the search finds them. Or vertices, each with its curvature, a multiple of pi/2: pi/2 for three quads, "
+        "-pi/2 for five. On surfaces with handles few that are given have a grid.",
+        one_mesh=True,
+    )
     boundary: str = option(
         "free",
         Choice(("free", "straight")),

@@ -167,7 +167,7 @@ def _quads(
         joined = read_joined(file, weld)
     found = quads(joined.mesh, quads=count, progress=console.part(READ, FLATTENED), **checking(repair))
     console.seconds.update(found.seconds)
-    return found, (*joined.notes_of(()), *found.notes)
+    return found, joined.notes_of(found.notes)
 
 
 def _check_combinations(context: click.Context, kind: str) -> None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...options import QuadOptions
-from .options import is_given, keywords, option_flags
+from ...options import QuadOptions, declarations
+from ...options.declared import ConeBounds, ConeNumber
+from .options import flag_of, is_given, keywords, option_flags
 from .shared import checking, input_options, verbosity_options
 
 if TYPE_CHECKING:
@@ -67,6 +69,7 @@ def quads(
       coneflat quads hand.obj --quads 3000 --stretch 0.5
       coneflat quads sheet.obj --boundary straight -o sheet_quads.glb
       coneflat quads bunny.obj --grid bunny_grid.obj
+      coneflat quads hand.obj -o hand.npz --view hand.html
     """
     from ...files.atomic import check_target
     from ...files.grid import check_grid_output
@@ -88,7 +91,7 @@ def quads(
     require_distinct({"input": mesh, **files})
     rounds = {"smooth": options.pop("smooth")} if "smooth" in options else {}
     with Console(verbosity) as console:
-        whole, notes = _grid_of(mesh, console, {**options, **checking(repair)}, weld)
+        whole = _grid_of(mesh, console, {**options, **checking(repair)}, weld)
         found = None if output is None and view is None else _quads_of(whole, console, rounds)
         measures = None
         if found is not None:
@@ -101,7 +104,7 @@ def quads(
                 found.save(output)
             if found is not None and view is not None:
                 _write_page(found, view, mesh.name)
-        told = [*notes, *(whole if found is None else found).notes]
+        told = list((whole if found is None else found).notes)
         if report is not None:
             _write_report(report, whole, measures, told, console.seconds)
         console.say(f"note: {note}" for note in told)
@@ -113,12 +116,19 @@ def _check_combinations(context: click.Context, mesh: Path) -> None:
     """Refuse options that would have no effect."""
     if is_given(context, "quads") and is_given(context, "size"):
         raise click.UsageError("--quads (--faces) and --size say the same: leave one out", context)
-    if is_given(context, "cone_count"):
-        for name in ("distortion", "max_cones"):
+    searched = [*declarations(ConeBounds), *declarations(ConeNumber), "max_cones"]
+    rules = [
+        (is_given(context, "cone_count"), ["distortion", "max_cones"], "the number of cones is given"),
+        (
+            context.params["cones"] not in ((), ("auto",)),
+            searched,
+            "with cones given there is nothing to search",
+        ),
+    ]
+    for applies, names, reason in rules:
+        for name in names if applies else ():
             if is_given(context, name):
-                raise click.UsageError(
-                    f"the number of cones is given: leave out --{name.replace('_', '-')}", context
-                )
+                raise click.UsageError(f"{reason}: leave out {flag_of(name)}", context)
     if mesh.suffix.lower() != ".npz":
         return
     for parameter in context.command.params:
@@ -127,10 +137,8 @@ def _check_combinations(context: click.Context, mesh: Path) -> None:
             raise click.UsageError(f"{mesh} is a grid: leave out {parameter.opts[0]}", context)
 
 
-def _grid_of(
-    mesh: Path, console: Console, options: dict[str, Any], weld: bool | None
-) -> tuple[IntegerGrid, list[str]]:
-    """Return the grid of a mesh file, or that a file holds; and notes on reading it."""
+def _grid_of(mesh: Path, console: Console, options: dict[str, Any], weld: bool | None) -> IntegerGrid:
+    """Return the grid of a mesh file, with notes on reading it, or the grid that a file holds."""
     from ...files.grid import read_grid
     from ...files.read import read_joined
     from ...grid import integer_grid
@@ -138,11 +146,11 @@ def _grid_of(
 
     with console.stage("read", 0.0):
         if mesh.suffix.lower() == ".npz":
-            return read_grid(mesh), []
+            return read_grid(mesh)
         joined = read_joined(mesh, weld)
     found = integer_grid(joined.mesh, progress=console.part(READ, FLATTENED), **joined.renamed(options))
     console.seconds.update(found.seconds)
-    return found, list(joined.notes_of(()))
+    return replace(found, notes=joined.notes_of(found.notes))
 
 
 def _quads_of(grid: IntegerGrid, console: Console, rounds: dict[str, int]) -> QuadMesh:
