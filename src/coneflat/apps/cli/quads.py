@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...options import QuadOptions, declarations
+from ...options import QuadOptions, declarations, read_options
 from ...options.declared import ConeBounds, ConeNumber
 from .options import flag_of, is_given, keywords, option_flags
 from .shared import checking, input_options, verbosity_options
@@ -80,6 +80,7 @@ def quads(
 
     _check_combinations(context, mesh)
     options = keywords(method, QuadOptions)
+    read_options(options, QuadOptions)
     if output is None and grid is None and view is None:
         output = Path(f"{mesh.stem}_quads.obj")
     # What can fail at the end is looked at before the work.
