@@ -22,7 +22,8 @@ DOORS = {
     ("result.flattening", "files.written"),  # Flattening.as_written
     ("result.flattening", "files.packages"),  # Flattening.to_trimesh, .to_pyvista, .to_meshio
     ("result.flattening", "view.page.webpage"),  # Flattening.view
-    ("grid.quad_mesh", "files.quads"),  # QuadMesh.save
+    ("grid.quad_mesh", "files.quads"),  # QuadMesh.save, .load
+    ("grid.integer_grid", "files.grid"),  # IntegerGrid.save, .load
 }
 
 

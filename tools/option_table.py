@@ -8,8 +8,8 @@ from dataclasses import MISSING, Field
 from typing import Any
 
 from coneflat.apps.cli.main import cli
-from coneflat.apps.cli.options import flag_of, shown_default
-from coneflat.options import declarations
+from coneflat.apps.cli.options import flag_of, own_first, shown_default
+from coneflat.options import QuadOptions
 from coneflat.options.declared import (
     AtlasOptions,
     ConeOptions,
@@ -39,37 +39,49 @@ GROUPS = (ConeOptions, MetricOptions, SeamOptions, SymmetryOptions, AtlasOptions
 
 def flag_tables() -> str:
     """Return the options of `coneflat flatten`, a table for each group."""
-    tables = []
-    for group in GROUPS:
-        rows = [
-            (_flags(name), _values(declaration.kind), _flag_default(field, declaration), declaration.doc)
-            for name, field, declaration in _options(group)
-            if declaration.flag
-        ]
-        tables.append(_table(group, "option", rows, lambda name: f"`{flag_of(name)}`"))
-    return "\n\n".join(tables)
+    return "\n\n".join(map(_flag_table, GROUPS))
 
 
 def keyword_tables() -> str:
     """Return the keywords of `coneflat.flatten`, a table for each group."""
-    tables = []
-    for group in GROUPS:
-        rows = [
-            (f"`{name}`", _python_values(declaration.kind), _python_default(field), declaration.doc)
-            for name, field, declaration in _options(group)
-        ]
-        tables.append(_table(group, "keyword", rows, "`{}`".format))
-    return "\n\n".join(tables)
+    return "\n\n".join(map(_keyword_table, GROUPS))
+
+
+def quad_flag_table() -> str:
+    """Return the options of `coneflat quads`."""
+    return _flag_table(QuadOptions, "quads")
+
+
+def quad_keyword_table() -> str:
+    """Return the keywords of `coneflat.quads`."""
+    return _keyword_table(QuadOptions)
+
+
+def _flag_table(group: type, command: str = "flatten") -> str:
+    rows = [
+        (_flags(name, command), _values(declaration.kind), _flag_default(field, declaration), declaration.doc)
+        for name, field, declaration in _options(group)
+        if declaration.flag
+    ]
+    return _table(group, "option", rows, lambda name: f"`{flag_of(name)}`")
+
+
+def _keyword_table(group: type) -> str:
+    rows = [
+        (f"`{name}`", _python_values(declaration.kind), _python_default(field), declaration.doc)
+        for name, field, declaration in _options(group)
+    ]
+    return _table(group, "keyword", rows, "`{}`".format)
 
 
 def _table(group: type, noun: str, rows: list[tuple[str, ...]], spelled: Callable[[str], str]) -> str:
     """Return a group's title, its table, and what only one search for cones has of it."""
-    title = (group.__doc__ or "").rstrip(".")
+    title = (group.__doc__ or "").split("\n")[0].rstrip(".")
     lines = [f"### {title}", "", f"| {noun} | values | default | meaning |", "| --- " * 4 + "|"]
     for row in rows:
         assert not any("|" in cell for cell in row), row
         lines.append(f"| {' | '.join(row)} |".replace("  ", " "))
-    for search in ("pursuit", "greedy"):
+    for search in ("pursuit", "greedy") if group in GROUPS else ():
         names = [name for name, _, declaration in _options(group) if declaration.only == search]
         if names:
             lines += ["", f"Only `{search}` cones take {', '.join(map(spelled, names))}."]
@@ -78,16 +90,14 @@ def _table(group: type, noun: str, rows: list[tuple[str, ...]], spelled: Callabl
 
 def _options(group: type) -> Iterator[tuple[str, Field[Any], Declaration]]:
     """Yield a group's options, its own before those of what it is made of."""
-    known = declarations(group)
-    own = [name for name in vars(group)["__annotations__"] if name in known]
-    for name in [*own, *(name for name in known if name not in own)]:
-        yield name, *known[name]
+    for name, (field, declaration) in own_first(group):
+        yield name, field, declaration
 
 
-def _flags(name: str) -> str:
+def _flags(name: str, command: str) -> str:
     spellings = [
         opts
-        for param in cli.commands["flatten"].params
+        for param in cli.commands[command].params
         if param.name == name
         for opts in (*param.opts, *(other for other in param.secondary_opts if other.startswith("--no-")))
     ]

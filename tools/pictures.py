@@ -16,6 +16,7 @@ from markers import ROOT
 from measured import Measured
 from palette import IMAGES, save_figure_small, save_small
 from PIL import Image
+from quad_pictures import BOARDS, SUBDIVIDED, boards_figure, quads_figure, subdivided_figure
 from scipy.sparse import csr_matrix, identity
 from tables import ALLOWED, GALLERY, TRADED, TRADEOFF, tradeoff
 
@@ -76,8 +77,9 @@ def draw_pictures(measured: Measured, names: list[str]) -> None:
             save_figure_small(draw(measured), name)
     if any(fnmatch("convergence", pattern) for pattern in names):
         _draw_convergence()
-    if any(fnmatch("viewer", pattern) for pattern in names):
-        _take_screenshots(measured)
+    for name, model in (("viewer", "bunny"), ("viewer-quads", "spot")):
+        if any(fnmatch(name, pattern) for pattern in names) and measured.has(model):
+            _take_screenshots(name, model, measured)
 
 
 def _draw_convergence() -> None:
@@ -91,17 +93,19 @@ def _draw_convergence() -> None:
         save_small(picture.copy(), path.stem, dither=False)
 
 
-def _take_screenshots(measured: Measured) -> None:
+def _take_screenshots(name: str, model: str, measured: Measured) -> None:
     """Take the pictures of the viewer, where there is a browser."""
     if find_spec("playwright") is None:
         print("playwright is not installed: the pictures of the viewer are left as they are")
         return
-    from screenshots import browser_path, take_screenshots
+    from screenshots import browser_path, take_screenshot_of_quads, take_screenshots
 
     if browser_path() is None:
         print("there is no Chromium: the pictures of the viewer are left as they are")
-    elif measured.has("bunny"):
-        take_screenshots(measured.flattening("bunny"))
+    elif name == "viewer":
+        take_screenshots(measured.flattening(model))
+    else:
+        take_screenshot_of_quads(coneflat.quads(measured.path(model), quads=3000), model)
 
 
 def curvature_figure(measured: Measured) -> Any:
@@ -366,4 +370,7 @@ PICTURES: dict[str, tuple[tuple[str, ...], Callable[[Measured], Any]]] = {
     "symmetric": (("camelhead", "human"), symmetric_figure),
     "methods": (("rocker-arm",), methods_figure),
     "tradeoff": (TRADED, tradeoff_figure),
+    "quads": (("bunny",), quads_figure),
+    "quads-board": (tuple(BOARDS), boards_figure),
+    "quads-subdivided": (tuple(SUBDIVIDED), subdivided_figure),
 }

@@ -20,11 +20,17 @@ MODELS = ROOT.parent / "shared" / "meshes"
 
 def remake_options(_: argparse.Namespace | None = None) -> Iterator[tuple[Path, str]]:
     """Yield the pages with tables of options."""
-    from option_table import flag_tables, keyword_tables
+    from option_table import flag_tables, keyword_tables, quad_flag_table, quad_keyword_table
 
-    tables = {"command-line.md": ("options", flag_tables), "python.md": ("keywords", keyword_tables)}
-    for page, (name, table) in tables.items():
-        yield DOCS / page, fill((DOCS / page).read_text(encoding="utf-8"), name, table())
+    tables = {
+        "command-line.md": {"options": flag_tables, "quad options": quad_flag_table},
+        "python.md": {"keywords": keyword_tables, "quad keywords": quad_keyword_table},
+    }
+    for page, by_name in tables.items():
+        text = (DOCS / page).read_text(encoding="utf-8")
+        for name, table in by_name.items():
+            text = fill(text, name, table())
+        yield DOCS / page, text
 
 
 def remake_house(_: argparse.Namespace) -> Iterator[tuple[Path, str]]:

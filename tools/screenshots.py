@@ -5,14 +5,18 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 from palette import save_small
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
 import coneflat
+from coneflat.view.page.quads import page_of_quads
+from coneflat.view.page.webpage import write_page
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 WIDE, NARROW = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
@@ -28,6 +32,7 @@ SHOTS = (
     ("viewer-phone-light", NARROW, "light", "coneflat.state.set({show: 'picture'})"),
     ("viewer-phone-dark", NARROW, "dark", "coneflat.state.set({show: 'area'})"),
 )
+SHOTS_OF_QUADS = (("viewer-quads", {"width": 1100, "height": 620}, "light", "null"),)
 
 
 def browser_path() -> str | None:
@@ -37,11 +42,21 @@ def browser_path() -> str | None:
 
 def take_screenshots(result: coneflat.Flattening) -> None:
     """Show a flattening in the viewer, in four ways."""
+    with tempfile.TemporaryDirectory() as folder:
+        _take(result.view(Path(folder) / "page.html"), SHOTS)
+
+
+def take_screenshot_of_quads(quads: coneflat.QuadMesh, name: str) -> None:
+    """Show quads in the viewer; name: of the model."""
+    with tempfile.TemporaryDirectory() as folder:
+        _take(write_page(page_of_quads(quads, name=name), Path(folder) / "page.html"), SHOTS_OF_QUADS)
+
+
+def _take(page_path: Path, shots: Sequence[tuple[str, Any, Any, str]]) -> None:
     arguments = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
-        page_path = result.view(Path(folder) / "page.html")
+    with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=browser_path(), args=arguments)
-        for name, size, scheme, script in SHOTS:
+        for name, size, scheme, script in shots:
             context = browser.new_context(viewport=size, color_scheme=scheme, reduced_motion="reduce")
             page = context.new_page()
             page.goto(page_path.as_uri())

@@ -14,6 +14,7 @@ import numpy as np
 from markers import ROOT, blocks, fill, fill_numbers
 from measured import Measured, number_text
 
+import coneflat
 from coneflat.apps.compare import Comparison
 from coneflat.apps.compare.published import MODELS as PUBLISHED
 from coneflat.options import METHODS, PAPER, VARIANTS
@@ -33,6 +34,7 @@ TRADED = (
     "3holes", "bunny", "camelhead", "elephant", "face", "fandisk", "hand", "horse", "human", "kitten", "knight",
     "plane-holes", "rocker-arm", "spot", "stanford-bunny",
 )  # fmt: skip
+QUADS = ("bunny", "fandisk", "hand", "kitten", "rocker-arm", "spot")
 ALLOWED = (0.5, 0.35, 0.25, 0.2, 0.15, 0.1, 0.07)
 #: Area distortion that others have who make dozens of charts.
 MORE_CONES = 0.05
@@ -295,6 +297,32 @@ def convergence() -> str:
     return _table(" | ".join(headings), rows)
 
 
+def quads_table(measured: Measured, body: str) -> str:
+    """Return how good quads are, by the defaults."""
+    made = dict[str, list[str] | None]()
+    for model in QUADS:
+        path = measured.path(model)
+        if path is None:
+            made[model] = None
+            continue
+        print(f"  quads of {model}", flush=True)
+        m = coneflat.measure_quads(coneflat.quads(path))
+        made[model] = [
+            model,
+            f"{m.quads:,}",
+            f"{m.irregular}",
+            f"{m.angle_mean:.1f}, {m.angle_p95:.1f}",
+            f"{m.edge_cv:.2f}",
+            f"{m.jacobian_mean:.3f}, {m.jacobian_min:.2f}",
+            f"{m.hausdorff / m.edge_mean:.2f}",
+        ]
+    headings = (
+        "model | quads | irregular vertices | degrees off 90: mean, 95% below | edge lengths, cv | "
+        "scaled Jacobian: mean, least | distance, edges"
+    )
+    return _table(headings, list(_each(QUADS, body, made)))
+
+
 #: What makes each table, from what there is of models, and from what stands there.
 TABLES: dict[str, Callable[[Measured, str], str]] = {
     "quality": quality_table,
@@ -305,4 +333,5 @@ TABLES: dict[str, Callable[[Measured, str], str]] = {
     "readings": readings_table,
     "convergence": lambda _, was: convergence(),
     "atlases": atlases_table,
+    "quads": quads_table,
 }

@@ -1,19 +1,29 @@
-"""Writing meshes of quads."""
+"""Writing and reading meshes of quads."""
 
 from __future__ import annotations
 
+import json
+import zipfile
+from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
+from .archive import CheckedArrays, number, read_archive
 from .atomic import as_path, atomic_write, check_target, known_ending
+from .gltf.quads import write_quads_glb
 from .obj_write import lines_of
 
+if TYPE_CHECKING:
+    from ..grid import QuadMesh
+
 #: Endings of the files that `write_quads` writes.
-QUAD_FORMATS = (".obj", ".ply")
+QUAD_FORMATS = (".obj", ".ply", ".glb", ".npz")
 _FACE = np.dtype([("count", "u1"), ("corners", "<i4", 4)])
+#: Arrays from which a mesh of quads is made again.
+_NAMES = ("vertices", "quads", "faces", "barycentric", "surface_vertices", "surface_faces", "report")
 
 
 def check_quads_output(path: str | PathLike[str]) -> Path:
@@ -29,39 +39,111 @@ def check_quads_output(path: str | PathLike[str]) -> Path:
     return path
 
 
-def write_quads(path: str | PathLike[str], vertices: FloatArray, quads: IntArray) -> Path:
+def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
     """Write a mesh of quads, in full or not at all, and return the path.
 
-    An .obj has the fewest digits from which the same numbers are read; a .ply is binary, coordinates as doubles.
+    An .obj has the fewest digits from which the same numbers are read; a .ply is binary, coordinates as doubles. A
+    .glb, which knows no quads, has two triangles for each, and their edges as lines; see `write_quads_glb`. An .npz has
+    all arrays of the `QuadMesh`, from which `read_quads` makes it again, and the irregular vertices with
+    their valences.
 
     Args:
         path: the file.
-        vertices, quads: (q, 3), (p, 4).
+        mesh: what to write.
 
     Raises:
         UnknownFormatError: the ending is not one of `QUAD_FORMATS`.
         MeshFileError: the file cannot be written.
     """
     path = check_quads_output(path)
+    writers: dict[str, Callable[[QuadMesh, IO[bytes]], None]] = {
+        ".obj": _write_obj,
+        ".ply": _write_ply,
+        ".glb": write_quads_glb,
+        ".npz": _write_npz,
+    }
     with atomic_write(path) as stream:
-        if path.suffix.lower() == ".obj":
-            stream.writelines(lines_of("v", vertices, b"\n"))
-            stream.writelines(lines_of("f", quads + 1, b"\n"))
-        else:
-            faces = np.empty(len(quads), _FACE)
-            faces["count"] = 4
-            faces["corners"] = quads
-            header = [
-                "ply",
-                "format binary_little_endian 1.0",
-                "comment quads by coneflat",
-                f"element vertex {len(vertices)}",
-                *(f"property double {axis}" for axis in "xyz"),
-                f"element face {len(faces)}",
-                "property list uchar int vertex_indices",
-                "end_header",
-            ]
-            stream.write(("\n".join(header) + "\n").encode("ascii"))
-            stream.write(np.ascontiguousarray(vertices, "<f8").data)
-            stream.write(faces.data)
+        writers[path.suffix.lower()](mesh, stream)
     return path
+
+
+def _write_obj(mesh: QuadMesh, stream: IO[bytes]) -> None:
+    stream.writelines(lines_of("v", mesh.vertices, b"\n"))
+    stream.writelines(lines_of("f", mesh.quads + 1, b"\n"))
+
+
+def _write_ply(mesh: QuadMesh, stream: IO[bytes]) -> None:
+    faces = np.empty(len(mesh.quads), _FACE)
+    faces["count"] = 4
+    faces["corners"] = mesh.quads
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        "comment quads by coneflat",
+        f"element vertex {len(mesh.vertices)}",
+        *(f"property double {axis}" for axis in "xyz"),
+        f"element face {len(faces)}",
+        "property list uchar int vertex_indices",
+        "end_header",
+    ]
+    stream.write(("\n".join(header) + "\n").encode("ascii"))
+    stream.write(np.ascontiguousarray(mesh.vertices, "<f8").data)
+    stream.write(faces.data)
+
+
+def _write_npz(mesh: QuadMesh, stream: IO[bytes]) -> None:
+    report = {"left_out": mesh.left_out, "area_left_out": mesh.area_left_out, "notes": list(mesh.notes)}
+    np.savez(
+        stream,
+        vertices=mesh.vertices,
+        quads=mesh.quads,
+        faces=mesh.faces,
+        barycentric=mesh.barycentric,
+        surface_vertices=mesh.surface.vertices,
+        surface_faces=mesh.surface.faces,
+        irregular=mesh.irregular,
+        valences=mesh.valences[mesh.irregular],
+        report=np.array(json.dumps(report)),
+    )
+
+
+def holds_quads(path: str | PathLike[str]) -> bool:
+    """Return whether a file is an archive with quads, whatever else may be wrong with it."""
+    path = as_path(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return path.suffix.lower() == ".npz" and "quads.npy" in archive.namelist()
+    except (OSError, ValueError, zipfile.BadZipFile):
+        return False
+
+
+def read_quads(path: str | PathLike[str]) -> QuadMesh:
+    """Return a mesh of quads that was written as .npz.
+
+    Raises:
+        UnknownFormatError: the ending is another.
+        MeshFileError: the file is not there, may not be read, or holds no mesh of quads.
+    """
+    path = as_path(path)
+    known_ending(path, (".npz",), "quads with their surface are read from")
+    return read_archive(path, _NAMES, _quad_mesh)
+
+
+def _quad_mesh(reading: CheckedArrays) -> QuadMesh:
+    from ..grid import QuadMesh
+    from ..mesh import TriangleMesh
+
+    reading.need(_NAMES, "mesh of quads")
+    report = reading.report()
+    vertices, surface = reading.finite("vertices", (None, 3)), reading.finite("surface_vertices", (None, 3))
+    faces = reading.indices("surface_faces", (None, 3), len(surface))
+    return QuadMesh(
+        vertices=vertices,
+        quads=reading.indices("quads", (None, 4), len(vertices)),
+        faces=reading.indices("faces", (len(vertices),), len(faces)),
+        barycentric=reading.finite("barycentric", (len(vertices), 3)),
+        left_out=int(number(report["left_out"])),
+        area_left_out=number(report["area_left_out"]),
+        surface=TriangleMesh(surface, faces),
+        notes=reading.notes(report),
+    )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,15 +17,19 @@ from ..geometry.planar import map_factors, sides_between, signed_angles, signed_
 from ..geometry.triangles import double_areas
 from ..layout.relax import Lines, PointConstraints, Relaxed, StretchEnergy, relax
 from ..layout.relax.relax import rest_sides
-from ..mesh import NEXT, PREVIOUS
+from ..mesh import NEXT
 from ..pipeline import flatten
+from ..progress import Stages
 from ..result.flattening import Flattening
+from ..result.promises import broken_promises
 from ..text import plural
 from ..threads import one_blas_thread
 from .aligned import Layout, aligned
+from .given_cones import require_quarters
+from .motions import find_motions
 from .rounding import find_rounding
 from .sides import Sides
-from .transitions import UNITS, Transitions, find_transitions
+from .transitions import Transitions, find_transitions
 
 # What the grid wants of a flattening: three, five or six quads at a cone, and rotations that are quarter turns.
 OPTIONS = {
@@ -69,6 +76,7 @@ class IntegerGrid:
         notes: what was done, one sentence each.
         corners: (k,) vertices on grid points where straight sides of the boundary meet; sides lie on grid lines.
         corner_quarters: (k,) the quarter turns of their angle: 1, 3 or more.
+        seconds: wall time of each stage; files do not keep it.
     """
 
     vertices: FloatArray
@@ -89,6 +97,36 @@ class IntegerGrid:
     notes: tuple[str, ...] = ()
     corners: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     corner_quarters: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def report(self) -> dict[str, float | None]:
+        """Return the numbers among the attributes by name, as JSON takes them: None for what is not known."""
+        numbers = {name: value for name, value in vars(self).items() if isinstance(value, float)}
+        return {name: float(value) if np.isfinite(value) else None for name, value in numbers.items()}
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the grid as .obj or .npz, in full or not at all, and return the path; see `write_grid`.
+
+        Raises:
+            UnknownFormatError: the ending is another.
+            MeshFileError: the file cannot be written.
+        """
+        from ..files.grid import write_grid
+
+        return write_grid(path, self)
+
+    @staticmethod
+    def load(path: str | PathLike[str]) -> IntegerGrid:
+        """Return the grid that an .npz or .obj file holds; see `read_grid`.
+
+        Raises:
+            UnknownFormatError: the ending is another.
+            MeshFileError: the file is not there, may not be read, or holds no manifold of triangles with UVs.
+            GridError: the UVs are no integer-grid map.
+        """
+        from ..files.grid import read_grid
+
+        return read_grid(path)
 
 
 def integer_grid(
@@ -107,7 +145,8 @@ def integer_grid(
         quads: about so many unit squares cover the surface; None: 10,000, unless a size is given.
         size: of a square in model units, instead.
         stretch: from angles, 0, to areas, 1: what the map keeps; see `StretchEnergy`.
-        options: of `coneflat.flatten`; by default cones have three, five or six quads.
+        options: of `coneflat.flatten`; by default cones have three, five or six quads. Cones that are given have
+            curvatures, multiples of pi/2; on surfaces with handles, or several boundaries, few have a grid.
 
     Raises:
         GridError: no grid of this size was found that turns no triangle over.
@@ -124,16 +163,22 @@ def integer_grid(
     wanted, name = (size, "size") if size is not None else (10_000 if quads is None else quads, "quads")
     if not (np.isfinite(wanted) and wanted > 0):
         raise OptionError(f"{name} must be a positive number, not {wanted!r}")
+    stages = Stages(options.get("progress"))
+    told: tuple[str, ...] = ()
     if isinstance(mesh, Flattening):
         if faces is not None or options:
             raise OptionError("a flattening has its faces and options: none can be given beside it")
         result = mesh
     else:
-        defaults = OPTIONS if options.get("boundary") != "straight" else {**OPTIONS, **STRAIGHT}
-        result = flatten(mesh, faces, **{**defaults, **options})
-    layout = aligned(result, None if size is not None else wanted, size)
-    with one_blas_thread():
+        with stages("flatten"):
+            result = flatten(mesh, faces, **{**_defaults(options), **options})
+        # What a map does not keep of its promises is not what the grid does not keep.
+        told = tuple(note for note in result.notes if note not in broken_promises(result))
+    stages.done = 1.0
+    with stages("grid"), one_blas_thread():
+        layout = aligned(result, None if size is not None else wanted, size)
         found = _whole(layout, StretchEnergy(stretch))
+    found = replace(found, notes=(*told, *found.notes), seconds=stages.seconds)
     loose = _loose_border(layout) if result.settings.get("boundary") == "straight" else 0
     if not loose:
         return found
@@ -142,6 +187,15 @@ def integer_grid(
         "different loops do not point in the same directions, up to quarter turns."
     )
     return replace(found, notes=(*found.notes, note))
+
+
+def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the grid wants of a flattening with these options; cones that are given are not searched for."""
+    given = options.get("cones", "auto")
+    if isinstance(given, str):
+        return OPTIONS if options.get("boundary") != "straight" else {**OPTIONS, **STRAIGHT}
+    require_quarters(given)
+    return {"charts": "one"}
 
 
 def _loose_border(layout: Layout) -> int:
@@ -254,7 +308,7 @@ def _described(
     tries: int,
 ) -> IntegerGrid:
     mesh, corners = layout.mesh, layout.corners
-    turns, shifts = _across(layout, points)
+    turns, shifts, _ = find_motions(mesh, _pairs(points)[corners])
     angles = signed_angles(sides_between(_pairs(points)[corners]))
     sums = np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
     quarters = np.rint(sums / (np.pi / 2)).astype(np.int64)
@@ -288,20 +342,6 @@ def _described(
         least_area=_distortion(layout, points)[1],
         notes=tuple(notes),
     )
-
-
-def _across(layout: Layout, points: ComplexArray) -> tuple[IntArray, IntArray]:
-    """Return (3m,) quarter turns and (3m, 2) shifts of half-edges: from the triangle across to their own."""
-    mesh, corners = layout.mesh, layout.corners
-    starts, ends = corners[:, NEXT].ravel(), corners[:, PREVIOUS].ravel()
-    turns = np.full(len(starts), -1, dtype=np.int64)
-    shifts = np.zeros(len(starts), dtype=np.complex128)
-    pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
-    for h, t in (pairs.T, pairs[:, ::-1].T):
-        own, other = points[ends[h]] - points[starts[h]], points[starts[t]] - points[ends[t]]
-        turns[h] = np.rint(np.angle(own / other) / (np.pi / 2)).astype(np.int64) % 4
-        shifts[h] = points[starts[h]] - UNITS[turns[h]] * points[ends[t]]
-    return turns, np.rint(_pairs(shifts)).astype(np.int64)
 
 
 def _moves(layout: Layout, smooth: ComplexArray, points: ComplexArray) -> tuple[float, float]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, dots
 from ..errors import GridError
 from ..mesh import TriangleMesh, sort_pairs
 from ..text import list_some, plural
@@ -29,6 +29,7 @@ class QuadMesh:
             on grid lines; negative, should a quad lie over a hole.
         surface: the triangle mesh.
         notes: what was done, and what falls short, one sentence each.
+        seconds: wall time of each stage; files do not keep it.
     """
 
     vertices: FloatArray
@@ -39,6 +40,7 @@ class QuadMesh:
     area_left_out: float
     surface: TriangleMesh
     notes: tuple[str, ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
 
     @cached_property
     def _edges(self) -> tuple[IntArray, IntArray]:
@@ -66,6 +68,20 @@ class QuadMesh:
         return mask
 
     @cached_property
+    def triangle_corners(self) -> IntArray:
+        """(2p, 3) corners of quads, 4 q + i, of the two triangles on either side of each quad's shorter diagonal."""
+        corners = self.vertices[self.quads]
+        one, two = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+        turn = np.where(dots(one, one) <= dots(two, two), 0, 1)
+        rolled = 4 * np.arange(len(self.quads))[:, None] + (np.arange(4) + turn[:, None]) % 4
+        return rolled[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+
+    @property
+    def triangles(self) -> IntArray:
+        """(2p, 3) vertex indices of these triangles, those of each quad one after the other."""
+        return self.quads.ravel()[self.triangle_corners]
+
+    @cached_property
     def valences(self) -> IntArray:
         """(q,) the number of edges at each vertex."""
         return np.bincount(self.edges.ravel(), minlength=len(self.vertices))
@@ -87,7 +103,7 @@ class QuadMesh:
         return self.surface.euler_characteristic - unused
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the mesh as .obj or .ply, in full or not at all, and return the path; see `write_quads`.
+        """Write the mesh as .obj, .ply, .glb or .npz, in full or not at all, and return the path; see `write_quads`.
 
         Raises:
             UnknownFormatError: the ending is another.
@@ -95,7 +111,19 @@ class QuadMesh:
         """
         from ..files.quads import write_quads
 
-        return write_quads(path, self.vertices, self.quads)
+        return write_quads(path, self)
+
+    @staticmethod
+    def load(path: str | PathLike[str]) -> QuadMesh:
+        """Return a mesh that was saved as .npz, with the surface that it lies on.
+
+        Raises:
+            UnknownFormatError: the ending is another.
+            MeshFileError: the file is not there, may not be read, or holds no mesh of quads.
+        """
+        from ..files.quads import read_quads
+
+        return read_quads(path)
 
 
 def require_manifold(quads: IntArray, vertex_count: int, edge_count: int) -> None:

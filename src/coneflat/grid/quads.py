@@ -9,6 +9,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ..errors import OptionError
+from ..progress import Stages
 from ..text import plural
 from .extract import extract_quads
 from .integer_grid import IntegerGrid, integer_grid
@@ -33,7 +34,8 @@ def quads(
     """Return a quad mesh of a surface: all faces are quads, and irregular vertices are the cones of a flattening.
 
     Args:
-        mesh, faces: as `coneflat.flatten` takes them; or an `IntegerGrid`, and none of the options but `smooth`.
+        mesh, faces: as `coneflat.flatten` takes them; or an `IntegerGrid`, and of the options only `smooth` and
+            `progress`.
         quads: about how many; None: 10,000, unless a size is given.
         size: of a quad's edges in model units, instead.
         stretch: from angles, 0, to areas, 1: what quads are to be alike in; see `integer_grid`.
@@ -45,14 +47,20 @@ def quads(
         OptionError: an option makes no sense.
         MeshError, CurvatureError, SeamError, MetricError: as `coneflat.flatten`.
     """
+    progress = options.get("progress")
     if isinstance(mesh, IntegerGrid):
-        if faces is not None or quads is not None or size is not None or options:
+        if faces is not None or quads is not None or size is not None or options.keys() - {"progress"}:
             raise OptionError("a grid has its faces, size and options: none can be given beside it")
         grid = mesh
     else:
         grid = integer_grid(mesh, faces, quads=quads, size=size, stretch=stretch, **options)
-    found = smooth_quads(extract_quads(grid), smooth)
-    return replace(found, notes=(*grid.notes, *_notes(found)))
+    stages = Stages(progress)
+    stages.done = 1.0
+    with stages("extract"):
+        found = extract_quads(grid)
+    with stages("smooth"):
+        found = smooth_quads(found, smooth)
+    return replace(found, notes=(*grid.notes, *_notes(found)), seconds={**grid.seconds, **stages.seconds})
 
 
 def _notes(found: QuadMesh) -> Iterator[str]:

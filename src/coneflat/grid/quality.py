@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -27,6 +28,7 @@ class QuadMeasures:
         irregular: inner vertices whose valence is not 4.
         irregular_valences: how many of each valence.
         euler_characteristic: vertices minus edges plus quads.
+        surface_euler: that of the surface, which it is unless squares were left out.
         boundary_edges: edges with one quad.
         angle_mean, angle_p95, angle_max: of all corner angles, degrees off 90.
         edge_mean, edge_cv: of edge lengths, the mean, and the standard deviation over it.
@@ -43,6 +45,7 @@ class QuadMeasures:
     irregular: int
     irregular_valences: dict[int, int]
     euler_characteristic: int
+    surface_euler: int
     boundary_edges: int
     angle_mean: float
     angle_p95: float
@@ -61,6 +64,43 @@ class QuadMeasures:
         """Return the measures by name, as JSON takes them."""
         return asdict(self)
 
+    def rows(self) -> Iterator[tuple[str, str, str]]:
+        """Yield what people are told: measure, value, meaning."""
+        valences = ", ".join(f"{count:,} of {valence}" for valence, count in self.irregular_valences.items())
+        apart = self.hausdorff / self.edge_mean
+        holds = self.euler_characteristic == self.surface_euler
+        yield (
+            "quads",
+            f"{self.quads:,}",
+            f"Euler characteristic {self.euler_characteristic}, "
+            + ("as the surface" if holds else f"not {self.surface_euler} as the surface"),
+        )
+        yield (
+            "irregular",
+            f"{self.irregular:,}",
+            f"inner vertices of other valence than 4: {valences or 'none'}",
+        )
+        yield (
+            "off 90 deg",
+            f"{self.angle_mean:.2f}",
+            f"mean; 95% below {self.angle_p95:.1f}, worst {self.angle_max:.1f}",
+        )
+        yield (
+            "edge cv",
+            f"{self.edge_cv:.3f}",
+            f"standard deviation of edge lengths over their mean, {self.edge_mean:.4g}",
+        )
+        yield (
+            "Jacobian",
+            f"{self.jacobian_mean:.3f}",
+            f"scaled, mean of each quad's least; least {self.jacobian_min:.3f}",
+        )
+        yield (
+            "distance",
+            f"{self.hausdorff:.3g}",
+            f"from the surface and back, the largest of samples; {apart:.2f} edges",
+        )
+
 
 def measure_quads(quads: QuadMesh) -> QuadMeasures:
     """Return the measures of a quad mesh on a surface."""
@@ -76,6 +116,7 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
         irregular=len(quads.irregular),
         irregular_valences=dict(zip(which.tolist(), many.tolist(), strict=True)),
         euler_characteristic=quads.euler_characteristic,
+        surface_euler=quads.surface_euler,
         boundary_edges=int(quads.is_boundary_edge.sum()),
         angle_mean=float(off.mean()),
         angle_p95=float(np.percentile(off, 95)),
@@ -114,12 +155,8 @@ def surface_gaps(quads: QuadMesh) -> tuple[float, float]:
     # Corners are the same for several quads.
     inner = np.einsum("si,pix->psx", patch[patch.max(axis=1) < 1], corners).reshape(-1, 3)
     there = surface_distances(mesh.vertices, mesh.faces, np.concatenate([quads.vertices, inner]))
-    one, two = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
-    turn = np.where(dots(one, one) <= dots(two, two), 0, 1)
-    rolled = np.take_along_axis(quads.quads, (np.arange(4) + turn[:, None]) % 4, axis=1)
-    halves = np.concatenate([rolled[:, [0, 1, 2]], rolled[:, [0, 2, 3]]])
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    back = surface_distances(quads.vertices, halves, _samples(mesh, float(sides.mean()) / 2))
+    back = surface_distances(quads.vertices, quads.triangles, _samples(mesh, float(sides.mean()) / 2))
     return float(there.max()), float(back.max())
 
 

@@ -19,7 +19,7 @@ from ..mesh import label_components, sort_pairs
 from ..text import plural
 from .mesh_file import MeshFile
 from .triangulate import triangulate
-from .validation import LEFT_OUT, left_out
+from .validation import is_left_out, left_out
 from .weld import weld as number_places
 
 
@@ -63,7 +63,7 @@ class Joined:
 
     def notes_of(self, notes: Sequence[str]) -> tuple[str, ...]:
         """Return these notes and those on a result; vertices that another is used for are not left out."""
-        kept = [note for note in notes if not (self.merged and note.startswith(LEFT_OUT))]
+        kept = [note for note in notes if not (self.merged and is_left_out(note))]
         lone = len(self.used) - len(np.unique(self.mesh.corners)) - self.merged
         return (*self.notes(), *kept, *[left_out(lone)] * (self.merged > 0 and lone > 0))
 

@@ -72,12 +72,17 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -
     return _Check(points, triangles, True).run()
 
 
-LEFT_OUT = "Left out "
+LEFT_OUT, FACELESS = "Left out ", " without a face."
 
 
 def left_out(count: int) -> str:
     """Return the note that vertices belong to no face."""
-    return f"{LEFT_OUT}{plural(count, 'vertex', 'vertices')} without a face."
+    return f"{LEFT_OUT}{plural(count, 'vertex', 'vertices')}{FACELESS}"
+
+
+def is_left_out(note: str) -> bool:
+    """Return whether a note is `left_out`'s."""
+    return note.startswith(LEFT_OUT) and note.endswith(FACELESS)
 
 
 def _as_vertices(vertices: ArrayLike) -> FloatArray:

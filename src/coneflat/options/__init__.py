@@ -13,6 +13,7 @@ from .declared import (
     CurveOptions,
     FindOptions,
 )
+from .quads import QuadOptions
 from .reading import declarations, read_options, settings, takes
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "CurveOptions",
     "FindOptions",
     "Options",
+    "QuadOptions",
     "declarations",
     "read_options",
     "settings",

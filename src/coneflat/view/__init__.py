@@ -8,6 +8,7 @@ from .figures.figure import FIGURE_FORMATS, check_figure_target, new_figure, sav
 from .figures.kinds import KINDS, Look, make_figure
 from .figures.model import draw_checker, draw_cones, draw_curvature, draw_quality
 from .figures.projection import MeshPicture, render_mesh
+from .figures.quads import draw_quads
 from .figures.uv_layout import draw_layout
 from .quantity import ColorScale, Quantity
 
@@ -25,6 +26,7 @@ __all__ = [
     "draw_cones",
     "draw_curvature",
     "draw_layout",
+    "draw_quads",
     "draw_quality",
     "make_figure",
     "new_figure",

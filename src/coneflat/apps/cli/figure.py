@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
-from .shared import Eye, again_option, input_options, up_option, verbosity_options
+from ...errors import OptionError
+from .shared import Eye, again_option, checking, input_options, up_option, verbosity_options
 
-KINDS = ("layout", "checker", "quality", "cones", "curvature", "curve")
+if TYPE_CHECKING:
+    from ...grid import QuadMesh
+    from .console import Console
+
+KINDS = ("layout", "checker", "quality", "cones", "curvature", "curve", "quads")
 
 _VIEWS = ("checker", "quality", "cones", "curvature")
 #: The kinds that an option means something for.
 _TAKEN_BY = {
-    "eye": _VIEWS,
-    "up": _VIEWS,
+    "eye": (*_VIEWS, "quads"),
+    "up": (*_VIEWS, "quads"),
     "colors": ("quality", "curvature"),
     "cells": ("checker",),
     "color_charts": ("layout",),
     "most": ("curve",),
+    "quads": ("quads",),
     "again": ("layout", *_VIEWS),
 }
 
@@ -34,7 +40,7 @@ _TAKEN_BY = {
     show_default=True,
     help="layout: the charts in the unit square.  checker: the model with a checkerboard.  quality: distortion of "
     "angles and scale.  cones: cones and seams on the model.  curvature: before and after.  curve: distortion "
-    "against the number of cones.",
+    "against the number of cones.  quads: the model made into quads.",
 )
 @click.option(
     "-o",
@@ -65,6 +71,7 @@ _TAKEN_BY = {
 @click.option(
     "--most", type=int, default=30, show_default=True, help="Of the curve: the largest number of cones."
 )
+@click.option("--quads", type=int, help="Of quads: about how many.  [default: 10000]")
 @again_option
 @input_options
 @click.option("--title", default="", help="A line above all.")
@@ -78,6 +85,7 @@ def figure(
     output: Path | None,
     eye: tuple[Any, ...],
     most: int,
+    quads: int | None,
     again: bool,
     repair: bool,
     weld: bool | None,
@@ -90,6 +98,7 @@ def figure(
     Examples:
       coneflat figure bunny.obj --kind layout -o bunny.svg
       coneflat figure horse.ply --kind checker --up z --eye right-back --eye left-front
+      coneflat figure hand.obj --kind quads --quads 3000
       coneflat flatten horse.ply -o horse.npz --distortion 0.1 && coneflat figure horse.npz --kind quality
     """
     from ...curve import cone_curve
@@ -117,6 +126,9 @@ def figure(
                     strict=not repair,
                     progress=console.part(READ, FLATTENED),
                 )
+        elif kind == "quads":
+            shown, notes = _quads(mesh, console, quads, repair=repair, weld=weld)
+            console.say(f"note: {note}" for note in notes)
         else:
             shown = open_result(mesh, console, again=again, repair=repair, weld=weld)
             console.say(f"note: {note}" for note in shown.notes)
@@ -135,6 +147,27 @@ def _surface(file: Path, weld: bool | None) -> tuple[Any, tuple[str, ...]]:
         return joined.mesh, joined.notes()
     result = read_flattening(file)
     return (result.vertices, result.faces), ()
+
+
+def _quads(
+    file: Path, console: Console, count: int | None, *, repair: bool, weld: bool | None
+) -> tuple[QuadMesh, tuple[str, ...]]:
+    """Return the quads that a .npz file holds, or those of a mesh; and notes on them."""
+    from ...files.quads import read_quads
+    from ...files.read import read_joined
+    from ...grid.quads import quads
+    from .run import FLATTENED, READ
+
+    with console.stage("read", 0.0):
+        if file.suffix.lower() == ".npz":
+            if count is not None:
+                raise OptionError(f"{file} holds quads: leave out --quads")
+            found = read_quads(file)
+            return found, found.notes
+        joined = read_joined(file, weld)
+    found = quads(joined.mesh, quads=count, progress=console.part(READ, FLATTENED), **checking(repair))
+    console.seconds.update(found.seconds)
+    return found, joined.notes_of(found.notes)
 
 
 def _check_combinations(context: click.Context, kind: str) -> None:

@@ -33,7 +33,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 #: Options that `shared.input_options` adds.
 OF_INPUT = ("repair", "strict")
 #: Other spellings of flags.
-SPELLINGS = {"quantise": ("--quantize",)}
+SPELLINGS = {"quantise": ("--quantize",), "quads": ("--faces",)}
 
 paper_option = click.option(
     "--paper",
@@ -99,13 +99,13 @@ def flag_of(name: str) -> str:
 
 
 def option_flags(group: type, *, one_mesh: bool) -> Callable[[Command], Command]:
-    """Return a decorator that adds the flags of a group of options to a command.
+    """Return a decorator that adds the flags of a group of options to a command, the group's own first.
 
     one_mesh: also those that name vertices of one mesh.
     """
     chosen = [
         (name, field, declaration)
-        for name, (field, declaration) in declarations(group).items()
+        for name, (field, declaration) in own_first(group)
         if declaration.flag and name not in OF_INPUT and (one_mesh or _may_fit_any_mesh(declaration))
     ]
 
@@ -115,6 +115,13 @@ def option_flags(group: type, *, one_mesh: bool) -> Callable[[Command], Command]
         return command
 
     return decorate
+
+
+def own_first(group: type) -> list[tuple[str, tuple[Field[Any], Declaration]]]:
+    """Return the options of a group, its own before those of the groups that it is made of."""
+    known = declarations(group)
+    own = [name for name in vars(group).get("__annotations__", {}) if name in known]
+    return [(name, known[name]) for name in dict.fromkeys([*own, *known])]
 
 
 def _may_fit_any_mesh(declaration: Declaration) -> bool:

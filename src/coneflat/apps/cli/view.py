@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -50,8 +51,9 @@ def view(
 ) -> None:
     """Write a page, one HTML file, that shows FILE and its layout side by side.
 
-    FILE is a result, .npz as `coneflat flatten -o` writes it, or a mesh (.obj, .ply, .stl, .off, .gltf, .glb): the
-    UVs that it has are shown; without, it is flattened first with default options, without overlaps.
+    FILE is a result, .npz as `coneflat flatten` writes it, quads, as `coneflat quads` does, or a mesh (.obj, .ply,
+    .stl, .off, .gltf, .glb): the UVs that it has are shown; without, it is flattened first with default options,
+    without overlaps.
 
     \b
     Examples:
@@ -59,8 +61,11 @@ def view(
       coneflat view horse_uv.obj --show qc
       coneflat view horse.npz -o horse.html --show qc
       coneflat view hand.obj -o hand.html --texture leather.jpg
+      coneflat quads hand.obj -o hand.npz && coneflat view hand.npz
     """
+    from ...files.quads import holds_quads, read_quads
     from ...files.texture import read_picture
+    from ...view.page.quads import page_of_quads
     from ...view.page.webpage import check_page, open_page, page_of, write_page
     from .console import Console
     from .run import FLATTENED, open_result
@@ -70,12 +75,24 @@ def view(
     if texture is not None:
         read_picture(texture)
     with Console(verbosity) as console:
-        result = open_result(file, console, again=again, repair=repair, weld=weld)
-        with console.stage("page", FLATTENED):
-            text = page_of(
-                result, name=file.name, texture=texture, up=up, show=show, most_triangles=most_triangles
-            )
-            write_page(text, page)
+        look: dict[str, Any] = {
+            "name": file.name,
+            "texture": texture,
+            "up": up,
+            "show": show,
+            "most_triangles": most_triangles,
+        }
+        result = None
+        if holds_quads(file):
+            with console.stage("read", 0.0):
+                quads = read_quads(file)
+            with console.stage("page", FLATTENED):
+                text = page_of_quads(quads, **look)
+        else:
+            result = open_result(file, console, again=again, repair=repair, weld=weld)
+            with console.stage("page", FLATTENED):
+                text = page_of(result, **look)
+        write_page(text, page)
         console.finish([page], result)
         if output is None and not open_page(page):
             console.say(["open it in any browser"])

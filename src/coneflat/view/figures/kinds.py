@@ -19,11 +19,13 @@ from .compose import Panel, Row, check_pixels, compose
 from .cone_curve import draw_cone_curve
 from .cone_marks import mark_handles
 from .model import DOTS_PER_INCH, draw_checker, draw_cones, draw_curvature, draw_quality
+from .quads import draw_quads, irregular_handles
 from .uv_layout import draw_layout, layout_aspect
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from ...grid import QuadMesh
     from ...result.flattening import Flattening
 
 CURVE_ASPECT, CURVE_HEIGHT = 1.6, 3.2
@@ -71,11 +73,12 @@ class Look:
             check_color_map(self.colors)
 
     def views(
-        self, result: Flattening, draw: Callable[..., object], label: str = "", **options: Any
+        self, result: Flattening | QuadMesh, draw: Callable[..., object], label: str = "", **options: Any
     ) -> list[Panel]:
         """Return a panel for each eye, in which a function draws the model."""
         options |= {"up": self.up, "dpi": self.dpi}
-        vertices = result.vertices[np.unique(result.faces)]
+        faces = result.quads if hasattr(result, "quads") else result.faces
+        vertices = result.vertices[np.unique(faces)]
         return [
             Panel(
                 view_aspect(vertices, eye, self.up),
@@ -86,28 +89,31 @@ class Look:
         ]
 
 
-def make_figure(shown: Flattening | ConeCurve, kind: str, **look: Any) -> Figure:
+def make_figure(shown: Flattening | ConeCurve | QuadMesh, kind: str, **look: Any) -> Figure:
     """Return a figure for print, which `save_figure` writes.
 
     Args:
-        shown: the flattening; of the kind "curve" a `ConeCurve`.
+        shown: the flattening; of the kind "curve" a `ConeCurve`, of the kind "quads" a `QuadMesh`.
         kind: "layout": the charts in the unit square with cones. "checker": the model with a checkerboard through
             its UVs. "quality": distortion of angles and of scale on the model and in the layout. "cones": the model
             with cones and seams. "curvature": angles missing around vertices, before and after. "curve": area
-            distortion against the number of cones.
+            distortion against the number of cones. "quads": the edges of quads, and their irregular vertices.
         look: `size` in inches, `dpi`, `eyes` to see the model from and its axis `up`, `colors`, `cells` of the
             checkerboard, `color_charts`, `distortion` wanted, `title`: the attributes of `coneflat.view.Look`.
 
     Raises:
         OptionError: an option makes no sense, or matplotlib is not installed.
     """
+    from ...grid.quad_mesh import QuadMesh
+
     if not isinstance(kind, str) or kind not in KINDS:
         raise OptionError(f"unknown kind of figure {text.shown(kind)}: choose from {', '.join(KINDS)}")
-    if isinstance(shown, ConeCurve) != (kind == "curve"):
-        raise OptionError(
-            "figures of the kind 'curve', and no others, show what `coneflat.cone_curve` returns"
-        )
-    if kind != "curve" and not hasattr(shown, "uv_faces"):
+    for name, own, maker in (("curve", ConeCurve, "cone_curve"), ("quads", QuadMesh, "quads")):
+        if isinstance(shown, own) != (kind == name):
+            raise OptionError(
+                f"figures of the kind {name!r}, and no others, show what `coneflat.{maker}` returns"
+            )
+    if kind not in ("curve", "quads") and not hasattr(shown, "uv_faces"):
         raise OptionError(f"a figure shows what `coneflat.flatten` returns, not {text.shown(shown)}")
     chosen = Look(**look)
     rows, marks = _ROWS[kind](shown, chosen)
@@ -161,6 +167,10 @@ def _curve(curve: ConeCurve, look: Look) -> _Rows:
     return [Row([panel], tallest=CURVE_HEIGHT)], []
 
 
+def _quads(quads: QuadMesh, look: Look) -> _Rows:
+    return [Row(look.views(quads, draw_quads))], irregular_handles(quads)
+
+
 _ROWS: dict[str, Callable[[Any, Look], _Rows]] = {
     "layout": _layout,
     "checker": _checker,
@@ -168,6 +178,7 @@ _ROWS: dict[str, Callable[[Any, Look], _Rows]] = {
     "cones": _cones,
     "curvature": _curvature,
     "curve": _curve,
+    "quads": _quads,
 }
 
 KINDS = tuple(_ROWS)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -38,14 +38,37 @@ class Payload(NamedTuple):
     arrays: str
 
 
+@dataclass(frozen=True)
+class Told:
+    """What a page says in words and numbers.
+
+    Attributes:
+        title: a line of key numbers.
+        rows: of the report: measure, value, meaning.
+        squares: of the checkerboard at first, in a row as long as the root of the area.
+    """
+
+    title: str
+    rows: Sequence[tuple[str, str, str]]
+    squares: float = CELLS
+
+
 def payload_of(
-    result: Flattening, content: Content, picture: Texture | None, name: str, up: str, show: str
+    result: Flattening,
+    content: Content,
+    picture: Texture | None,
+    name: str,
+    up: str,
+    show: str,
+    told: Told | None = None,
 ) -> Payload:
-    """Return the data of a page.
+    """Return the data of a page; told: what is said, by default that of a flattening.
 
     Raises:
         OptionError: `up` names no axis.
     """
+    if told is None:
+        told = Told(title(replace(result, source=None)), shown_rows(result))
     low, high = content.uv.min(axis=0), content.uv.max(axis=0)
     arrays = _arrays(content)
     if picture is not None:
@@ -53,8 +76,8 @@ def payload_of(
     listed, block = pack(arrays)
     head: dict[str, Any] = {
         "name": name,
-        "title": title(replace(result, source=None)),
-        "rows": shown_rows(result),
+        "title": told.title,
+        "rows": list(told.rows),
         "notes": list(result.notes),
         "triangles": len(result.faces),
         "left_out": content.left_out,
@@ -65,7 +88,7 @@ def payload_of(
         "uv_low": low.tolist(),
         "uv_high": high.tolist(),
         "uv_side": content.uv_side,
-        "squares": CELLS,
+        "squares": told.squares,
         "crease_cosine": CREASE_COSINE,
         "scales": {key: as_plain(key, scale) for key, scale in content.scales.items()},
         "picture": None if picture is None else picture.kind,

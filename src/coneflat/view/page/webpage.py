@@ -20,7 +20,7 @@ from ...files.atomic import as_path, atomic_write, check_target, known_ending
 from ...files.texture import read_picture
 from ...text import shown
 from .content import content_of
-from .payload import payload_of
+from .payload import Told, payload_of
 
 if TYPE_CHECKING:
     from ...result.flattening import Flattening
@@ -52,6 +52,7 @@ def page_of(
     up: str = "y",
     show: str | None = None,
     most_triangles: int = MOST_TRIANGLES,
+    told: Told | None = None,
 ) -> str:
     """Return the page as text.
 
@@ -63,6 +64,7 @@ def page_of(
         show: what the colours show first: "checker", "picture", "charts", "qc", "area", "curvature" (of the model),
             "flat" (the curvature left) or "plain"; by default the picture, if there is one, or the checkerboard.
         most_triangles: a mesh with more is thinned for display.
+        told: what it says; by default the key numbers and the report.
 
     Raises:
         OptionError: `up` or `show` is none of these, or `most_triangles` is no whole number.
@@ -80,7 +82,7 @@ def page_of(
     content = content_of(result, most_triangles)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
-    payload = payload_of(result, content, picture, name, up, show)
+    payload = payload_of(result, content, picture, name, up, show, told)
     before_head, after_head, after_arrays = _template()
     return "".join((before_head, payload.head, after_head, payload.arrays, after_arrays))
 

@@ -1,0 +1,50 @@
+"""The options of quads: their own, and those of a flattening that make sense for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .declared import ConeBounds, ConeNumber, RunOptions, option
+from .kinds import Choice, Count, Number, Strength, WordOrVertices
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuadOptions(RunOptions, ConeBounds, ConeNumber):
+    """Options of quads.
+
+    What is not here, or has another default, is what quads need of a flattening: `OPTIONS` of `grid.integer_grid`.
+    Symmetry is not here, as quantised cones are not mirror symmetric.
+    """
+
+    quads: int | None = option(None, Count(), "About how many quads; 10,000 unless a size is given.")
+    size: float | None = option(
+        None, Number(optional=True, positive=True), "The length of their edges in model units, instead."
+    )
+    stretch: float = option(
+        0.0, Strength(1.0), "What quads are to be alike in: from angles, 0, to sizes as well, 1."
+    )
+    smooth: int = option(10, Count(), "Rounds of smoothing on the surface; 0 for none.")
+    cones: str | Mapping[int, float] = option(
+        "auto",
+        WordOrVertices(("auto",), "cone"),
+        "auto: the search finds them. Or vertices, each with its curvature, a multiple of pi/2: pi/2 for three quads, "
+        "-pi/2 for five. On surfaces with handles few that are given have a grid.",
+        one_mesh=True,
+    )
+    boundary: str = option(
+        "free",
+        Choice(("free", "straight")),
+        "free: it runs across squares, and those that it cuts are left out. straight: it lies on grid lines, between "
+        "corners that the search finds like cones, and no square is lost.",
+    )
+    min_cone_angle: float = option(
+        1.5 * math.pi,
+        Number(is_angle=True),
+        "The sharpest cone, pi/2 for each quad at it; with straight sides it is pi/2, one quad, at corners.",
+    )
+    max_cone_angle: float | None = option(
+        3 * math.pi, Number(is_angle=True, optional=True), "The widest saddle; 3pi is six quads."
+    )
+    max_cones: int | None = option(None, Count(), "The search stops at so many cones per component.")

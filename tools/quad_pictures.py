@@ -1,0 +1,80 @@
+"""The documentation's pictures of integer grids and quads."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from typing import Any
+
+import numpy as np
+from markers import ROOT
+from measured import Measured
+
+import coneflat
+from coneflat.view.figures.camera import view_aspect
+from coneflat.view.figures.compose import Panel, Row, compose
+from coneflat.view.figures.cone_marks import pixels_of
+from coneflat.view.figures.projection import render_mesh
+from coneflat.view.figures.quads import draw_quads
+
+sys.path.insert(0, str(ROOT / "examples"))
+from catmull_clark import catmull_clark
+
+DPI = 110.0
+TALLEST = 3.0  # inches
+#: Models with a seamless checkerboard, and where they are seen from.
+BOARDS = {"bunny": "front-right", "spot": "left-back", "hand": "front"}
+#: Those that are subdivided: how many quads, and where they are seen from.
+SUBDIVIDED = {"rocker-arm": (400, "right-top"), "spot": (400, "left-back")}
+
+
+def draw_board(grid: coneflat.IntegerGrid, axes: Any, *, eye: str, dpi: float = DPI) -> None:
+    """Draw a model with a board whose squares have grid points and quads as their middles, in turn.
+
+    It is the same after a quarter turn about either, so it goes on across seams; the usual board, whose squares are
+    quads, changes its colours there.
+    """
+    turned = grid.corner_grid @ np.array([[1, 1], [1, -1]]) + 0.5
+    picture = render_mesh(
+        grid.vertices, grid.faces, size=pixels_of(axes, dpi), eye=eye, corner_uv=turned, cell=1.0
+    )
+    axes.imshow(
+        picture.image, extent=(0, picture.camera.width, picture.camera.height, 0), interpolation="antialiased"
+    )
+    axes.set_axis_off()
+
+
+def boards_figure(measured: Measured) -> Any:
+    """Return a figure of models with a checkerboard in which no seam is seen."""
+    panels = []
+    for model, eye in BOARDS.items():
+        grid = coneflat.integer_grid(measured.path(model), quads=3000)
+        panels.append(Panel(view_aspect(grid.vertices, eye), partial(draw_board, grid, eye=eye)))
+    return compose([Row(panels)], dpi=DPI, width=8.0)
+
+
+def quads_figure(measured: Measured) -> Any:
+    """Return a figure of a model made into quads, from two sides."""
+    quads = coneflat.quads(measured.path("bunny"), quads=4000)
+    return coneflat.make_figure(quads, "quads", eyes=["front-right", "back-left"], dpi=DPI)
+
+
+def subdivided_figure(measured: Measured) -> Any:
+    """Return a figure of coarse quads, and of what a step of Catmull-Clark makes of them."""
+    rows = []
+    for model, (count, eye) in SUBDIVIDED.items():
+        quads = coneflat.quads(measured.path(model), quads=count)
+        finer = subdivided(quads)
+        panels = []
+        for each, label in ((quads, f"{len(quads.quads)} quads"), (finer, "subdivided once")):
+            drawn = partial(draw_quads, each, eye=eye, irregular=False, dpi=DPI)
+            panels.append(Panel(view_aspect(quads.vertices, eye), drawn, label))
+        rows.append(Row(panels, tallest=TALLEST))
+    return compose(rows, dpi=DPI, width=8.0)
+
+
+def subdivided(quads: coneflat.QuadMesh) -> coneflat.QuadMesh:
+    """Return quads after a step of Catmull-Clark; its vertices lie on no surface, so they have no places on it."""
+    vertices, finer = catmull_clark(quads.vertices, quads.quads)
+    none = np.empty((0, 3))
+    return coneflat.QuadMesh(vertices, finer, np.empty(0, dtype=np.int64), none, 0, 0.0, quads.surface)
