@@ -44,6 +44,8 @@ class PointConstraints:
         tied: (q,) half-edges of seams.
         translations: (q, 2) what is added in the end to a point in the frame of the triangle across each, turned by the
             seam's rotation, to give the one in the frame of its own.
+        quarter_turns: the sides of seams come to be the nearest quarter turns of each other, point by point, whatever
+            they are as yet; else they must be rigid copies, and keep their rotations.
     """
 
     pinned: ArrayLike = ()
@@ -52,6 +54,7 @@ class PointConstraints:
     held_seams: ArrayLike = ()
     tied: ArrayLike = ()
     translations: ArrayLike = ()
+    quarter_turns: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +70,7 @@ class CheckedConstraints:
     held_seams: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     tied: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     translations: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+    quarter_turns: bool = False
 
 
 def check_constraints(constraints: PointConstraints, points: FloatArray) -> CheckedConstraints:
@@ -94,7 +98,16 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
     if lines is None:
         none = np.empty(0, dtype=np.int64)
         return CheckedConstraints(
-            pinned, places, none, none, np.empty((0, 2)), np.empty(0), held, tied, translations
+            pinned,
+            places,
+            none,
+            none,
+            np.empty((0, 2)),
+            np.empty(0),
+            held,
+            tied,
+            translations,
+            constraints.quarter_turns,
         )
     on_line = _indices(lines.points, len(points), "points of lines")
     directions = _floats(lines.directions, "directions of lines").reshape(-1, 2)
@@ -117,7 +130,18 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
             raise OptionError(
                 f"offsets of lines must be {plural(len(directions), 'number')}, or NaN, not of shape {offsets.shape}"
             )
-    return CheckedConstraints(pinned, places, on_line, line, directions, offsets, held, tied, translations)
+    return CheckedConstraints(
+        pinned,
+        places,
+        on_line,
+        line,
+        directions,
+        offsets,
+        held,
+        tied,
+        translations,
+        constraints.quarter_turns,
+    )
 
 
 def _across(directions: FloatArray, places: FloatArray) -> FloatArray:
