@@ -22,8 +22,9 @@ def split_for_features(
 
     Edges are split until none is longer than wanted, nor than a part of the patch between features that it lies in; and
     those that join vertices on features or the boundary without being such, so that straight sides leave every triangle
-    room. A triangle's longest side is always split before others (M.-C. Rivara, "Algorithms for refining triangular
-    grids suitable for adaptive and multigrid techniques", 1984), so that angles do not become ever smaller.
+    room. Of triangles whose edges are too long the longest is always split before others (M.-C. Rivara, "Algorithms for
+    refining triangular grids suitable for adaptive and multigrid techniques", 1984), so that angles do not become ever
+    smaller.
 
     Args:
         vertices, faces: (n, 3), (m, 3) the mesh; its vertices remain the first ones.
@@ -33,13 +34,19 @@ def split_for_features(
     mesh = TriangleMesh(vertices, faces)
     edges = edge_indices(mesh, features)
     for _ in range(ROUNDS):
-        is_fixed = mesh.is_boundary_edge.copy()
-        is_fixed[edges] = True
-        marked = _too_long(mesh, edges, longest) | _chords(mesh, is_fixed)
+        marked = _too_long(mesh, edges, longest)
         if not marked.any():
             break
         mesh, edges = _split(mesh, edges, _closed(mesh, marked))
-    return mesh, edges
+    return _split(mesh, edges, _chords(mesh, edges))
+
+
+def split_faces(mesh: TriangleMesh, edges: IntArray, faces: IntArray) -> tuple[TriangleMesh, IntArray]:
+    """Return a mesh in which all sides of some faces are split, and its features, given as edges."""
+    marked = np.zeros(len(mesh.edges), dtype=bool)
+    marked[mesh.halfedge_edges.reshape(-1, 3)[faces]] = True
+    mesh, edges = _split(mesh, edges, _closed(mesh, marked))
+    return _split(mesh, edges, _chords(mesh, edges))
 
 
 def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
@@ -67,8 +74,10 @@ def _too_long(mesh: TriangleMesh, edges: IntArray, longest: float) -> BoolArray:
     return too_long
 
 
-def _chords(mesh: TriangleMesh, is_fixed: BoolArray) -> BoolArray:
+def _chords(mesh: TriangleMesh, edges: IntArray) -> BoolArray:
     """Return (e,) the edges that join vertices on features or the boundary and are none themselves."""
+    is_fixed = mesh.is_boundary_edge.copy()
+    is_fixed[edges] = True
     on = np.zeros(len(mesh.vertices), dtype=bool)
     on[mesh.edges[is_fixed]] = True
     return on[mesh.edges].all(axis=1) & ~is_fixed
@@ -76,7 +85,7 @@ def _chords(mesh: TriangleMesh, is_fixed: BoolArray) -> BoolArray:
 
 def _closed(mesh: TriangleMesh, marked: BoolArray) -> BoolArray:
     """Return marks with the longest side of every triangle that has one."""
-    marked, longest = marked.copy(), _longest_sides(mesh)
+    marked, longest = marked.copy(), _longest_sides(mesh, np.ones(len(marked), dtype=bool))
     sides = mesh.halfedge_edges.reshape(-1, 3)
     while True:
         more = longest[marked[sides].any(axis=1)]
@@ -86,13 +95,17 @@ def _closed(mesh: TriangleMesh, marked: BoolArray) -> BoolArray:
         marked[more] = True
 
 
-def _longest_sides(mesh: TriangleMesh) -> IntArray:
-    """Return (m,) the longest edge of each triangle; of equal ones the same, whatever the numbering."""
+def _longest_sides(mesh: TriangleMesh, among: BoolArray) -> IntArray:
+    """Return (m,) the longest edge of each triangle among some (e,), if it has any.
+
+    Of equal ones it is the same, whatever the numbering.
+    """
     lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
     key = tie_key(mesh.vertices)[mesh.edges].sum(axis=1)
     rounded = np.round(lengths / lengths.max(initial=1e-300), 9)
     rank = np.empty(len(lengths), dtype=np.int64)
     rank[np.lexsort((key, rounded))] = np.arange(len(lengths))
+    rank[~among] = -1
     sides = mesh.halfedge_edges.reshape(-1, 3)
     longest: IntArray = sides[np.arange(len(sides)), np.argmax(rank[sides], axis=1)]
     return longest
@@ -105,7 +118,7 @@ def _split(mesh: TriangleMesh, edges: IntArray, marked: BoolArray) -> tuple[Tria
     middle[marked] = n + np.arange(int(marked.sum()))
     points = np.concatenate([mesh.vertices, mesh.vertices[mesh.edges[marked]].mean(axis=1)])
     sides = mesh.halfedge_edges.reshape(-1, 3)
-    first = np.argmax(sides == _longest_sides(mesh)[:, None], axis=1)
+    first = np.argmax(sides == _longest_sides(mesh, marked)[:, None], axis=1)
     turn = (first[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(mesh.faces, turn, axis=1).T
     bc, ca, ab = middle[np.take_along_axis(sides, turn, axis=1)].T

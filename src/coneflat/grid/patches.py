@@ -11,7 +11,7 @@ from ..cones import ConeSolution
 from ..cones.choose import ROOM, Surface
 from ..cones.integer.search import quantise_cones
 from ..cones.sparse import ConeSearch
-from ..errors import CurvatureError, GridError
+from ..errors import CurvatureError
 from ..flat.exact.boundary import straight_boundary
 from ..flat.exact.flatten import ExactChoices, ExactFlatMetric, exact_flattening
 from ..flat.exact.handles import CorrectedMetric, corrected_flattening
@@ -33,30 +33,34 @@ class FlatPatch:
         points: (u,) of the plane.
         corners: (m, 3) the point at each triangle corner.
         cones: vertices of the patch, inside.
+        turned: (t,) triangles that are turned over, as they are too coarse for straight sides.
     """
 
     points: ComplexArray
     corners: IntArray
     cones: IntArray
+    turned: IntArray
 
 
-def flatten_patch(mesh: TriangleMesh, lengths: FloatArray, quarters: IntArray, options: Options) -> FlatPatch:
+def flatten_patch(
+    mesh: TriangleMesh, lengths: FloatArray, quarters: IntArray, distortion: float, options: Options
+) -> FlatPatch:
     """Return a connected patch flattened conformally, with angles of whole quarter turns on its boundary.
 
     Args:
         mesh: the patch.
         lengths: (m, 3) side lengths.
         quarters: (n,) the quarter turns of the angle at each vertex on the boundary.
-        options: what is asked of the cones inside.
+        distortion: the area distortion allowed, the standard deviation of the log of the scale by area.
+        options: what else is asked of the cones inside.
 
     Raises:
         CurvatureError: no cones inside make up for the corners.
-        GridError: triangles are turned over.
         ConvergenceError, MetricError: no metric was found.
     """
     on_boundary = mesh.is_boundary_vertex
     corners = np.where(on_boundary, QUARTER * (2 - quarters), 0.0)
-    solution = _cones(mesh, lengths, corners, options)
+    solution = _cones(mesh, lengths, corners, distortion, options)
     choices = ExactChoices(scale_at_cones=False, boundary=straight_boundary(mesh, solution.target))
     metric: ExactFlatMetric | CorrectedMetric
     if mesh.genus():
@@ -66,15 +70,15 @@ def flatten_patch(mesh: TriangleMesh, lengths: FloatArray, quarters: IntArray, o
     costs = edge_costs(mesh, lengths.ravel()[mesh.edge_halfedges[:, 0]], creases=options.creases)
     seams = find_seams(mesh, solution.cones, costs)
     laid_out = metric.lay_out(cut_open(mesh, seams).mesh, seams)
-    turned = int((signed_double_areas(laid_out.points[laid_out.corners]) <= 0).sum())
-    if turned:
-        raise GridError(f"{turned} of {len(mesh.faces):,} triangles of a patch are turned over")
+    turned = np.flatnonzero(signed_double_areas(laid_out.points[laid_out.corners]) <= 0)
     points = laid_out.points[:, 0] + 1j * laid_out.points[:, 1]
     points = points * np.exp(-1j * _side_angle(mesh, laid_out.corners, points))
-    return FlatPatch(points, laid_out.corners, solution.cones)
+    return FlatPatch(points, laid_out.corners, solution.cones, turned)
 
 
-def _cones(mesh: TriangleMesh, lengths: FloatArray, corners: FloatArray, options: Options) -> ConeSolution:
+def _cones(
+    mesh: TriangleMesh, lengths: FloatArray, corners: FloatArray, distortion: float, options: Options
+) -> ConeSolution:
     """Return cones inside a patch whose (n,) corners are given: these are taken off the curvature to be made up for."""
     surface = Surface.of(mesh, lengths)
     inside = ~mesh.is_boundary_vertex
@@ -96,7 +100,7 @@ def _cones(mesh: TriangleMesh, lengths: FloatArray, corners: FloatArray, options
         found = quantise_cones(
             search,
             QUARTER,
-            distortion=options.distortion,
+            distortion=distortion,
             count=options.cone_count,
             most=options.max_cones,
         ).solution

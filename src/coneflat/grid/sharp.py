@@ -27,6 +27,8 @@ from .sides import Sides, find_sides
 STEPS = 200
 # What counts beside angles on the way: patches of one size meet more easily.
 STRETCH = 1.0
+# By how much more than others small patches may be distorted, so that they have fewer cones.
+UNEVEN = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +50,13 @@ def flatten_patches(opened: Opened, lengths: FloatArray, options: Options) -> Lo
     """Return all patches of an opened mesh, flattened at their own areas; lengths are (m, 3), of its sides."""
     corners = np.empty_like(opened.mesh.faces)
     points, cones, count = [], [], 0
-    for part, vertices, faces in opened.cut.mesh.split_components():
-        flat = flatten_patch(part, lengths[faces], opened.quarters[vertices], options)
+    parts = opened.cut.mesh.split_components()
+    areas = double_areas(lengths)
+    for part, vertices, faces in parts:
+        # What all have in common is the mean of squares by area, to which small ones add little.
+        share = float(areas[faces].sum() / areas.mean() / len(areas))
+        distortion = options.distortion * min(max(1.0, 1 / np.sqrt(len(parts) * share)), UNEVEN)
+        flat = flatten_patch(part, lengths[faces], opened.quarters[vertices], distortion, options)
         corners[faces] = flat.corners + count
         points.append(flat.points)
         cones.append(opened.cut.origin[vertices[flat.cones]])

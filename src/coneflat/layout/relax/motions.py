@@ -11,6 +11,7 @@ from ..._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import OptionError
 from ...mesh import TriangleMesh
 from .constraints import CheckedConstraints
+from .elimination import sparse_solutions
 from .seam_chains import SeamChains, find_chains
 
 # Relative size below which what elimination leaves of an equation is rounding, and of a coefficient. What is taken for
@@ -88,6 +89,11 @@ def _constrained_chains(
         return chains
     held = np.concatenate([c.pinned, on])
     return find_chains(mesh, corners, points, vertex[held], quarter_turns=c.quarter_turns)
+
+
+def _require_solved(missed: float, right: FloatArray) -> None:
+    if missed > ROUNDING * max(1.0, float(np.abs(right).max())):
+        raise OptionError(f"constraints contradict each other, or the seams: by {missed:.2g} at least")
 
 
 class _Builder:
@@ -289,13 +295,16 @@ class _Builder:
         rows, right = self._equations()
         if not len(rows):
             return np.concatenate([np.eye(self.size), np.zeros((self.size, 1))], axis=1)
+        if self.constraints.quarter_turns:
+            basis, left = sparse_solutions(rows, right)
+            _require_solved(float(np.abs(left).max(initial=0.0)), right)
+            return basis
         q, r, pivots = scipy.linalg.qr(rows, mode="economic", pivoting=True)
         diagonal = np.abs(np.diag(r))
         rank = int((diagonal > ROUNDING * max(diagonal[0], 1e-300)).sum())
         turned = q.T @ right
         missed = float(np.abs(right - q[:, :rank] @ turned[:rank]).max())
-        if missed > ROUNDING * max(1.0, float(np.abs(right).max())):
-            raise OptionError(f"constraints contradict each other, or the seams: by {missed:.2g} at least")
+        _require_solved(missed, right)
         solved = scipy.linalg.solve_triangular(
             r[:rank, :rank], np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
         )
