@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray
-from ..geometry import edge_lengths
+from .._arrays import BoolArray, IntArray
 from ..geometry.ties import tie_key
 from ..mesh import TriangleMesh, label_components
 
@@ -17,8 +16,8 @@ ACROSS = 4
 
 def split_for_features(
     vertices: FloatArray, faces: IntArray, features: IntArray, longest: float
-) -> tuple[TriangleMesh, IntArray]:
-    """Return a finer mesh of the same surface, and its features.
+) -> tuple[TriangleMesh, IntArray, IntArray]:
+    """Return a finer mesh of the same surface, its features as edges, and the one of those given that each is part of.
 
     Edges are split until none is longer than wanted, nor than a part of the patch between features that it lies in; and
     those that join vertices on features or the boundary without being such, so that straight sides leave every triangle
@@ -32,21 +31,23 @@ def split_for_features(
         longest: what no edge is to exceed.
     """
     mesh = TriangleMesh(vertices, faces)
-    edges = edge_indices(mesh, features)
+    edges, origin = edge_indices(mesh, features), np.arange(len(features))
     for _ in range(ROUNDS):
         marked = _too_long(mesh, edges, longest)
         if not marked.any():
             break
-        mesh, edges = _split(mesh, edges, _closed(mesh, marked))
-    return _split(mesh, edges, _chords(mesh, edges))
+        mesh, edges, origin = _split(mesh, edges, origin, _closed(mesh, marked))
+    return _split(mesh, edges, origin, _chords(mesh, edges))
 
 
-def split_faces(mesh: TriangleMesh, edges: IntArray, faces: IntArray) -> tuple[TriangleMesh, IntArray]:
-    """Return a mesh in which all sides of some faces are split, and its features, given as edges."""
+def split_faces(
+    mesh: TriangleMesh, edges: IntArray, origin: IntArray, faces: IntArray
+) -> tuple[TriangleMesh, IntArray, IntArray]:
+    """Return a mesh in which all sides of some faces are split, its features (k,) and the origin of each of these."""
     marked = np.zeros(len(mesh.edges), dtype=bool)
     marked[mesh.halfedge_edges.reshape(-1, 3)[faces]] = True
-    mesh, edges = _split(mesh, edges, _closed(mesh, marked))
-    return _split(mesh, edges, _chords(mesh, edges))
+    mesh, edges, origin = _split(mesh, edges, origin, _closed(mesh, marked))
+    return _split(mesh, edges, origin, _chords(mesh, edges))
 
 
 def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
@@ -111,8 +112,10 @@ def _longest_sides(mesh: TriangleMesh, among: BoolArray) -> IntArray:
     return longest
 
 
-def _split(mesh: TriangleMesh, edges: IntArray, marked: BoolArray) -> tuple[TriangleMesh, IntArray]:
-    """Return a mesh with marked edges split in the middle, and its features."""
+def _split(
+    mesh: TriangleMesh, edges: IntArray, origin: IntArray, marked: BoolArray
+) -> tuple[TriangleMesh, IntArray, IntArray]:
+    """Return a mesh with marked edges split in the middle, its features (k,) and the origin of each of these."""
     n = len(mesh.vertices)
     middle = np.full(len(marked), -1)
     middle[marked] = n + np.arange(int(marked.sum()))
@@ -139,12 +142,7 @@ def _split(mesh: TriangleMesh, edges: IntArray, marked: BoolArray) -> tuple[Tria
     ]
     finer = TriangleMesh(points, np.concatenate(parts))
     pairs, at = mesh.edges[edges], middle[edges]
-    kept = pairs[at < 0]
-    pairs, at = pairs[at >= 0], at[at >= 0]
-    halves = [np.stack([pairs[:, 0], at], axis=1), np.stack([pairs[:, 1], at], axis=1)]
-    return finer, edge_indices(finer, np.concatenate([kept, *halves]))
-
-
-def lengths_of(mesh: TriangleMesh) -> FloatArray:
-    """Return (m, 3) side lengths."""
-    return edge_lengths(mesh.vertices, mesh.faces)
+    is_cut = at >= 0
+    halves = [np.stack([pairs[is_cut, end], at[is_cut]], axis=1) for end in range(2)]
+    features = edge_indices(finer, np.concatenate([pairs[~is_cut], *halves]))
+    return finer, features, np.concatenate([origin[~is_cut], origin[is_cut], origin[is_cut]])

@@ -17,30 +17,61 @@ from ..seams import CutMesh, open_along
 LENIENT = 0.05
 
 
-def sharp_edges(mesh: TriangleMesh, angle: float, size: float) -> IntArray:
-    """Return the inner edges that bend by more than an angle, without stubs.
+def sharp_edges(mesh: TriangleMesh, angle: float) -> IntArray:
+    """Return the inner edges that bend by more than an angle, radians."""
+    return np.flatnonzero(np.abs(dihedral_angles(mesh)) > angle)
 
-    A stub ends where no other sharp edge goes on, in less than two edges or before it is as long as a quad.
 
-    Args:
-        mesh: the mesh.
-        angle: radians.
-        size: of a quad, in units of the mesh.
+def without_stubs(mesh: TriangleMesh, edges: IntArray, least: float) -> IntArray:
+    """Return which of some edges (k,) are kept when stubs are dropped.
+
+    A stub ends where no other one goes on, in less than two edges or before it is as long as is asked.
     """
-    sharp = np.flatnonzero(np.abs(dihedral_angles(mesh)) > angle)
-    lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
+    kept = np.arange(len(edges))
+    lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges[edges]], axis=1)[:, 0], axis=1)
     while True:
-        chain, ends = feature_chains(mesh, sharp)
-        loose = (ends == 1).any(axis=1)
+        chain, ends = feature_chains(mesh, edges[kept])
         count = int(chain.max(initial=-1)) + 1
         is_stub = np.zeros(count, dtype=bool)
-        is_stub[chain[loose]] = True
+        is_stub[chain[(ends == 1).any(axis=1)]] = True
         is_stub &= (np.bincount(chain, minlength=count) < 2) | (
-            np.bincount(chain, lengths[sharp], count) < size
+            np.bincount(chain, lengths[kept], count) < least
         )
         if not is_stub.any():
-            return sharp
-        sharp = sharp[~is_stub[chain]]
+            return kept
+        kept = kept[~is_stub[chain]]
+
+
+def patches_of(mesh: TriangleMesh, edges: IntArray) -> tuple[int, IntArray]:
+    """Return into how many patches edges part a mesh, and (m,) that of each triangle."""
+    glued = ~mesh.is_boundary_edge
+    glued[edges] = False
+    pairs = mesh.edge_faces[glued]
+    return label_components(len(mesh.faces), pairs[:, 0], pairs[:, 1])
+
+
+def dangling(mesh: TriangleMesh, edges: IntArray) -> IntArray:
+    """Return which of some edges (k,) have the same patch on both sides."""
+    _, patch = patches_of(mesh, edges)
+    one, two = patch[mesh.edge_faces[edges]].T
+    return np.flatnonzero(one == two)
+
+
+def border_of(mesh: TriangleMesh, edges: IntArray, number: int) -> IntArray:
+    """Return which of some edges (k,) part one patch from another one, those of the chain that does so the longest.
+
+    Where none does, those that lie in it; empty if it has none of either.
+    """
+    _, patch = patches_of(mesh, edges)
+    one, two = patch[mesh.edge_faces[edges]].T
+    beside = (one == number) | (two == number)
+    parting = np.flatnonzero(beside & (one != two))
+    if not len(parting):
+        return np.flatnonzero(beside)
+    chain, _ = feature_chains(mesh, edges)
+    lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges[edges]], axis=1)[:, 0], axis=1)
+    longest = int(np.argmax(np.bincount(chain[parting], lengths[parting])))
+    return parting[chain[parting] == longest]
 
 
 def feature_chains(mesh: TriangleMesh, edges: IntArray) -> tuple[IntArray, IntArray]:

@@ -21,6 +21,7 @@ from ..text import plural
 from ..threads import one_blas_thread
 from .aligned import Layout, aligned
 from .rounding import find_rounding
+from .sharp_edges import sharp_layouts
 from .sides import Sides
 from .transitions import UNITS, Transitions, find_transitions
 
@@ -67,8 +68,10 @@ class IntegerGrid:
         qc_before, qc_mean: quasi-conformal distortion, the mean by area, likewise.
         least_area: of any triangle, over what it should have.
         notes: what was done, one sentence each.
-        corners: (k,) vertices on grid points where straight sides of the boundary meet; sides lie on grid lines.
-        corner_quarters: (k,) the quarter turns of their angle: 1, 3 or more.
+        corners: (k,) further vertices on grid points, where straight sides of the boundary, or sharp edges, meet at an
+            angle; sides and these lie on grid lines.
+        corner_quarters: (k,) the quarter turns of their angle.
+        features: (f, 2) vertices of sharp edges that lie on grid lines.
     """
 
     vertices: FloatArray
@@ -89,6 +92,7 @@ class IntegerGrid:
     notes: tuple[str, ...] = ()
     corners: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     corner_quarters: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    features: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
 
 
 def integer_grid(
@@ -98,6 +102,7 @@ def integer_grid(
     quads: int | None = None,
     size: float | None = None,
     stretch: float = 0.0,
+    sharp_angle: float | str | None = None,
     **options: Any,
 ) -> IntegerGrid:
     """Return a map of a surface to the integer grid, seamless: unit squares become quads that meet across seams.
@@ -107,6 +112,8 @@ def integer_grid(
         quads: about so many unit squares cover the surface; None: 10,000, unless a size is given.
         size: of a square in model units, instead.
         stretch: from angles, 0, to areas, 1: what the map keeps; see `StretchEnergy`.
+        sharp_angle: radians: edges at which the surface bends by more come to lie on grid lines, and the boundary with
+            them; None for none.
         options: of `coneflat.flatten`; by default cones have three, five or six quads.
 
     Raises:
@@ -125,9 +132,12 @@ def integer_grid(
     if not (np.isfinite(wanted) and wanted > 0):
         raise OptionError(f"{name} must be a positive number, not {wanted!r}")
     if isinstance(mesh, Flattening):
-        if faces is not None or options:
+        if faces is not None or options or sharp_angle is not None:
             raise OptionError("a flattening has its faces and options: none can be given beside it")
         result = mesh
+    elif sharp_angle is not None:
+        given = {**OPTIONS, **options, "sharp_angle": sharp_angle}
+        return _sharp(mesh, faces, None if size is not None else wanted, size, given, StretchEnergy(stretch))
     else:
         defaults = OPTIONS if options.get("boundary") != "straight" else {**OPTIONS, **STRAIGHT}
         result = flatten(mesh, faces, **{**defaults, **options})
@@ -142,6 +152,32 @@ def integer_grid(
         "different loops do not point in the same directions, up to quarter turns."
     )
     return replace(found, notes=(*found.notes, note))
+
+
+def _sharp(
+    mesh: Any,
+    faces: ArrayLike | None,
+    quads: float | None,
+    size: float | None,
+    given: dict[str, Any],
+    energy: StretchEnergy,
+) -> IntegerGrid:
+    """Return a grid with as many sharp edges on grid lines as can be."""
+    why = "no layout has them along the axes"
+    for found in sharp_layouts(mesh, faces, quads, size, given):
+        with one_blas_thread():
+            grid, why = _attempt(found.layout, energy)
+        if grid is not None:
+            return replace(grid, features=found.features, notes=(*grid.notes, *found.notes))
+    plain = integer_grid(
+        mesh,
+        faces,
+        size=size,
+        quads=None if quads is None else int(np.ceil(quads)),
+        stretch=energy.stretch,
+        **{name: value for name, value in given.items() if name != "sharp_angle"},
+    )
+    return replace(plain, notes=(*plain.notes, f"No sharp edge is on a grid line: {why}."))
 
 
 def _loose_border(layout: Layout) -> int:

@@ -11,7 +11,7 @@ from ..cones import ConeSolution
 from ..cones.choose import ROOM, Surface
 from ..cones.integer.search import quantise_cones
 from ..cones.sparse import ConeSearch
-from ..errors import CurvatureError
+from ..errors import ConvergenceError, CurvatureError
 from ..flat.exact.boundary import straight_boundary
 from ..flat.exact.flatten import ExactChoices, ExactFlatMetric, exact_flattening
 from ..flat.exact.handles import CorrectedMetric, corrected_flattening
@@ -62,11 +62,7 @@ def flatten_patch(
     corners = np.where(on_boundary, QUARTER * (2 - quarters), 0.0)
     solution = _cones(mesh, lengths, corners, distortion, options)
     choices = ExactChoices(scale_at_cones=False, boundary=straight_boundary(mesh, solution.target))
-    metric: ExactFlatMetric | CorrectedMetric
-    if mesh.genus():
-        metric = corrected_flattening(lengths, solution, choices, open_turning(mesh), QUARTER)
-    else:
-        metric = exact_flattening(mesh, lengths, solution, choices)
+    metric = _metric(mesh, lengths, solution, choices)
     costs = edge_costs(mesh, lengths.ravel()[mesh.edge_halfedges[:, 0]], creases=options.creases)
     seams = find_seams(mesh, solution.cones, costs)
     laid_out = metric.lay_out(cut_open(mesh, seams).mesh, seams)
@@ -74,6 +70,18 @@ def flatten_patch(
     points = laid_out.points[:, 0] + 1j * laid_out.points[:, 1]
     points = points * np.exp(-1j * _side_angle(mesh, laid_out.corners, points))
     return FlatPatch(points, laid_out.corners, solution.cones, turned)
+
+
+def _metric(
+    mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, choices: ExactChoices
+) -> ExactFlatMetric | CorrectedMetric:
+    """Return a flat metric, if it can be with rotations along handles that are quarter turns: it need not be as yet."""
+    if mesh.genus():
+        try:
+            return corrected_flattening(lengths, solution, choices, open_turning(mesh), QUARTER)
+        except ConvergenceError:
+            pass
+    return exact_flattening(mesh, lengths, solution, choices)
 
 
 def _cones(

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .._arrays import ComplexArray, FloatArray, IntArray
+from ..errors import CurvatureError, GridError, MetricError, SeamError
 from ..geometry import double_areas
 from ..geometry.planar import signed_double_areas
 from ..layout.relax import Lines, PointConstraints, StretchEnergy, relax
 from ..layout.relax.seam_chains import SeamChains, find_chains
-from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from ..options import Options
 from .aligned import Layout, joined_charts, origins
 from .features import Opened
@@ -46,21 +46,45 @@ class Loose:
     cones: IntArray
 
 
+class PatchError(GridError):
+    """A patch cannot be flattened; `faces` are its triangles."""
+
+    def __init__(self, faces: IntArray, why: str) -> None:
+        super().__init__(why)
+        self.faces = faces
+
+
+class CoarseError(PatchError):
+    """A patch cannot be flattened as some of its triangles, `faces`, are too coarse."""
+
+
 def flatten_patches(opened: Opened, lengths: FloatArray, options: Options) -> Loose:
-    """Return all patches of an opened mesh, flattened at their own areas; lengths are (m, 3), of its sides."""
+    """Return all patches of an opened mesh, flattened at their own areas; lengths are (m, 3), of its sides.
+
+    Raises:
+        CoarseError: triangles are too coarse.
+        PatchError: a patch has no flat metric with angles of quarter turns.
+    """
     corners = np.empty_like(opened.mesh.faces)
-    points, cones, count = [], [], 0
+    points, cones, turned, count = [], [], [], 0
     parts = opened.cut.mesh.split_components()
     areas = double_areas(lengths)
     for part, vertices, faces in parts:
         # What all have in common is the mean of squares by area, to which small ones add little.
         share = float(areas[faces].sum() / areas.mean() / len(areas))
         distortion = options.distortion * min(max(1.0, 1 / np.sqrt(len(parts) * share)), UNEVEN)
-        flat = flatten_patch(part, lengths[faces], opened.quarters[vertices], distortion, options)
+        try:
+            flat = flatten_patch(part, lengths[faces], opened.quarters[vertices], distortion, options)
+        except (CurvatureError, MetricError, SeamError) as error:
+            raise PatchError(faces, str(error)) from error
+        turned.append(faces[flat.turned])
         corners[faces] = flat.corners + count
         points.append(flat.points)
         cones.append(opened.cut.origin[vertices[flat.cones]])
         count += len(flat.points)
+    coarse = np.concatenate(turned)
+    if len(coarse):
+        raise CoarseError(coarse, f"{len(coarse)} of {len(corners):,} triangles are turned over on straight sides")
     return Loose(np.concatenate(points), corners, np.concatenate(cones))
 
 
