@@ -20,7 +20,7 @@ from ..result.flattening import Flattening
 from ..text import plural
 from ..threads import one_blas_thread
 from .aligned import Layout, aligned
-from .rounding import find_rounding
+from .rounding import Rounding, find_rounding
 from .sharp_edges import sharp_layouts
 from .sides import Sides
 from .transitions import UNITS, Transitions, find_transitions
@@ -40,6 +40,8 @@ STRAIGHT = {"min_cone_angle": np.pi / 2}
 TRIES = 6
 # Newton steps at most, and how many times that of an isometry the energy may become: cones fall together then.
 STEPS, HOPELESS = 200, 1e3
+# Part of their areas that triangles keep in a start for relaxation.
+LEAST_START = 1e-2
 # Part of the squares wanted by which there may be more or fewer without a note.
 NOTED = 0.1
 # Bits after the point that coordinates have at most: so seams fit exactly, and no triangle notices.
@@ -213,8 +215,9 @@ def _attempt(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None,
     smooth = transitions.places(layout.points, rounding.smooth)
     tries, why = 0, "all lattice points near it put cones on each other"
     for values in candidates[:TRIES]:
+        start = _displaced(layout, smooth, rounding, transitions, values)
         try:
-            found = _relaxed(layout, smooth, transitions, values, energy)
+            found = _relaxed(layout, start, transitions, values, energy)
         except ConvergenceError as error:
             tries, why = tries + 1, str(error)
             continue
@@ -223,6 +226,19 @@ def _attempt(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None,
             return _described(layout, smooth, points, found, transitions, tries), ""
         tries, why = tries + 1, "a triangle so small was left that rounding turned it over"
     return None, why
+
+
+def _displaced(
+    layout: Layout, smooth: ComplexArray, rounding: Rounding, transitions: Transitions, values: IntArray
+) -> ComplexArray:
+    """Return the layout with seams and cones where they are to be, moved by the shift of least energy.
+
+    Where that makes a triangle too small the smooth layout itself: relaxation may find a way.
+    """
+    shift = rounding.stiffness.displacement((values - rounding.smooth)[:, None])[:, 0]
+    moved = transitions.places(smooth + shift[0::2] + 1j * shift[1::2], values.astype(np.float64))
+    before, after = (signed_double_areas(_pairs(points)[layout.corners]) for points in (smooth, moved))
+    return moved if (after > LEAST_START * before).all() else smooth
 
 
 def _relaxed(

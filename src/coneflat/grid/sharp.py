@@ -103,6 +103,7 @@ def glued(opened: Opened, lengths: FloatArray, loose: Loose) -> Loose:
     constraints = PointConstraints(
         lines=Lines(sides.points, sides.side, directions, offsets) if len(offsets) else None,
         quarter_turns=True,
+        nodes=whole,
     )
     found = relax(
         mesh,

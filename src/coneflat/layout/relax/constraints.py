@@ -46,6 +46,7 @@ class PointConstraints:
             seam's rotation, to give the one in the frame of its own.
         quarter_turns: the sides of seams come to be the nearest quarter turns of each other, point by point, whatever
             they are as yet; else they must be rigid copies, and keep their rotations.
+        nodes: vertices at which seams end in any case.
     """
 
     pinned: ArrayLike = ()
@@ -55,6 +56,7 @@ class PointConstraints:
     tied: ArrayLike = ()
     translations: ArrayLike = ()
     quarter_turns: bool = False
+    nodes: ArrayLike = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +73,7 @@ class CheckedConstraints:
     tied: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     translations: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
     quarter_turns: bool = False
+    nodes: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
 def check_constraints(constraints: PointConstraints, points: FloatArray) -> CheckedConstraints:
@@ -94,6 +97,7 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
         raise OptionError(
             f"{plural(len(tied), 'half-edge')} tied, but {plural(len(translations), 'translation')} for them"
         )
+    nodes = np.asarray(constraints.nodes, dtype=np.int64).ravel()
     lines = constraints.lines
     if lines is None:
         none = np.empty(0, dtype=np.int64)
@@ -108,6 +112,7 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
             tied,
             translations,
             constraints.quarter_turns,
+            nodes,
         )
     on_line = _indices(lines.points, len(points), "points of lines")
     directions = _floats(lines.directions, "directions of lines").reshape(-1, 2)
@@ -141,6 +146,7 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
         tied,
         translations,
         constraints.quarter_turns,
+        nodes,
     )
 
 

@@ -82,13 +82,14 @@ def _constrained_chains(
 ) -> SeamChains:
     """Return the seams, with nodes at points that are held but on one line, as left ones within a seam may be."""
     on, times = np.unique(c.on_line, return_counts=True)
-    held = np.concatenate([c.pinned, on[times > 1]])
-    chains = find_chains(mesh, corners, points, vertex[held], quarter_turns=c.quarter_turns)
+    nodes = np.concatenate([vertex[c.pinned], vertex[on[times > 1]], c.nodes])
+    chains = find_chains(mesh, corners, points, nodes, quarter_turns=c.quarter_turns)
     inside = ~chains.is_node[chains.vertices]
     if not np.isin(on, chains.right[inside]).any():
         return chains
-    held = np.concatenate([c.pinned, on])
-    return find_chains(mesh, corners, points, vertex[held], quarter_turns=c.quarter_turns)
+    return find_chains(
+        mesh, corners, points, np.concatenate([nodes, vertex[on]]), quarter_turns=c.quarter_turns
+    )
 
 
 def _require_solved(missed: float, right: FloatArray) -> None:
