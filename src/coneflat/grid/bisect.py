@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import BoolArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray
 from ..geometry.ties import tie_key
 from ..mesh import TriangleMesh, label_components
 

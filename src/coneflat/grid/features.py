@@ -75,7 +75,7 @@ def border_of(mesh: TriangleMesh, edges: IntArray, number: int) -> IntArray:
 
 
 def feature_chains(mesh: TriangleMesh, edges: IntArray) -> tuple[IntArray, IntArray]:
-    """Return (k,) the chain of each edge, between vertices where other than two meet, and (k, 2) how many do at its ends.
+    """Return (k,) the chain of each edge, between where other than two meet, and (k, 2) how many do at its ends.
 
     The boundary counts as three edges more.
     """
@@ -131,7 +131,7 @@ class Opened:
 
 
 def opened(mesh: TriangleMesh, edges: IntArray, lengths: FloatArray) -> Opened:
-    """Return a mesh cut open along edges (k,), with angles rounded to quarter turns; lengths are (m, 3), of its sides."""
+    """Return a mesh cut open along edges (k,), with angles rounded to quarter turns; lengths are (m, 3)."""
     cut = open_along(mesh, edges)
     angles = corner_angles(lengths)
     sums = np.bincount(cut.mesh.faces.ravel(), angles.ravel(), len(cut.origin)) / (np.pi / 2)

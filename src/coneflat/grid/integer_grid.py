@@ -165,7 +165,7 @@ def _sharp(
     energy: StretchEnergy,
 ) -> IntegerGrid:
     """Return a grid with as many sharp edges on grid lines as can be."""
-    why = "no layout has them along the axes"
+    why = "none is long enough for quads of this size"
     for found in sharp_layouts(mesh, faces, quads, size, given):
         with one_blas_thread():
             grid, why = _attempt(found.layout, energy)

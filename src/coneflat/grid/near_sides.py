@@ -91,9 +91,7 @@ def _shortest(
         return path
 
     chosen = order[first]
-    return [
-        [*to_root(int(a))[::-1], *to_root(int(b))] for a, b in zip(one[chosen], two[chosen], strict=True)
-    ]
+    return [[*to_root(int(a))[::-1], *to_root(int(b))] for a, b in zip(one[chosen], two[chosen], strict=True)]
 
 
 class PathVector(NamedTuple):
@@ -101,7 +99,7 @@ class PathVector(NamedTuple):
 
     Attributes:
         rows: (2, v) of it, by the variables, as far as these tell where the ends are.
-        length: of it, in the layout.
+        length: of it, in the layout; 0 along a single edge.
         first, last: the points at the ends.
         turn: by how many quarter turns the frame of the last edge is turned.
     """
@@ -114,10 +112,12 @@ class PathVector(NamedTuple):
 
 
 def distances_to_sides(vectors: list[PathVector], transitions: Transitions) -> tuple[IntArray, FloatArray]:
-    """Return (p, 2, v) the coordinate that separates the ends of vectors, the other one as 0, and (p,) their lengths."""
+    """Return (p, 2, v) the coordinate that separates the ends of vectors, with 0 for the other, and (p,) lengths."""
     found, lengths = [], []
     for one in vectors:
-        known = _known_axes(transitions, one.first) & np.roll(_known_axes(transitions, one.last), one.turn % 2)
+        known = _known_axes(transitions, one.first) & np.roll(
+            _known_axes(transitions, one.last), one.turn % 2
+        )
         for axis in np.flatnonzero(known).tolist():
             if one.rows[axis].any():
                 found.append(np.stack([one.rows[axis], np.zeros_like(one.rows[axis])]))

@@ -52,8 +52,10 @@ def quads(
             raise OptionError("a grid has its faces, size and options: none can be given beside it")
         grid = mesh
     else:
-        grid = integer_grid(mesh, faces, quads=quads, size=size, stretch=stretch, sharp_angle=sharp_angle, **options)
-    found = smooth_quads(extract_quads(grid), smooth)
+        grid = integer_grid(
+            mesh, faces, quads=quads, size=size, stretch=stretch, sharp_angle=sharp_angle, **options
+        )
+    found = smooth_quads(extract_quads(grid), smooth, grid.features)
     return replace(found, notes=(*grid.notes, *_notes(found)))
 
 

@@ -21,6 +21,8 @@ from .transitions import TURNS, UNITS, Transitions
 NEAR = 3.0
 # Part of the way between two sides, or a side and a cone, that leads straight to the other if they face each other.
 FACING = 0.45
+# Units below which they are on one line.
+APART = 1e-6
 # Lattice points that are looked at for each set of pairs kept apart, and sets of such at most.
 CANDIDATES, REPAIRS = 64, 200
 # Of these, whether they turn triangles over is looked at beforehand.
@@ -189,7 +191,7 @@ def _near_pairs(
     paths = paths_to_sides(mesh, corners, points, cones, transitions, NEAR)
     sides_apart, length = distances_to_sides([joining(path) for path in paths], transitions)
     sides_apart = sides_apart @ basis
-    facing = np.abs(sides_apart[:, 0] @ start) >= FACING * length
+    facing = np.abs(sides_apart[:, 0] @ start) > np.maximum(FACING * length, APART)
     joined = np.concatenate([cones_apart @ basis, sides_apart[facing]])
     return ConePairs(joined, joined @ start)
 
@@ -221,4 +223,6 @@ def _vector(sides: list[tuple[int, int]], transitions: Transitions, points: Comp
             turn = (turn + across) % 4
         place += UNITS[turn] * (points[end] - points[there])
     last = total + TURNS[turn] @ shift(sides[-1][1])
-    return PathVector(last, float(abs(place)), sides[0][0], sides[-1][1], turn)
+    # Along one edge there is nothing between, however far off the straight way its end may be.
+    length = float(abs(place)) if len(sides) > 1 else 0.0
+    return PathVector(last, length, sides[0][0], sides[-1][1], turn)

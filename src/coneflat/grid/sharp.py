@@ -1,8 +1,8 @@
 """A seamless layout of a surface in which its sharp edges lie along the axes.
 
-Cut open along them, the surface falls into patches, which are flattened one by one, conformally, with straight sides. Of
-two patches beside a sharp edge each has it at another length then. Relaxation, which is not conformal, brings both sides
-together point by point, as quarter turns of each other, without turning a triangle over.
+Cut open along them, the surface falls into patches, which are flattened one by one, conformally, with straight sides.
+Of two patches beside a sharp edge each has it at another length then. Relaxation, which is not conformal, brings both
+sides together point by point, as quarter turns of each other, without turning a triangle over.
 """
 
 from __future__ import annotations
@@ -84,7 +84,9 @@ def flatten_patches(opened: Opened, lengths: FloatArray, options: Options) -> Lo
         count += len(flat.points)
     coarse = np.concatenate(turned)
     if len(coarse):
-        raise CoarseError(coarse, f"{len(coarse)} of {len(corners):,} triangles are turned over on straight sides")
+        raise CoarseError(
+            coarse, f"{len(coarse)} of {len(corners):,} triangles are turned over on straight sides"
+        )
     return Loose(np.concatenate(points), corners, np.concatenate(cones))
 
 

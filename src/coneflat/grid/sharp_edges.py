@@ -25,15 +25,17 @@ from .sharp import CoarseError, PatchError, sharp_layout
 
 # What may be asked of the cones inside patches, and of the input.
 TAKEN = frozenset(
-    "sharp_angle boundary quantise correct_handles charts min_cone_angle max_cone_angle distortion creases repair strict "
-    "solver progress".split()
+    (
+        *("sharp_angle", "boundary", "quantise", "quantize", "correct_handles", "charts"),
+        *("min_cone_angle", "max_cone_angle", "distortion", "creases", "repair", "strict", "solver"),
+    )
 )
 # Edges across the whole surface, about, that each has at least for the layout to bend along.
 ACROSS = 25
 # Squares: shorter stubs are dropped, and sharp edges around patches with less area.
 LASTING, LEAST_AREA = 4.0, 1.0
 # Times that triangles are split because they are too coarse, and that sharp edges are left out.
-SPLITS, TRIES = 4, 10
+SPLITS, TRIES = 4, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,7 @@ def sharp_layouts(
         OptionError, MeshError: as `coneflat.flatten`.
     """
     _check_taken(given)
-    options = read_options(given)
+    options: Options = read_options(given)
     angle = options.sharp_angle
     assert angle is not None
     if options.boundary_kind not in ("free", "straight"):
@@ -96,8 +98,8 @@ def _check_taken(given: Mapping[str, Any]) -> None:
     others = sorted(set(given) - TAKEN)
     if others:
         raise OptionError(
-            f"with sharp edges on grid lines, cones are found for each patch between them: {list_some(others)} cannot be "
-            "given beside sharp_angle"
+            f"with sharp edges on grid lines, cones are found for each patch between them: {list_some(others)} cannot "
+            "be given beside sharp_angle"
         )
 
 
@@ -137,13 +139,15 @@ class _Search:
         share = 100 * self.lengths[left].sum() / self.lengths.sum()
         why = f": {self.why}" if self.why else ", too short for quads of this size"
         return (
-            f"{plural(int(left.sum()), 'sharp edge')} of {len(left):,}, {share:.1f} % of their length, on no grid line"
-            f"{why}.",
+            f"{plural(int(left.sum()), 'sharp edge')} of {len(left):,}, {share:.1f} % of their length, on no grid "
+            f"line{why}.",
         )
 
     def layouts(self) -> Iterator[tuple[Layout, IntArray]]:
         """Yield layouts and their features."""
         for attempt in range(TRIES):
+            if not len(self.edges) and not self.mesh.is_boundary_edge.any():
+                return
             try:
                 layout = self._layout()
             except PatchError as error:
@@ -157,14 +161,14 @@ class _Search:
                 yield layout, self.mesh.edges[self.edges]
                 self.why = "there was no grid with them"
                 self._drop_some(attempt)
-            if not len(self.edges) and not self.mesh.is_boundary_edge.any():
-                return
 
     def _layout(self) -> Layout:
         for _ in range(SPLITS):
             lengths = self._side_lengths()
             try:
-                return sharp_layout(opened(self.mesh, self.edges, lengths), lengths, self.square, self.options)
+                return sharp_layout(
+                    opened(self.mesh, self.edges, lengths), lengths, self.square, self.options
+                )
             except CoarseError as error:
                 finer = split_faces(self.mesh, self.edges, self.origin, error.faces)
                 coarse = error

@@ -13,7 +13,7 @@ PIVOT = 0.5
 
 
 def sparse_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (v, k + 1) a basis of the solutions of equations, one solution in the last column, and what was missed.
+    """Return (v, k + 1) a basis of the solutions of equations, one of these in the last column, and what was missed.
 
     Equations with the fewest variables are solved first, each for the variable that is in the fewest others (H. M.
     Markowitz, "The elimination form of the inverse and its application to linear programming", 1957), so that variables
@@ -24,7 +24,8 @@ def sparse_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, F
         right: (r,).
 
     Returns:
-        The basis, and (d,) the right-hand sides left of equations that depend on others: 0 unless they contradict these.
+        The basis, and (d,) what is left of the right-hand sides of equations that depend on others: 0 unless they
+        contradict these.
     """
     work = np.concatenate([rows, right[:, None]], axis=1)
     count = rows.shape[1]

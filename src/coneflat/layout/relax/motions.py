@@ -157,16 +157,17 @@ class _Builder:
             self.points[chains.right] - chains.rotation[chains.chain, None] * self.points[chains.left]
         ).mean(axis=1)
         count = len(chains.rotation)
-        total = np.bincount(chains.chain, off.real, count) + 1j * np.bincount(chains.chain, off.imag, count)
-        mean: ComplexArray = total / np.maximum(np.bincount(chains.chain, minlength=count), 1)
-        return mean
+        total = np.zeros(count, dtype=np.complex128)
+        np.add.at(total, chains.chain, off)
+        total /= np.maximum(np.bincount(chains.chain, minlength=count), 1)
+        return total
 
     def _missing(self, left: IntArray, right: IntArray, chain: IntArray) -> ComplexArray:
         """Return by what right points have to be shifted to be where the left ones go; nothing along rigid seams."""
         if not self.constraints.quarter_turns:
             return np.zeros(len(left), dtype=np.complex128)
-        turned: ComplexArray = self.chains.rotation[chain] * self.points[left] + self.translation[chain]
-        return turned - self.points[right]
+        turned: ComplexArray = self.chains.rotation[chain] * self.points[left]
+        return turned + self.translation[chain] - self.points[right]
 
     def motions(self) -> Motions:
         """Return the motions."""
@@ -246,12 +247,11 @@ class _Builder:
         shifts = self.of_line[line] >= 0
         unknown = self.count + np.arange(len(left))
         self.count += len(left)
-        for points, factor in ((left, np.ones_like(turn)), (right, turn)):
+        same: ComplexArray = np.ones_like(turn)
+        for points, factor in ((left, same), (right, turn)):
             self._add_unknowns(points, factor * direction, unknown)
             self._add_offset(points, factor * off)
-            self._add(
-                points[shifts], self.of_line[line[shifts]], (factor * normal)[shifts], is_complex=False
-            )
+            self._add(points[shifts], self.of_line[line[shifts]], (factor * normal)[shifts], is_complex=False)
 
     def _add_ordinary(self) -> None:
         """Let all other points move: anywhere, along a line, or to their places."""
