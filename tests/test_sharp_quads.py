@@ -66,6 +66,7 @@ SHAPES = {
     "cylinder": shapes.cylinder(caps=True),
     "hexagon": prism(6),
     "open box": open_box(),
+    "two": shapes.join(shapes.box(2), (shapes.cylinder(caps=True)[0] + 5, shapes.cylinder(caps=True)[1])),
 }
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from .._arrays import ComplexArray, FloatArray, IntArray
 from ..errors import GridError
+from ..geometry import mollify
 from ..geometry.planar import signed_double_areas
 from ..geometry.triangles import double_areas, edge_lengths
 from ..layout.relax.seam_chains import SeamChains, find_chains
@@ -58,7 +59,8 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Layo
         SeamError: the sides of a seam are no rigid copies of each other.
     """
     mesh = TriangleMesh(result.vertices, result.faces)
-    lengths = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
+    own = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
+    lengths, _ = mollify(own)
     flat = signed_double_areas(result.corner_uv)
     if not (flat > 0).all():
         raise GridError(

@@ -11,11 +11,9 @@ from ..cones import ConeSolution
 from ..cones.choose import ROOM, Surface
 from ..cones.integer.search import quantise_cones
 from ..cones.sparse import ConeSearch
-from ..errors import ConvergenceError, CurvatureError
+from ..errors import CurvatureError
 from ..flat.exact.boundary import straight_boundary
-from ..flat.exact.flatten import ExactChoices, ExactFlatMetric, exact_flattening
-from ..flat.exact.handles import CorrectedMetric, corrected_flattening
-from ..geometry.handles import open_turning
+from ..flat.exact.flatten import ExactChoices, exact_flattening
 from ..geometry.planar import signed_double_areas
 from ..geometry.ties import tie_key
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
@@ -62,7 +60,9 @@ def flatten_patch(
     corners = np.where(on_boundary, QUARTER * (2 - quarters), 0.0)
     solution = _cones(mesh, lengths, corners, distortion, options)
     choices = ExactChoices(scale_at_cones=False, boundary=straight_boundary(mesh, solution.target))
-    metric = _metric(mesh, lengths, solution, choices)
+    # Rotations along handles are no quarter turns yet, nor are loops of the boundary parallel: both come to be so when
+    # patches are brought together.
+    metric = exact_flattening(mesh, lengths, solution, choices)
     costs = edge_costs(mesh, lengths.ravel()[mesh.edge_halfedges[:, 0]], creases=options.creases)
     seams = find_seams(mesh, solution.cones, costs)
     laid_out = metric.lay_out(cut_open(mesh, seams).mesh, seams)
@@ -70,18 +70,6 @@ def flatten_patch(
     points = laid_out.points[:, 0] + 1j * laid_out.points[:, 1]
     points = points * np.exp(-1j * _side_angle(mesh, laid_out.corners, points))
     return FlatPatch(points, laid_out.corners, solution.cones, turned)
-
-
-def _metric(
-    mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, choices: ExactChoices
-) -> ExactFlatMetric | CorrectedMetric:
-    """Return a flat metric, if it can be with rotations along handles that are quarter turns: it need not be as yet."""
-    if mesh.genus():
-        try:
-            return corrected_flattening(lengths, solution, choices, open_turning(mesh), QUARTER)
-        except ConvergenceError:
-            pass
-    return exact_flattening(mesh, lengths, solution, choices)
 
 
 def _cones(
