@@ -8,9 +8,10 @@ import numpy as np
 
 from .._arrays import ComplexArray, FloatArray, IntArray
 from ..errors import GridError
+from ..geometry import mollify
 from ..geometry.planar import signed_double_areas
 from ..geometry.triangles import double_areas, edge_lengths
-from ..layout.relax.seam_chains import find_chains
+from ..layout.relax.seam_chains import SeamChains, find_chains
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from ..result.flattening import Flattening
 from .sides import Sides, find_sides, side_angles
@@ -58,7 +59,8 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Layo
         SeamError: the sides of a seam are no rigid copies of each other.
     """
     mesh = TriangleMesh(result.vertices, result.faces)
-    lengths = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
+    own = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
+    lengths, _ = mollify(own)
     flat = signed_double_areas(result.corner_uv)
     if not (flat > 0).all():
         raise GridError(
@@ -78,8 +80,24 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Layo
 
 def _turned(layout: Layout) -> Layout:
     """Return the layout with charts joined at some seams, along its creases, a cone of each component at the origin."""
-    mesh, corners, points = layout.mesh, layout.corners, layout.points.copy()
-    chains = find_chains(mesh, corners, points, layout.cones)
+    mesh, corners = layout.mesh, layout.corners
+    chains = find_chains(mesh, corners, layout.points, layout.cones)
+    points, of_point = joined_charts(corners, layout.points, chains)
+    is_straight, angles = side_angles(mesh, corners, points, of_point)
+    angles = np.where(is_straight, angles, _crease_angles(layout, points, of_point))
+    points *= np.exp(-1j * angles)[of_point]
+    turned = replace(layout, points=points, sides=find_sides(mesh, corners, points, is_straight[of_point]))
+    return replace(turned, points=points - origins(turned, of_point)[of_point])
+
+
+def joined_charts(
+    corners: IntArray, points: ComplexArray, chains: SeamChains
+) -> tuple[ComplexArray, IntArray]:
+    """Return (u,) points with charts moved to each other, so that none of `joining_chains` moves a point.
+
+    And (u,) the component of each point.
+    """
+    points = points.copy()
     chart, component = charts_of(corners, len(points), chains)
     _, firsts = np.unique(chains.chain, return_index=True)
     done = np.zeros(len(component), dtype=bool)
@@ -99,15 +117,10 @@ def _turned(layout: Layout) -> Layout:
             points[with_it] = factor / abs(factor) * (points[with_it] - points[moving[0]]) + points[still[0]]
             done[chart[moving[0]]] = True
         left_over = later
-    of_point = component[chart]
-    is_straight, angles = side_angles(mesh, corners, points, of_point)
-    angles = np.where(is_straight, angles, _crease_angles(layout, points, of_point))
-    points *= np.exp(-1j * angles)[of_point]
-    turned = replace(layout, points=points, sides=find_sides(mesh, corners, points, is_straight[of_point]))
-    return replace(turned, points=points - _origins(turned, of_point)[of_point])
+    return points, component[chart]
 
 
-def _origins(layout: Layout, component: IntArray) -> ComplexArray:
+def origins(layout: Layout, component: IntArray) -> ComplexArray:
     """Return (c,) the place of the first cone or corner of each component, or else of the first point on a side."""
     vertex = np.zeros(len(layout.points), dtype=np.int64)
     vertex[layout.corners.ravel()] = layout.mesh.faces.ravel()

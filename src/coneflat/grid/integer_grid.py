@@ -27,7 +27,8 @@ from ..threads import one_blas_thread
 from .aligned import Layout, aligned
 from .given_cones import require_quarters
 from .motions import find_motions
-from .rounding import find_rounding
+from .rounding import Rounding, find_rounding
+from .sharp_edges import sharp_layouts
 from .sides import Sides
 from .transitions import Transitions, find_transitions
 
@@ -46,6 +47,8 @@ STRAIGHT = {"min_cone_angle": np.pi / 2}
 TRIES = 6
 # Newton steps at most, and how many times that of an isometry the energy may become: cones fall together then.
 STEPS, HOPELESS = 200, 1e3
+# Part of their areas that triangles keep in a start for relaxation.
+LEAST_START = 1e-2
 # Part of the squares wanted by which there may be more or fewer without a note.
 NOTED = 0.1
 # Bits after the point that coordinates have at most: so seams fit exactly, and no triangle notices.
@@ -74,8 +77,10 @@ class IntegerGrid:
         qc_before, qc_mean: quasi-conformal distortion, the mean by area, likewise.
         least_area: of any triangle, over what it should have.
         notes: what was done, one sentence each.
-        corners: (k,) vertices on grid points where straight sides of the boundary meet; sides lie on grid lines.
-        corner_quarters: (k,) the quarter turns of their angle: 1, 3 or more.
+        corners: (k,) further vertices on grid points, where straight sides of the boundary, or sharp edges, meet at an
+            angle; sides and these lie on grid lines.
+        corner_quarters: (k,) the quarter turns of their angle.
+        features: (f, 2) vertices of sharp edges that lie on grid lines.
         seconds: wall time of each stage; files do not keep it.
     """
 
@@ -97,6 +102,7 @@ class IntegerGrid:
     notes: tuple[str, ...] = ()
     corners: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     corner_quarters: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    features: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     seconds: dict[str, float] = field(default_factory=dict)
 
     def report(self) -> dict[str, float | None]:
@@ -136,6 +142,7 @@ def integer_grid(
     quads: int | None = None,
     size: float | None = None,
     stretch: float = 0.0,
+    sharp_angle: float | str | None = None,
     **options: Any,
 ) -> IntegerGrid:
     """Return a map of a surface to the integer grid, seamless: unit squares become quads that meet across seams.
@@ -145,6 +152,8 @@ def integer_grid(
         quads: about so many unit squares cover the surface; None: 10,000, unless a size is given.
         size: of a square in model units, instead.
         stretch: from angles, 0, to areas, 1: what the map keeps; see `StretchEnergy`.
+        sharp_angle: radians: edges at which the surface bends by more come to lie on grid lines, and the boundary with
+            them; None for none.
         options: of `coneflat.flatten`; by default cones have three, five or six quads. Cones that are given have
             curvatures, multiples of pi/2; on surfaces with handles, or several boundaries, few have a grid.
 
@@ -166,9 +175,17 @@ def integer_grid(
     stages = Stages(options.get("progress"))
     told: tuple[str, ...] = ()
     if isinstance(mesh, Flattening):
-        if faces is not None or options:
+        if faces is not None or options or sharp_angle is not None:
             raise OptionError("a flattening has its faces and options: none can be given beside it")
         result = mesh
+    elif sharp_angle is not None:
+        given = {**OPTIONS, **options, "sharp_angle": sharp_angle}
+        given.pop("progress", None)
+        with stages("grid"):
+            found = _sharp(
+                mesh, faces, None if size is not None else wanted, size, given, StretchEnergy(stretch)
+            )
+        return replace(found, seconds=stages.seconds)
     else:
         with stages("flatten"):
             result = flatten(mesh, faces, **{**_defaults(options), **options})
@@ -196,6 +213,32 @@ def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
         return OPTIONS if options.get("boundary") != "straight" else {**OPTIONS, **STRAIGHT}
     require_quarters(given)
     return {"charts": "one"}
+
+
+def _sharp(
+    mesh: Any,
+    faces: ArrayLike | None,
+    quads: float | None,
+    size: float | None,
+    given: dict[str, Any],
+    energy: StretchEnergy,
+) -> IntegerGrid:
+    """Return a grid with as many sharp edges on grid lines as can be."""
+    why = "none is long enough for quads of this size"
+    for found in sharp_layouts(mesh, faces, quads, size, given):
+        with one_blas_thread():
+            grid, why = _attempt(found.layout, energy)
+        if grid is not None:
+            return replace(grid, features=found.features, notes=(*grid.notes, *found.notes))
+    plain = integer_grid(
+        mesh,
+        faces,
+        size=size,
+        quads=None if quads is None else int(np.ceil(quads)),
+        stretch=energy.stretch,
+        **{name: value for name, value in given.items() if name != "sharp_angle"},
+    )
+    return replace(plain, notes=(*plain.notes, f"No sharp edge is on a grid line: {why}."))
 
 
 def _loose_border(layout: Layout) -> int:
@@ -231,8 +274,9 @@ def _attempt(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None,
     smooth = transitions.places(layout.points, rounding.smooth)
     tries, why = 0, "all lattice points near it put cones on each other"
     for values in candidates[:TRIES]:
+        start = _displaced(layout, smooth, rounding, transitions, values)
         try:
-            found = _relaxed(layout, smooth, transitions, values, energy)
+            found = _relaxed(layout, start, transitions, values, energy)
         except ConvergenceError as error:
             tries, why = tries + 1, str(error)
             continue
@@ -241,6 +285,19 @@ def _attempt(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None,
             return _described(layout, smooth, points, found, transitions, tries), ""
         tries, why = tries + 1, "a triangle so small was left that rounding turned it over"
     return None, why
+
+
+def _displaced(
+    layout: Layout, smooth: ComplexArray, rounding: Rounding, transitions: Transitions, values: IntArray
+) -> ComplexArray:
+    """Return the layout with seams and cones where they are to be, moved by the shift of least energy.
+
+    Where that makes a triangle too small the smooth layout itself: relaxation may find a way.
+    """
+    shift = rounding.stiffness.displacement((values - rounding.smooth)[:, None])[:, 0]
+    moved = transitions.places(smooth + shift[0::2] + 1j * shift[1::2], values.astype(np.float64))
+    before, after = (signed_double_areas(_pairs(points)[layout.corners]) for points in (smooth, moved))
+    return moved if (after > LEAST_START * before).all() else smooth
 
 
 def _relaxed(

@@ -28,6 +28,7 @@ def quads(
     quads: int | None = None,
     size: float | None = None,
     stretch: float = 0.0,
+    sharp_angle: float | str | None = None,
     smooth: int = ROUNDS,
     **options: Any,
 ) -> QuadMesh:
@@ -39,6 +40,7 @@ def quads(
         quads: about how many; None: 10,000, unless a size is given.
         size: of a quad's edges in model units, instead.
         stretch: from angles, 0, to areas, 1: what quads are to be alike in; see `integer_grid`.
+        sharp_angle: radians: quads' edges run along edges at which the surface bends by more; None for none.
         smooth: rounds of smoothing on the surface, see `smooth_quads`; 0 for none.
         options: of `coneflat.flatten`; by default cones have three, five or six quads.
 
@@ -49,17 +51,25 @@ def quads(
     """
     progress = options.get("progress")
     if isinstance(mesh, IntegerGrid):
-        if faces is not None or quads is not None or size is not None or options.keys() - {"progress"}:
+        if (
+            faces is not None
+            or quads is not None
+            or size is not None
+            or sharp_angle is not None
+            or options.keys() - {"progress"}
+        ):
             raise OptionError("a grid has its faces, size and options: none can be given beside it")
         grid = mesh
     else:
-        grid = integer_grid(mesh, faces, quads=quads, size=size, stretch=stretch, **options)
+        grid = integer_grid(
+            mesh, faces, quads=quads, size=size, stretch=stretch, sharp_angle=sharp_angle, **options
+        )
     stages = Stages(progress)
     stages.done = 1.0
     with stages("extract"):
         found = extract_quads(grid)
     with stages("smooth"):
-        found = smooth_quads(found, smooth)
+        found = smooth_quads(found, smooth, grid.features)
     return replace(found, notes=(*grid.notes, *_notes(found)), seconds={**grid.seconds, **stages.seconds})
 
 

@@ -13,11 +13,16 @@ from .._arrays import ComplexArray, FloatArray, IntArray
 from ..errors import GridError
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from .lattice import nearest_points, reduced, whole_solutions
+from .near_sides import PathVector, distances_to_sides, paths_to_sides
 from .stiffness import Stiffness
-from .transitions import TURNS, Transitions
+from .transitions import TURNS, UNITS, Transitions
 
 # Units: cones that are farther from each other along the surface are not rounded onto each other.
 NEAR = 3.0
+# Part of the way between two sides, or a side and a cone, that leads straight to the other if they face each other.
+FACING = 0.45
+# Units below which they are on one line.
+APART = 1e-6
 # Lattice points that are looked at for each set of pairs kept apart, and sets of such at most.
 CANDIDATES, REPAIRS = 64, 200
 # Of these, whether they turn triangles over is looked at beforehand.
@@ -167,6 +172,11 @@ def _near_pairs(
     is_cone = np.zeros(len(mesh.vertices), dtype=bool)
     is_cone[cones] = True
     rows = []
+
+    def joining(path: list[int]) -> PathVector:
+        sides = [_side(int(halfedge[a, b]), int(halfedge[b, a]), starts, ends) for a, b in pairwise(path)]
+        return _vector(sides, transitions, points)
+
     for i, j in np.argwhere(np.isfinite(found[:, cones])).tolist():
         if i >= j:
             continue
@@ -176,9 +186,13 @@ def _near_pairs(
         path.reverse()
         if is_cone[path[1:-1]].any():
             continue
-        sides = [_side(int(halfedge[a, b]), int(halfedge[b, a]), starts, ends) for a, b in pairwise(path)]
-        rows.append(_vector(sides, transitions))
-    joined = np.array(rows, dtype=np.int64).reshape(len(rows), 2, basis.shape[0]) @ basis
+        rows.append(joining(path).rows)
+    cones_apart = np.array(rows, dtype=np.int64).reshape(len(rows), 2, basis.shape[0])
+    paths = paths_to_sides(mesh, corners, points, cones, transitions, NEAR)
+    sides_apart, length = distances_to_sides([joining(path) for path in paths], transitions)
+    sides_apart = sides_apart @ basis
+    facing = np.abs(sides_apart[:, 0] @ start) > np.maximum(FACING * length, APART)
+    joined = np.concatenate([cones_apart @ basis, sides_apart[facing]])
     return ConePairs(joined, joined @ start)
 
 
@@ -189,8 +203,8 @@ def _side(forth: int, back: int, starts: IntArray, ends: IntArray) -> tuple[int,
     return int(ends[back - 1]), int(starts[back - 1])
 
 
-def _vector(sides: list[tuple[int, int]], transitions: Transitions) -> IntArray:
-    """Return (2, v) the vector along a path, in the frame of its first edge, by the variables.
+def _vector(sides: list[tuple[int, int]], transitions: Transitions, points: ComplexArray) -> PathVector:
+    """Return the vector along a path, given by the points at the ends of its edges.
 
     The places of vertices on the way cancel: of two copies of one, i^turn base + shift each, the difference is left
     between their shifts, seen from one frame.
@@ -201,10 +215,14 @@ def _vector(sides: list[tuple[int, int]], transitions: Transitions) -> IntArray:
         return rows
 
     turn, total = 0, -shift(sides[0][0])
-    for (_, here), (there, _) in pairwise(sides):
+    place = points[sides[0][1]] - points[sides[0][0]]
+    for (_, here), (there, end) in pairwise(sides):
         if here != there:
             across = int(transitions.turn[here] - transitions.turn[there]) % 4
             total = total + TURNS[turn] @ (shift(here) - TURNS[across] @ shift(there))
             turn = (turn + across) % 4
-    last: IntArray = total + TURNS[turn] @ shift(sides[-1][1])
-    return last
+        place += UNITS[turn] * (points[end] - points[there])
+    last = total + TURNS[turn] @ shift(sides[-1][1])
+    # Along one edge there is nothing between, however far off the straight way its end may be.
+    length = float(abs(place)) if len(sides) > 1 else 0.0
+    return PathVector(last, length, sides[0][0], sides[-1][1], turn)

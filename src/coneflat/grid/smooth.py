@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._arrays import BoolArray, FloatArray, IntArray, dots
 from ..errors import OptionError
 from ..geometry.nearest import Stars, slide_near
 from ..mesh import NEXT
+from .bisect import edge_indices
 from .jacobians import least_jacobians
 from .quad_mesh import QuadMesh
 from .worst import lift_worst
@@ -20,25 +22,28 @@ LEAST = 0.5
 SHARP = np.deg2rad(40.0)
 
 
-def smooth_quads(quads: QuadMesh, rounds: int = 10) -> QuadMesh:
+def smooth_quads(quads: QuadMesh, rounds: int = 10, features: ArrayLike = ()) -> QuadMesh:
     """Return a quad mesh with squarer quads, whose vertices have moved on the surface.
 
     Each quad asks its corners to go to the nearest square (S. Bouaziz, M. Deuss, Y. Schwartzburg, T. Weise, M. Pauly,
     "Shape-Up: shaping discrete geometry with projections", 2012, Section 4). Each vertex goes to the mean of what its
     quads ask for, and from there to the nearest point of the surface nearby. A quad whose scaled Jacobian would fall
     too low keeps its corners where they were. Quads that are bad in the end are made better by moving single vertices.
-    Vertices of the boundary stay, and those on sharp edges.
+    Vertices of the boundary stay, and those on edges of the surface that bend by 40 degrees and more.
 
     Args:
         quads: the quad mesh.
         rounds: how many times.
+        features: (f, 2) vertices of further edges of the surface on which vertices stay.
 
     Raises:
         OptionError: the number of rounds is negative.
     """
     if rounds < 0:
         raise OptionError(f"smoothing takes 0 rounds or more, not {rounds}")
-    movable = ~(quads.is_boundary_vertex | _is_held(quads))
+    movable = ~(
+        quads.is_boundary_vertex | _is_held(quads, np.asarray(features, dtype=np.int64).reshape(-1, 2))
+    )
     surface = Stars.of(quads.surface.vertices, quads.surface.faces)
     points, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
     for _ in range(rounds):
@@ -88,14 +93,15 @@ def _held_back(old: FloatArray, new: FloatArray, quads: IntArray) -> BoolArray:
         stays[quads[bad]] = True
 
 
-def _is_held(quads: QuadMesh) -> BoolArray:
-    """Return (q,) the vertices on sharp edges of the surface."""
+def _is_held(quads: QuadMesh, features: IntArray) -> BoolArray:
+    """Return (q,) the vertices on sharp edges of the surface, and on features (f, 2)."""
     mesh = quads.surface
     corners = mesh.vertices[mesh.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.sqrt(dots(normal, normal)), np.finfo(float).tiny)[:, None]
     one, two = mesh.edge_faces.T
     sharp = (dots(normal[one], normal[two]) < np.cos(SHARP)) & ~mesh.is_boundary_edge
+    sharp[edge_indices(mesh, features)] = True
     has_sharp = np.zeros(len(mesh.vertices), dtype=bool)
     has_sharp[mesh.edges[sharp]] = True
     within = quads.barycentric > 0

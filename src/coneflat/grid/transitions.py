@@ -32,7 +32,7 @@ class Transitions:
     """The motions of a layout's seams, and what may vary of them.
 
     The variables are x and y of the translation of each chain, x and y of the place of one copy of each cone, and the
-    one coordinate that points of a side of the boundary have in common.
+    one coordinate that points of a side have in common, on the boundary or on the left of a chain.
 
     Attributes:
         chains: the seams.
@@ -124,8 +124,8 @@ class _Builder:
         """Return the transitions."""
         chains, points = self.chains, self.points
         self.held[np.isin(self.vertex, self.cones)] = True
-        self._add_regular()
-        self._add_sides()
+        on_side = self._add_sides()
+        self._add_regular(on_side)
         self._add_nodes()
         self._fix_charts()
         row, column, value = (np.concatenate(parts) for parts in zip(*self.entries, strict=True))
@@ -157,29 +157,43 @@ class _Builder:
         )
         return mean
 
-    def _add_regular(self) -> None:
-        """Give the right points within chains by the left ones."""
+    def _add_regular(self, on_side: IntArray) -> None:
+        """Give the right points within chains by the left ones, of which some are (u,) on a side, else -1."""
         chains = self.chains
         inside = ~chains.is_node[chains.vertices]
         right, at = np.unique(chains.right[inside], return_index=True)
+        left = chains.left[inside][at]
         chain = np.broadcast_to(chains.chain[:, None], chains.left.shape)[inside][at]
-        self.base[right] = chains.left[inside][at]
+        self.base[right] = left
         self.turn[right] = self.quarters[chain]
         for axis in range(2):
             self.entries.append((2 * right + axis, 2 * chain + axis, np.ones(len(right), dtype=np.int64)))
+        held = on_side[left] >= 0
+        right, side = right[held], on_side[left[held]]
+        factors = TURNS[self.quarters[chain[held]], :, self.sides.axis[side]]
+        for axis in range(2):
+            self.entries.append((2 * right + axis, self.first_side + side, factors[:, axis]))
 
-    def _add_sides(self) -> None:
-        """Give a coordinate of points on sides where no seam ends, by that of the side; remember the others."""
-        on_seam = np.zeros(len(self.points), dtype=bool)
-        on_seam[self.chains.left] = on_seam[self.chains.right] = True
+    def _add_sides(self) -> IntArray:
+        """Give a coordinate of points on sides by that of the side, and remember where seams end.
+
+        Return (u,) the side of each such point, else -1.
+        """
+        chains = self.chains
+        is_end = np.zeros(len(self.points), dtype=bool)
+        for ends in (chains.left, chains.right):
+            is_end[ends[chains.is_node[chains.vertices]]] = True
         points, side = self.sides.points, self.sides.side
-        special = on_seam[points] | self.held[points, 0]
+        special = is_end[points] | self.held[points, 0]
         for point, one in zip(points[special].tolist(), side[special].tolist(), strict=True):
             self.sides_at[point].append(one)
         points, side = points[~special], side[~special]
         axis = self.sides.axis[side]
         self.held[points, axis] = True
         self.entries.append((2 * points + axis, self.first_side + side, np.ones(len(points), dtype=np.int64)))
+        on_side = np.full(len(self.points), -1)
+        on_side[points] = side
+        return on_side
 
     def _add_nodes(self) -> None:
         """Give the copies of each node by one of them, and close the circle around it."""

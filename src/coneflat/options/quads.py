@@ -26,6 +26,11 @@ class QuadOptions(RunOptions, ConeBounds, ConeNumber):
         0.0, Strength(1.0), "What quads are to be alike in: from angles, 0, to sizes as well, 1."
     )
     smooth: int = option(10, Count(), "Rounds of smoothing on the surface; 0 for none.")
+    sharp_angle: float | None = option(
+        None,
+        Number(is_angle=True, optional=True),
+        "Edges at which the surface bends by more lie on grid lines, and the boundary with them: quads run along them.",
+    )
     cones: str | Mapping[int, float] = option(
         "auto",
         WordOrVertices(("auto",), "cone"),

@@ -32,7 +32,7 @@ class Limits:
     @classmethod
     def of_angles(
         cls,
-        euler_characteristic: int | None,
+        euler_characteristic: float | None,
         min_cone_angle: float,
         max_cone_angle: float | None,
         positive_only: bool,
@@ -61,8 +61,8 @@ class Limits:
         if (total > 0 and most <= 0) or (total < 0 and least >= 0):
             kind = "positive" if total < 0 else "negative"
             raise CurvatureError(
-                f"a surface of Euler characteristic {euler_characteristic} has a total curvature of "
-                f"{2 * euler_characteristic} pi, which cones of {kind} curvature alone cannot carry"
+                f"a surface of Euler characteristic {euler_characteristic:g} has a total curvature of "
+                f"{2 * euler_characteristic:g} pi, which cones of {kind} curvature alone cannot carry"
             )
         return cls(least, most, total)
 

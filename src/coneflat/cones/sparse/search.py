@@ -102,7 +102,7 @@ class ConeSearch:
         curvature: FloatArray,
         areas: FloatArray,
         is_boundary: BoolArray,
-        euler_characteristic: int,
+        euler_characteristic: float,
         *,
         tie_key: FloatArray | None = None,
         min_cone_angle: float = math.pi / 2,

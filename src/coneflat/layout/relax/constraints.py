@@ -44,6 +44,9 @@ class PointConstraints:
         tied: (q,) half-edges of seams.
         translations: (q, 2) what is added in the end to a point in the frame of the triangle across each, turned by the
             seam's rotation, to give the one in the frame of its own.
+        quarter_turns: the sides of seams come to be the nearest quarter turns of each other, point by point, whatever
+            they are as yet; else they must be rigid copies, and keep their rotations.
+        nodes: vertices at which seams end in any case.
     """
 
     pinned: ArrayLike = ()
@@ -52,6 +55,8 @@ class PointConstraints:
     held_seams: ArrayLike = ()
     tied: ArrayLike = ()
     translations: ArrayLike = ()
+    quarter_turns: bool = False
+    nodes: ArrayLike = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +72,8 @@ class CheckedConstraints:
     held_seams: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     tied: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     translations: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+    quarter_turns: bool = False
+    nodes: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
 def check_constraints(constraints: PointConstraints, points: FloatArray) -> CheckedConstraints:
@@ -90,11 +97,22 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
         raise OptionError(
             f"{plural(len(tied), 'half-edge')} tied, but {plural(len(translations), 'translation')} for them"
         )
+    nodes = np.asarray(constraints.nodes, dtype=np.int64).ravel()
     lines = constraints.lines
     if lines is None:
         none = np.empty(0, dtype=np.int64)
         return CheckedConstraints(
-            pinned, places, none, none, np.empty((0, 2)), np.empty(0), held, tied, translations
+            pinned,
+            places,
+            none,
+            none,
+            np.empty((0, 2)),
+            np.empty(0),
+            held,
+            tied,
+            translations,
+            constraints.quarter_turns,
+            nodes,
         )
     on_line = _indices(lines.points, len(points), "points of lines")
     directions = _floats(lines.directions, "directions of lines").reshape(-1, 2)
@@ -117,7 +135,19 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
             raise OptionError(
                 f"offsets of lines must be {plural(len(directions), 'number')}, or NaN, not of shape {offsets.shape}"
             )
-    return CheckedConstraints(pinned, places, on_line, line, directions, offsets, held, tied, translations)
+    return CheckedConstraints(
+        pinned,
+        places,
+        on_line,
+        line,
+        directions,
+        offsets,
+        held,
+        tied,
+        translations,
+        constraints.quarter_turns,
+        nodes,
+    )
 
 
 def _across(directions: FloatArray, places: FloatArray) -> FloatArray:

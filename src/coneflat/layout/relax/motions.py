@@ -11,6 +11,7 @@ from ..._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import OptionError
 from ...mesh import TriangleMesh
 from .constraints import CheckedConstraints
+from .elimination import sparse_solutions
 from .seam_chains import SeamChains, find_chains
 
 # Relative size below which what elimination leaves of an equation is rounding, and of a coefficient. What is taken for
@@ -72,9 +73,28 @@ def find_motions(
     """
     vertex = np.zeros(len(points), dtype=np.int64)
     vertex[corners.ravel()] = mesh.faces.ravel()
-    constrained = np.concatenate([constraints.pinned, constraints.on_line])
-    chains = find_chains(mesh, corners, points, vertex[constrained])
+    chains = _constrained_chains(mesh, corners, points, vertex, constraints)
     return _Builder(points, vertex, is_free, chains, constraints).motions()
+
+
+def _constrained_chains(
+    mesh: TriangleMesh, corners: IntArray, points: ComplexArray, vertex: IntArray, c: CheckedConstraints
+) -> SeamChains:
+    """Return the seams, with nodes at points that are held but on one line, as left ones within a seam may be."""
+    on, times = np.unique(c.on_line, return_counts=True)
+    nodes = np.concatenate([vertex[c.pinned], vertex[on[times > 1]], c.nodes])
+    chains = find_chains(mesh, corners, points, nodes, quarter_turns=c.quarter_turns)
+    inside = ~chains.is_node[chains.vertices]
+    if not np.isin(on, chains.right[inside]).any():
+        return chains
+    return find_chains(
+        mesh, corners, points, np.concatenate([nodes, vertex[on]]), quarter_turns=c.quarter_turns
+    )
+
+
+def _require_solved(missed: float, right: FloatArray) -> None:
+    if missed > ROUNDING * max(1.0, float(np.abs(right).max())):
+        raise OptionError(f"constraints contradict each other, or the seams: by {missed:.2g} at least")
 
 
 class _Builder:
@@ -110,6 +130,7 @@ class _Builder:
         shifting = np.flatnonzero(np.isnan(constraints.offsets))
         self.of_line[shifting] = 2 * (len(special) + len(loose)) + np.arange(len(shifting))
         self.size = 2 * (len(special) + len(loose)) + len(shifting)
+        self.translation = self._translations()
         c = constraints
         self.ties = [
             self._tie(side, shift)
@@ -128,6 +149,25 @@ class _Builder:
             is_held = np.isin(ends[:, 0] * n + ends[:, 1], held[:, 0] * n + held[:, 1])
             is_loose[chains.chain[is_held]] = False
         return np.flatnonzero(is_loose)
+
+    def _translations(self) -> ComplexArray:
+        """Return (c,) what is added to the left side of each chain, turned, on average, to give the right one."""
+        chains = self.chains
+        off = (
+            self.points[chains.right] - chains.rotation[chains.chain, None] * self.points[chains.left]
+        ).mean(axis=1)
+        count = len(chains.rotation)
+        total = np.zeros(count, dtype=np.complex128)
+        np.add.at(total, chains.chain, off)
+        total /= np.maximum(np.bincount(chains.chain, minlength=count), 1)
+        return total
+
+    def _missing(self, left: IntArray, right: IntArray, chain: IntArray) -> ComplexArray:
+        """Return by what right points have to be shifted to be where the left ones go; nothing along rigid seams."""
+        if not self.constraints.quarter_turns:
+            return np.zeros(len(left), dtype=np.complex128)
+        turned: ComplexArray = self.chains.rotation[chain] * self.points[left]
+        return turned + self.translation[chain] - self.points[right]
 
     def motions(self) -> Motions:
         """Return the motions."""
@@ -178,11 +218,15 @@ class _Builder:
         chain = np.broadcast_to(chains.chain[:, None], chains.left.shape)[inside][at]
         self.is_special[left] = self.is_special[right] = True
         turn = chains.rotation[chain]
-        unknown = self.count + 2 * np.arange(len(left))
-        self.count += 2 * len(left)
+        self._add_offset(right, self._missing(left, right, chain))
+        on_line = np.isin(left, self.constraints.on_line)
+        self._add_on_lines(left[on_line], right[on_line], turn[on_line])
+        one, two, turning = left[~on_line], right[~on_line], turn[~on_line]
+        unknown = self.count + 2 * np.arange(len(one))
+        self.count += 2 * len(one)
         for axis, direction in enumerate((1.0, 1j)):
-            self._add_unknowns(left, np.full(len(left), direction, dtype=np.complex128), unknown + axis)
-            self._add_unknowns(right, direction * turn, unknown + axis)
+            self._add_unknowns(one, np.full(len(one), direction, dtype=np.complex128), unknown + axis)
+            self._add_unknowns(two, direction * turning, unknown + axis)
         moves = self.of_chain[chain] >= 0
         self._add(
             right[moves],
@@ -190,6 +234,24 @@ class _Builder:
             np.ones(int(moves.sum()), dtype=np.complex128),
             is_complex=True,
         )
+
+    def _add_on_lines(self, left: IntArray, right: IntArray, turn: ComplexArray) -> None:
+        """Let left points within seams move along their lines and with these, and the right ones alike."""
+        c = self.constraints
+        order = np.argsort(c.on_line, kind="stable")
+        at = order[np.searchsorted(c.on_line[order], left)]
+        line = c.line[at]
+        direction = self._complex(c.directions)[line]
+        normal = 1j * direction
+        off = normal * self._off_line(left, line)
+        shifts = self.of_line[line] >= 0
+        unknown = self.count + np.arange(len(left))
+        self.count += len(left)
+        same: ComplexArray = np.ones_like(turn)
+        for points, factor in ((left, same), (right, turn)):
+            self._add_unknowns(points, factor * direction, unknown)
+            self._add_offset(points, factor * off)
+            self._add(points[shifts], self.of_line[line[shifts]], (factor * normal)[shifts], is_complex=False)
 
     def _add_ordinary(self) -> None:
         """Let all other points move: anywhere, along a line, or to their places."""
@@ -234,13 +296,16 @@ class _Builder:
         rows, right = self._equations()
         if not len(rows):
             return np.concatenate([np.eye(self.size), np.zeros((self.size, 1))], axis=1)
+        if self.constraints.quarter_turns:
+            basis, left = sparse_solutions(rows, right)
+            _require_solved(float(np.abs(left).max(initial=0.0)), right)
+            return basis
         q, r, pivots = scipy.linalg.qr(rows, mode="economic", pivoting=True)
         diagonal = np.abs(np.diag(r))
         rank = int((diagonal > ROUNDING * max(diagonal[0], 1e-300)).sum())
         turned = q.T @ right
         missed = float(np.abs(right - q[:, :rank] @ turned[:rank]).max())
-        if missed > ROUNDING * max(1.0, float(np.abs(right).max())):
-            raise OptionError(f"constraints contradict each other, or the seams: by {missed:.2g} at least")
+        _require_solved(missed, right)
         solved = scipy.linalg.solve_triangular(
             r[:rank, :rank], np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
         )
@@ -275,7 +340,8 @@ class _Builder:
             ]
             terms = [term for term in terms if term[0] >= 0]
             if terms:
-                add(terms, 0.0)
+                ends = chains.left[k, [end]], chains.right[k, [end]], np.array([chain])
+                add(terms, complex(self._missing(*ends)[0]))
         for point, place in zip(c.pinned.tolist(), self._complex(c.places).tolist(), strict=True):
             if self.of_point[point] >= 0:
                 add([(int(self.of_point[point]), 1.0 + 0.0j)], place - complex(self.points[point]))
@@ -305,9 +371,7 @@ class _Builder:
             raise OptionError(f"tied half-edge {side} is on a seam that is held")
         turn = complex(chains.rotation[chain])
         wanted = shift if is_right else -turn * shift
-        return chain, wanted - complex(
-            self.points[chains.right[k, 0]] - turn * self.points[chains.left[k, 0]]
-        )
+        return chain, wanted - complex(self.translation[chain])
 
     @staticmethod
     def _complex(places: FloatArray) -> ComplexArray:

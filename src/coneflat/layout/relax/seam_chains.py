@@ -15,6 +15,7 @@ from ...mesh import NEXT, PREVIOUS, TriangleMesh, label_components
 SAME_ROTATION = 1e-5
 # By how much of an edge the sides of a seam may miss being copies of each other.
 RIGID = 1e-4
+QUARTERS = np.array([1, 1j, -1, -1j])
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,12 @@ class SeamChains:
 
 
 def find_chains(
-    mesh: TriangleMesh, corners: IntArray, points: ComplexArray, nodes: IntArray | None = None
+    mesh: TriangleMesh,
+    corners: IntArray,
+    points: ComplexArray,
+    nodes: IntArray | None = None,
+    *,
+    quarter_turns: bool = False,
 ) -> SeamChains:
     """Return the chains of the edges whose sides have different points.
 
@@ -51,6 +57,7 @@ def find_chains(
         corners: (m, 3) the point at each triangle corner.
         points: (u,) of the plane.
         nodes: vertices that are to be nodes, whether chains end there or not.
+        quarter_turns: rotations are the nearest quarter turns, whether the sides of seams are copies or not.
 
     Raises:
         SeamError: the sides of a seam are no rigid copies of each other.
@@ -63,9 +70,12 @@ def find_chains(
     vertices = np.stack([mesh.tails[h], mesh.heads[h]], axis=1)
     sides = np.stack([np.stack([starts[h], ends[h]], axis=1), np.stack([ends[t], starts[t]], axis=1)])
     one, two = (points[side[:, 1]] - points[side[:, 0]] for side in sides)
-    _check_rigid(edges, vertices, one, two)
+    if not quarter_turns:
+        _check_rigid(edges, vertices, one, two)
     turns = two * np.conj(one)
     turns /= np.abs(turns)
+    if quarter_turns:
+        turns = _nearest_quarter(turns)
 
     count = len(edges)
     is_node = np.bincount(vertices.ravel(), minlength=len(mesh.vertices)) != 2
@@ -95,7 +105,16 @@ def find_chains(
         chain,
         np.where(swapped, two * np.conj(one), 0).conj() + np.where(swapped, 0, two * np.conj(one)),
     )
-    return SeamChains(edges, vertices, left, right, halfedges, chain, total / np.abs(total), is_node)
+    rotation = total / np.abs(total)
+    if quarter_turns:
+        rotation = _nearest_quarter(rotation)
+    return SeamChains(edges, vertices, left, right, halfedges, chain, rotation, is_node)
+
+
+def _nearest_quarter(turns: ComplexArray) -> ComplexArray:
+    """Return the nearest of 1, i, -1 and -i."""
+    nearest: ComplexArray = QUARTERS[np.rint(np.angle(turns) / (np.pi / 2)).astype(np.int64) % 4]
+    return nearest
 
 
 def _turning(vertices: IntArray, sides: IntArray, turns: ComplexArray, is_node: BoolArray) -> IntArray:

@@ -1,0 +1,164 @@
+"""A seamless layout of a surface in which its sharp edges lie along the axes.
+
+Cut open along them, the surface falls into patches, which are flattened one by one, conformally, with straight sides.
+Of two patches beside a sharp edge each has it at another length then. Relaxation, which is not conformal, brings both
+sides together point by point, as quarter turns of each other, without turning a triangle over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .._arrays import ComplexArray, FloatArray, IntArray
+from ..errors import CurvatureError, GridError, MetricError, SeamError
+from ..geometry import double_areas
+from ..geometry.planar import signed_double_areas
+from ..layout.relax import Lines, PointConstraints, StretchEnergy, relax
+from ..layout.relax.seam_chains import SeamChains, find_chains
+from ..options import Options
+from .aligned import Layout, joined_charts, origins
+from .features import Opened
+from .patches import flatten_patch
+from .sides import Sides, find_sides
+
+# Newton steps at most.
+STEPS = 200
+# What counts beside angles on the way: patches of one size meet more easily.
+STRETCH = 1.0
+# By how much more than others small patches may be distorted, so that they have fewer cones.
+UNEVEN = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Loose:
+    """Patches in the plane that do not fit each other yet.
+
+    Attributes:
+        points: (u,) of the plane.
+        corners: (m, 3) the point at each triangle corner.
+        cones: vertices, inside patches.
+    """
+
+    points: ComplexArray
+    corners: IntArray
+    cones: IntArray
+
+
+class PatchError(GridError):
+    """A patch cannot be flattened; `faces` are its triangles."""
+
+    def __init__(self, faces: IntArray, why: str) -> None:
+        super().__init__(why)
+        self.faces = faces
+
+
+class CoarseError(PatchError):
+    """A patch cannot be flattened as some of its triangles, `faces`, are too coarse."""
+
+
+def flatten_patches(opened: Opened, lengths: FloatArray, options: Options) -> Loose:
+    """Return all patches of an opened mesh, flattened at their own areas; lengths are (m, 3), of its sides.
+
+    Raises:
+        CoarseError: triangles are too coarse.
+        PatchError: a patch has no flat metric with angles of quarter turns.
+    """
+    corners = np.empty_like(opened.mesh.faces)
+    points, cones, turned, count = [], [], [], 0
+    parts = opened.cut.mesh.split_components()
+    areas = double_areas(lengths)
+    for part, vertices, faces in parts:
+        # What all have in common is the mean of squares by area, to which small ones add little.
+        share = float(areas[faces].sum() / areas.mean() / len(areas))
+        distortion = options.distortion * min(max(1.0, 1 / np.sqrt(len(parts) * share)), UNEVEN)
+        try:
+            flat = flatten_patch(part, lengths[faces], opened.quarters[vertices], distortion, options)
+        except (CurvatureError, MetricError, SeamError) as error:
+            raise PatchError(faces, str(error)) from error
+        turned.append(faces[flat.turned])
+        corners[faces] = flat.corners + count
+        points.append(flat.points)
+        cones.append(opened.cut.origin[vertices[flat.cones]])
+        count += len(flat.points)
+    coarse = np.concatenate(turned)
+    if len(coarse):
+        raise CoarseError(
+            coarse, f"{len(coarse)} of {len(corners):,} triangles are turned over on straight sides"
+        )
+    return Loose(np.concatenate(points), corners, np.concatenate(cones))
+
+
+def glued(opened: Opened, lengths: FloatArray, loose: Loose) -> Loose:
+    """Return patches relaxed so that their sides are straight, along the axes, and quarter turns of each other.
+
+    Raises:
+        ConvergenceError: they cannot be without turning a triangle over, as far as is known.
+    """
+    mesh, whole = opened.mesh, np.concatenate([loose.cones, opened.nodes])
+    chains = find_chains(mesh, loose.corners, loose.points, whole, quarter_turns=True)
+    sides = all_sides(opened, loose.corners, loose.points, chains)
+    is_upright = sides.axis == 0
+    directions = np.stack([~is_upright, is_upright], axis=1).astype(np.float64)
+    offsets = np.full(len(sides.axis), np.nan)
+    constraints = PointConstraints(
+        lines=Lines(sides.points, sides.side, directions, offsets) if len(offsets) else None,
+        quarter_turns=True,
+        nodes=whole,
+    )
+    found = relax(
+        mesh,
+        np.stack([loose.points.real, loose.points.imag], axis=1),
+        loose.corners,
+        StretchEnergy(STRETCH),
+        constraints,
+        lengths=lengths,
+        steps=STEPS,
+    )
+    return replace(loose, points=found.points[:, 0] + 1j * found.points[:, 1])
+
+
+def all_sides(opened: Opened, corners: IntArray, points: ComplexArray, chains: SeamChains) -> Sides:
+    """Return the sides that lie along the axes: of the boundary, and the left ones of chains of features."""
+    mesh = opened.mesh
+    border = find_sides(mesh, corners, points, np.ones(len(points), dtype=bool))
+    feature = opened.is_feature[chains.edges]
+    left, chain = chains.left[feature], chains.chain[feature]
+    along = points[left[:, 1]] - points[left[:, 0]]
+    # Twice the direction, so that to and fro are the same.
+    numbers, which = np.unique(chain, return_inverse=True)
+    double = np.abs(along) * (along / np.abs(along)) ** 2
+    sums = np.bincount(which, double.real, len(numbers))
+    axis = np.where(sums >= 0, 1, 0)
+    both = np.stack([left.ravel(), which.repeat(2)], axis=1)
+    both = np.unique(both, axis=0)
+    return Sides(
+        np.setdiff1d(opened.nodes, opened.irregular),
+        np.concatenate([border.points, both[:, 0]]),
+        np.concatenate([border.side, both[:, 1] + len(border.axis)]),
+        np.concatenate([border.axis, axis]),
+    )
+
+
+def sharp_layout(opened: Opened, lengths: FloatArray, size: float, options: Options) -> Layout:
+    """Return a seamless layout of a mesh with sharp edges along the axes, in units of a grid.
+
+    Args:
+        opened: the mesh, opened along its sharp edges.
+        lengths: (m, 3) side lengths of its triangles.
+        size: of a square of the grid.
+        options: what is asked of the cones inside patches.
+    """
+    loose = glued(opened, lengths, flatten_patches(opened, lengths, options))
+    mesh, corners = opened.mesh, loose.corners
+    whole = np.concatenate([loose.cones, opened.nodes])
+    chains = find_chains(mesh, corners, loose.points, whole)
+    points, of_point = joined_charts(corners, loose.points, chains)
+    flat = float(signed_double_areas(np.stack([points.real, points.imag], axis=1)[corners]).sum())
+    points = points * np.sqrt(float(double_areas(lengths).sum()) / flat) / size
+    chains = find_chains(mesh, corners, points, whole)
+    sides = all_sides(opened, corners, points, chains)
+    cones = np.concatenate([loose.cones, opened.irregular])
+    layout = Layout(mesh, lengths, corners, points, cones, sides, size)
+    return replace(layout, points=points - origins(layout, of_point)[of_point])

@@ -1,0 +1,208 @@
+"""Layouts in which sharp edges lie along the axes: all of them, or as many as can."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import FloatArray, IntArray
+from ..errors import ConvergenceError, GridError, OptionError
+from ..geometry import double_areas, edge_lengths, mollify
+from ..input.components import prepare
+from ..mesh import TriangleMesh
+from ..options import Options, read_options
+from ..solver import solving
+from ..text import list_some, plural
+from ..threads import one_blas_thread
+from .aligned import Layout
+from .bisect import split_faces, split_for_features
+from .features import border_of, dangling, opened, patches_of, sharp_edges, without_stubs
+from .sharp import CoarseError, PatchError, sharp_layout
+
+# What may be asked of the cones inside patches, and of the input.
+TAKEN = frozenset(
+    (
+        *("sharp_angle", "boundary", "quantise", "quantize", "correct_handles", "charts"),
+        *("min_cone_angle", "max_cone_angle", "distortion", "creases", "repair", "strict", "solver"),
+    )
+)
+# Edges across the whole surface, about, that each has at least for the layout to bend along.
+ACROSS = 25
+# Squares: shorter stubs are dropped, and sharp edges around patches with less area.
+LASTING, LEAST_AREA = 4.0, 1.0
+# Times that triangles are split because they are too coarse, and that sharp edges are left out.
+SPLITS, TRIES = 4, 6
+
+
+@dataclass(frozen=True, eq=False)
+class SharpLayout:
+    """A layout with sharp edges along the axes.
+
+    Attributes:
+        layout: in units of a grid.
+        features: (k, 2) the sharp edges, as vertices of its mesh.
+        notes: which were left out.
+    """
+
+    layout: Layout
+    features: IntArray
+    notes: tuple[str, ...]
+
+
+def sharp_layouts(
+    mesh: Any,
+    faces: ArrayLike | None,
+    quads: float | None,
+    size: float | None,
+    given: Mapping[str, Any],
+) -> Iterator[SharpLayout]:
+    """Yield layouts of a surface, each with fewer sharp edges along the axes than those before.
+
+    Args:
+        mesh, faces: as `coneflat.flatten` takes them.
+        quads: unit squares that cover the surface.
+        size: of a square in model units, instead.
+        given: options, `sharp_angle` among them.
+
+    Raises:
+        OptionError, MeshError: as `coneflat.flatten`.
+    """
+    _check_taken(given)
+    options: Options = read_options(given)
+    angle = options.sharp_angle
+    assert angle is not None
+    if options.boundary_kind not in ("free", "straight"):
+        raise OptionError(f"sharp edges on grid lines need a straight boundary, not {options.boundary!r}")
+    prepared = prepare(mesh, faces, replace(options, sharp_angle=None))
+    checked, exponent = prepared.checked.mesh, prepared.checked.exponent
+    area = float(double_areas(edge_lengths(checked.vertices, checked.faces)).sum()) / 2
+    if size is None:
+        assert quads is not None
+        square = float(np.sqrt(area / quads))
+    else:
+        square = float(np.ldexp(size, exponent))
+    given_edges = sharp_edges(checked, angle)
+    search = _Search(checked, given_edges, square, area, options)
+    with one_blas_thread(), solving(options.solver):
+        for layout, features in search.layouts():
+            yield SharpLayout(
+                _at_scale(layout, exponent, square), features, (*prepared.notes, *search.notes())
+            )
+
+
+def _check_taken(given: Mapping[str, Any]) -> None:
+    others = sorted(set(given) - TAKEN)
+    if others:
+        raise OptionError(
+            f"with sharp edges on grid lines, cones are found for each patch between them: {list_some(others)} cannot "
+            "be given beside sharp_angle"
+        )
+
+
+def _at_scale(layout: Layout, exponent: int, square: float) -> Layout:
+    """Return a layout with lengths in model units."""
+    mesh = TriangleMesh(np.ldexp(layout.mesh.vertices, -exponent), layout.mesh.faces)
+    return replace(
+        layout,
+        mesh=mesh,
+        lengths=np.ldexp(layout.lengths, -exponent),
+        size=float(np.ldexp(square, -exponent)),
+    )
+
+
+class _Search:
+    """Sharp edges that lie on grid lines, fewer each time that there is no grid with them."""
+
+    def __init__(
+        self, mesh: TriangleMesh, sharp: IntArray, square: float, area: float, options: Options
+    ) -> None:
+        self.square, self.options = square, options
+        self.lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges[sharp]], axis=1)[:, 0], axis=1)
+        kept = without_stubs(mesh, sharp, LASTING * square)
+        finer = split_for_features(mesh.vertices, mesh.faces, mesh.edges[sharp[kept]], np.sqrt(area) / ACROSS)
+        self.mesh, self.edges = finer[0], finer[1]
+        self.origin = kept[finer[2]]
+        self.why = ""
+        while len(self.edges) and self._areas().min() < LEAST_AREA:
+            self._drop(int(np.argmin(self._areas())))
+
+    def notes(self) -> tuple[str, ...]:
+        """Return what was left out."""
+        left = np.ones(len(self.lengths), dtype=bool)
+        left[self.origin] = False
+        if not left.any():
+            return ()
+        share = 100 * self.lengths[left].sum() / self.lengths.sum()
+        why = f": {self.why}" if self.why else ", too short for quads of this size"
+        return (
+            f"{plural(int(left.sum()), 'sharp edge')} of {len(left):,}, {share:.1f} % of their length, on no grid "
+            f"line{why}.",
+        )
+
+    def layouts(self) -> Iterator[tuple[Layout, IntArray]]:
+        """Yield layouts and their features."""
+        for attempt in range(TRIES):
+            if not len(self.edges) and not self.mesh.is_boundary_edge.any():
+                return
+            try:
+                layout = self._layout()
+            except PatchError as error:
+                self.why = str(error)
+                _, patch = patches_of(self.mesh, self.edges)
+                self._drop(int(patch[error.faces[0]]))
+            except (ConvergenceError, GridError) as error:
+                self.why = str(error)
+                self._drop_some(attempt)
+            else:
+                yield layout, self.mesh.edges[self.edges]
+                self.why = "there was no grid with them"
+                self._drop_some(attempt)
+
+    def _layout(self) -> Layout:
+        for _ in range(SPLITS):
+            lengths = self._side_lengths()
+            try:
+                return sharp_layout(
+                    opened(self.mesh, self.edges, lengths), lengths, self.square, self.options
+                )
+            except CoarseError as error:
+                finer = split_faces(self.mesh, self.edges, self.origin, error.faces)
+                coarse = error
+            self.mesh, self.edges, self.origin = finer
+        raise coarse
+
+    def _side_lengths(self) -> FloatArray:
+        return mollify(edge_lengths(self.mesh.vertices, self.mesh.faces))[0]
+
+    def _areas(self) -> FloatArray:
+        """Return the areas of patches, in squares."""
+        count, patch = patches_of(self.mesh, self.edges)
+        areas = double_areas(self._side_lengths()) / 2
+        found: FloatArray = np.bincount(patch, areas, count) / self.square**2
+        return found
+
+    def _drop_some(self, attempt: int) -> None:
+        """Leave out what dangles, or else what parts the smallest patches, more of them each time."""
+        loose = dangling(self.mesh, self.edges)
+        if len(loose):
+            self._leave_out(loose)
+            return
+        for _ in range(max(1, 2 ** (attempt - 2))):
+            if len(self.edges):
+                self._drop(int(np.argmin(self._areas())))
+
+    def _drop(self, patch: int) -> None:
+        """Leave out what parts a patch from another one."""
+        border = border_of(self.mesh, self.edges, patch)
+        self._leave_out(border if len(border) else np.arange(len(self.edges)))
+
+    def _leave_out(self, which: IntArray) -> None:
+        kept = np.ones(len(self.edges), dtype=bool)
+        kept[which] = False
+        self.edges, self.origin = self.edges[kept], self.origin[kept]
+        kept_on = without_stubs(self.mesh, self.edges, LASTING * self.square)
+        self.edges, self.origin = self.edges[kept_on], self.origin[kept_on]

@@ -1,0 +1,59 @@
+"""Solutions of linear equations with few and small coefficients, by few of the variables each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..._arrays import FloatArray
+
+# Coefficients below this are rounding: those of quarter turns are whole.
+NONE = 1e-9
+# Part of the largest coefficient of an equation that a pivot has at least.
+PIVOT = 0.5
+
+
+def sparse_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (v, k + 1) a basis of the solutions of equations, one of these in the last column, and what was missed.
+
+    Equations with the fewest variables are solved first, each for the variable that is in the fewest others (H. M.
+    Markowitz, "The elimination form of the inverse and its application to linear programming", 1957), so that variables
+    depend on few; those of an orthogonal basis would depend on all.
+
+    Args:
+        rows: (r, v) coefficients, dependent ones among them are no harm.
+        right: (r,).
+
+    Returns:
+        The basis, and (d,) what is left of the right-hand sides of equations that depend on others: 0 unless they
+        contradict these.
+    """
+    work = np.concatenate([rows, right[:, None]], axis=1)
+    count = rows.shape[1]
+    is_open = np.ones(len(rows), dtype=bool)
+    solved: list[tuple[int, int]] = []
+    while True:
+        filled = np.abs(work[:, :count]) > NONE
+        sizes = np.where(is_open, filled.sum(axis=1), count + 1)
+        sizes[is_open & (sizes == 0)] = count + 1
+        row = int(np.argmin(sizes))
+        if sizes[row] > count:
+            break
+        size = np.abs(work[row, :count])
+        columns = np.flatnonzero(size >= PIVOT * size.max())
+        column = int(columns[np.argmin(filled[:, columns].sum(axis=0))])
+        work[row] /= work[row, column]
+        others = np.flatnonzero(filled[:, column])
+        others = others[others != row]
+        work[others] -= work[others, column, None] * work[row]
+        work[others, column] = 0.0
+        is_open[row] = False
+        solved.append((row, column))
+    pivots = np.array([column for _, column in solved], dtype=np.int64)
+    at = np.array([row for row, _ in solved], dtype=np.int64)
+    free = np.setdiff1d(np.arange(count), pivots)
+    basis = np.zeros((count, len(free) + 1))
+    basis[free, np.arange(len(free))] = 1.0
+    basis[pivots, :-1] = -work[np.ix_(at, free)]
+    basis[pivots, -1] = work[at, count]
+    basis[np.abs(basis) < NONE * max(1.0, float(np.abs(basis).max(initial=0.0)))] = 0.0
+    return basis, work[is_open, count]
