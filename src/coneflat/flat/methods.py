@@ -37,8 +37,10 @@ def find_metric(
             return replace(metric, split=options.split and options.lengths is None)
         return metric
     choices = _exact_choices(surface, solution, constraints, options)
-    if options.correct_handles and options.quantise is not None and mesh.genus():
-        return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantise)
+    if options.correct_handles and options.quantise is not None:
+        turning = open_turning(mesh, holes=not held_boundary(mesh, constraints, options).any())
+        if turning.loops:
+            return corrected_flattening(lengths, solution, choices, turning, options.quantise)
     return exact_flattening(mesh, lengths, solution, choices)
 
 

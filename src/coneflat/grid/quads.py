@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from ..errors import OptionError
 from ..text import plural
 from .extract import extract_quads
-from .integer_grid import IntegerGrid, integer_grid
+from .integer_grid import integer_grid
+from .integer_map import IntegerGrid
 from .jacobians import least_jacobians
 from .quad_mesh import QuadMesh
 from .smooth import smooth_quads
@@ -26,6 +27,7 @@ def quads(
     *,
     quads: int | None = None,
     size: float | None = None,
+    coarsest: bool = False,
     stretch: float = 0.0,
     smooth: int = ROUNDS,
     **options: Any,
@@ -36,6 +38,7 @@ def quads(
         mesh, faces: as `coneflat.flatten` takes them; or an `IntegerGrid`, and none of the options but `smooth`.
         quads: about how many; None: 10,000, unless a size is given.
         size: of a quad's edges in model units, instead.
+        coarsest: the fewest for which a grid is found, instead: the patches of a quad layout.
         stretch: from angles, 0, to areas, 1: what quads are to be alike in; see `integer_grid`.
         smooth: rounds of smoothing on the surface, see `smooth_quads`; 0 for none.
         options: of `coneflat.flatten`; by default cones have three, five or six quads.
@@ -46,11 +49,13 @@ def quads(
         MeshError, CurvatureError, SeamError, MetricError: as `coneflat.flatten`.
     """
     if isinstance(mesh, IntegerGrid):
-        if faces is not None or quads is not None or size is not None or options:
+        if faces is not None or quads is not None or size is not None or coarsest or options:
             raise OptionError("a grid has its faces, size and options: none can be given beside it")
         grid = mesh
     else:
-        grid = integer_grid(mesh, faces, quads=quads, size=size, stretch=stretch, **options)
+        grid = integer_grid(
+            mesh, faces, quads=quads, size=size, coarsest=coarsest, stretch=stretch, **options
+        )
     found = smooth_quads(extract_quads(grid), smooth)
     return replace(found, notes=(*grid.notes, *_notes(found)))
 
