@@ -16,6 +16,8 @@ from ..errors import GridError
 LARGEST = 2**40
 # How much shorter a vector must be than the one before it to come first (Lenstra, Lenstra, Lovasz 1982).
 LOVASZ = 0.99
+# Steps of the reduction for each vector at most; where rounding exchanges two for ever, less than reduced will do.
+MOST_STEPS = 200
 # Places of the search tree that are visited in all, at most.
 VISITS = 200_000
 
@@ -138,8 +140,9 @@ class Lattice:
 def reduce_basis(root: FloatArray, basis: IntArray) -> None:
     """Reduce the columns of an upper triangular matrix in place, and those of `basis` likewise (LLL)."""
     size = len(root)
-    k = 1
-    while k < size:
+    k, steps = 1, 0
+    while k < size and steps < MOST_STEPS * size:
+        steps += 1
         for j in range(k - 1, -1, -1):
             times = round(root[j, k] / root[j, j])
             if times != 0:

@@ -22,7 +22,7 @@ NEAR = 3.0
 # be kept apart so; if not, the next of these.
 WAYS = ((np.deg2rad(60.0), 1000), (np.deg2rad(90.0), 1000), (np.deg2rad(60.0), 1), (np.deg2rad(90.0), 1))
 # Lattice points that are looked at for each set of pairs kept apart, and sets of such at most.
-CANDIDATES, REPAIRS = 64, 200
+CANDIDATES, REPAIRS = 64, 60
 # Places of the search tree visited for the nearest one alone, of which only that cones fall together is asked.
 QUICK = 2_000
 # Of these, whether they turn triangles over is looked at beforehand.
