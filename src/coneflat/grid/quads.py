@@ -16,6 +16,7 @@ from .integer_map import IntegerGrid
 from .jacobians import least_jacobians
 from .quad_mesh import QuadMesh
 from .smooth import smooth_quads
+from .untangle import untangled
 
 # Rounds of smoothing by default: more change little.
 ROUNDS = 10
@@ -57,6 +58,8 @@ def quads(
             mesh, faces, quads=quads, size=size, coarsest=coarsest, stretch=stretch, **options
         )
     found = smooth_quads(extract_quads(grid), smooth)
+    if smooth:
+        found = untangled(found)
     return replace(found, notes=(*grid.notes, *_notes(found)))
 
 
