@@ -57,7 +57,7 @@ def make_surface(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
         vertices, faces = shapes.subdivide(vertices, faces)
         recipe.append("subdivide")
     for change, chance in CHANGES:
-        if rng.random() < chance:
+        if rng.random() < chance and len(faces):
             vertices, faces = change(vertices, faces, rng)
             recipe.append(change.__name__)
     scale = float(rng.choice([1.0, 1.0, 1e-6, 1e6]))
