@@ -23,7 +23,7 @@ DOORS = {
     ("result.flattening", "files.packages"),  # Flattening.to_trimesh, .to_pyvista, .to_meshio
     ("result.flattening", "view.page.webpage"),  # Flattening.view
     ("grid.quad_mesh", "files.quads"),  # QuadMesh.save, .load
-    ("grid.integer_grid", "files.grid"),  # IntegerGrid.save, .load
+    ("grid.integer_map", "files.grid"),  # IntegerGrid.save, .load
 }
 
 

@@ -7,6 +7,7 @@ import pytest
 import shapes
 
 from coneflat import errors, flatten, integer_grid, sample_path
+from coneflat import quads as find_quads
 from coneflat.mesh import TriangleMesh
 
 TURNS = np.array([1, 1j, -1, -1j])
@@ -63,7 +64,7 @@ def check_laws(grid):
     at = grid.corner_grid[np.isin(grid.faces, grid.cones)]
     assert (at == np.rint(at)).all()
     assert double_areas(grid).min() > 0
-    inside = ~mesh.is_boundary_vertex
+    inside = ~mesh.is_boundary_vertex & np.isin(np.arange(len(mesh.vertices)), mesh.faces)
     quarters = np.full(len(mesh.vertices), 4)
     quarters[grid.cones] = grid.quarters
     assert (grid.quarters != 4).all()
@@ -233,15 +234,74 @@ def test_sides_of_loops_that_are_askew_are_said_to_be_on_no_line(shared):
     assert "of the boundary are on no grid line" in " ".join(grid.notes)
 
 
-def test_what_is_too_coarse_is_told_what_would_do():
+def test_what_is_too_coarse_is_told_what_would_do(shared):
+    """A chess piece with 114 cones, in thirty squares."""
+    result = flatten(shared("knight.off"), **{**QUARTER, "correct_handles": True})
+    with pytest.raises(errors.GridError, match=r"no grid of about 30 quads was found: .*would do") as caught:
+        integer_grid(result, quads=30)
+    advised = int(str(caught.value).rsplit("; ", 1)[1].split()[0].replace(",", ""))
+    check_laws(integer_grid(result, quads=advised))
+
+
+@pytest.mark.parametrize("quads", [1000, 2000])
+def test_triangles_of_three_cones_are_split(shared, quads):
+    """Of a thousand triangles, 14 have cones at all corners, which rounding puts in a row."""
+    result = flatten(shared("knight.off"), **{**QUARTER, "correct_handles": True})
+    grid = integer_grid(result, quads=quads)
+    check_laws(grid)
+    assert double_areas(grid).sum() / 2 == pytest.approx(quads, rel=0.1)
+    assert "edges between cones" in " ".join(grid.notes)
+    is_cone = np.zeros(len(grid.vertices), dtype=bool)
+    is_cone[grid.cones] = True
+    assert is_cone[grid.faces].sum(axis=1).max() == 1
+    # The same surface: vertices of the input, then middles of its edges; triangles within those they were.
+    count = len(result.vertices)
+    assert (grid.vertices[:count] == result.vertices).all()
+    area = [
+        np.linalg.norm(np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]]), axis=1).sum()
+        for v, f in ((grid.vertices, grid.faces), (result.vertices, result.faces))
+    ]
+    assert area[0] == pytest.approx(area[1])
+
+
+def test_holes_of_a_free_boundary_turn_by_quarters(shared):
+    """Rotations around holes are made whole, as those along handles are."""
+    grid = integer_grid(shared("stanford-bunny.obj"), quads=3000)
+    check_laws(grid)
+    assert double_areas(grid).sum() / 2 == pytest.approx(3000, rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus"])
+def test_the_coarsest_grid(name):
+    """Fewest quads: six of a sphere with eight cones; of a torus with few, about that many."""
+    said = []
+    grid = integer_grid(*SHAPES[name], coarsest=True, progress=lambda text, part: said.append((text, part)))
+    check_laws(grid)
+    squares = double_areas(grid).sum() / 2
+    least = max(1, len(grid.cones) - TriangleMesh(grid.vertices, grid.faces).euler_characteristic)
+    assert least - 1e-6 <= squares <= 8 * least
+    assert f"has {squares:,.0f} quads" in " ".join(grid.notes)
+    assert any("coarsest grid" in text for text, _ in said)
+    assert all(0 <= part <= 1 for _, part in said)
+
+
+def test_the_coarsest_grid_is_a_quad_layout(shared):
+    """Each of its quads becomes k by k: finer grids of the same cones have many times the quads."""
+    result = flatten(shared("spot.obj"), **{**QUARTER, "correct_handles": True})
+    grid = integer_grid(result, coarsest=True)
+    check_laws(grid)
+    mesh = find_quads(grid)
+    assert mesh.euler_characteristic == 2
+    assert len(mesh.quads) < 80
+    assert set(mesh.irregular) <= set(range(len(mesh.vertices)))
+    assert len(mesh.irregular) == len(result.cones)
+
+
+def test_cones_far_too_near_each_other_are_kept_apart():
     """The torus' smooth layout is a hundred times smaller in one place than it should be, with cones there."""
     shape = pair(shapes.sphere(2), shapes.torus(24, 12))
-    with pytest.raises(
-        errors.GridError, match=r"no grid of about 1,000 quads was found: .*would do"
-    ) as caught:
-        integer_grid(*shape, quads=1000)
-    advised = int(str(caught.value).rsplit("; ", 1)[1].split()[0].replace(",", ""))
-    check_laws(integer_grid(*shape, quads=advised))
+    grid = integer_grid(*shape, quads=1000)
+    check_laws(grid)
 
 
 def test_numbering_changes_nothing():
@@ -261,6 +321,8 @@ def test_grids_are_the_same_every_time():
     ("options", "message"),
     [
         ({"quads": 10, "size": 1.0}, "give one of them"),
+        ({"quads": 10, "coarsest": True}, "give one of them"),
+        ({"size": 1.0, "coarsest": True}, "give one of them"),
         ({"quads": 0}, "quads must be a positive number"),
         ({"size": -1.0}, "size must be a positive number"),
         ({"stretch": -1.0}, "stretch must be"),

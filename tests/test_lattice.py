@@ -7,12 +7,17 @@ from itertools import product
 import numpy as np
 import pytest
 
-from coneflat.grid.lattice import nearest_points, reduced, whole_solutions
+from coneflat.grid.lattice import Lattice, reduce_basis, whole_solutions
 
 
 def random_gram(rng, size):
     root = rng.normal(size=(size, size)) @ np.diag(np.logspace(0, 1.5, size))
     return root.T @ root
+
+
+def whole_space(gram):
+    size = len(gram)
+    return Lattice(np.zeros(size, dtype=np.int64), np.eye(size, dtype=np.int64), gram)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -47,7 +52,8 @@ def test_a_basis_spans_no_sublattice():
 def test_reduced_bases_keep_the_lattice_and_its_lengths(seed):
     rng = np.random.default_rng(seed)
     gram = random_gram(rng, 7)
-    basis, root = reduced(gram)
+    root, basis = np.ascontiguousarray(np.linalg.cholesky(gram).T), np.eye(7, dtype=np.int64)
+    reduce_basis(root, basis)
     assert abs(round(np.linalg.det(basis))) == 1
     assert root.T @ root == pytest.approx(basis.T @ gram @ basis, rel=1e-8, abs=1e-6 * gram.max())
     assert (np.abs(np.triu(root, 1)) <= 0.51 * np.abs(np.diag(root))[:, None]).all()
@@ -58,11 +64,33 @@ def test_nearest_points_are_those_of_brute_force(seed):
     rng = np.random.default_rng(seed)
     gram = random_gram(rng, 4)
     place = rng.uniform(-2, 2, size=4)
-    points, squares = nearest_points(reduced(gram), place, 5)
+    points = whole_space(gram).nearest(place, 5)
+    squares = np.einsum("ki,ij,kj->k", points - place, gram, points - place)
     every = np.array(list(product(range(-9, 10), repeat=4)))
     off = every - place
     distances = np.sort(np.einsum("ki,ij,kj->k", off, gram, off))[:5]
     if np.abs(points).max() < 9:  # else there may be nearer ones outside the box
         assert squares == pytest.approx(distances)
     assert (np.diff(squares) >= 0).all()
-    assert np.einsum("ki,ij,kj->k", points - place, gram, points - place) == pytest.approx(squares)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_nearest_points_with_equations_are_those_of_brute_force(seed):
+    rng = np.random.default_rng(seed)
+    gram = random_gram(rng, 4)
+    place = rng.uniform(-2, 2, size=4)
+    row = np.array([1, -1, 2, 0])
+    lattice = whole_space(gram).where(row, 3).reduced()
+    found = lattice.nearest(place, 3)
+    assert (found @ row == 3).all()
+    every = np.array([each for each in product(range(-12, 13), repeat=4) if row @ each == 3])
+    distances = np.sort(np.einsum("ki,ij,kj->k", every - place, gram, every - place))[:3]
+    if np.abs(found).max() < 12:
+        assert np.einsum("ki,ij,kj->k", found - place, gram, found - place) == pytest.approx(distances)
+    assert lattice.where(row, 4) is None
+    assert lattice.where(2 * np.array([0, 1, 0, 1]), 1) is None
+
+
+def test_a_lattice_of_one_point():
+    alone = whole_space(np.eye(2)).where(np.array([1, 0]), 2).where(np.array([0, 1]), -1)
+    assert alone.nearest(np.array([0.3, 0.4]), 5).tolist() == [[2, -1]]

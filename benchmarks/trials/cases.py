@@ -22,6 +22,7 @@ from .arguments import DOORS, Calls
 from .choices import in_short, make_options
 from .commands import make_command, run_command
 from .files import make_file
+from .grids import grid_case
 from .meshes import make_mesh
 from .outcome import LONGEST_MESSAGE, Outcome
 from .promises import check
@@ -242,6 +243,7 @@ KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "file": _file,
     "argument": _argument,
     "command": _command,
+    "grid": grid_case,
     "crash": _crash,
     "hang": _hang,
     "swell": _swell,

@@ -35,15 +35,17 @@ _ARRAYS = (
     "quarters",
     "corners",
     "corner_quarters",
+    "features",
 )
 _NUMBERS = (
     "size", "move_rms", "move_max", "energy_before", "energy", "qc_before", "qc_mean", "least_area",
 )  # fmt: skip
 _REPORT = re.compile(rb"(?m)^# grid (\{.*\})[ \t]*\r?$")
+_LINE = re.compile(rb"(?m)^l +(\d+) +(\d+)[ \t]*\r?$")
 _HEAD = (
     "# An integer grid by coneflat: texture coordinates are in squares of the grid, which goes on across seams.",
     "# seam V W TURNS X Y: across the edge from V to W, p of the triangle on its right is R p + (X, Y) in that on its",
-    "# left, R being so many quarter turns to the left. Other edges are no seams.",
+    "# left, R being so many quarter turns to the left. Other edges are no seams. Lines (l) are sharp edges on grid lines.",
 )
 
 
@@ -95,6 +97,7 @@ def _write_obj(grid: IntegerGrid, stream: IO[bytes]) -> None:
     stream.writelines(lines_of("v", grid.vertices, b"\n"))
     stream.writelines(lines_of("vt", points[:, 1:], b"\n"))
     stream.writelines(_face_lines(grid.faces + 1, number_of.reshape(-1, 3) + 1))
+    stream.writelines(lines_of("l", grid.features + 1, b"\n"))
 
 
 def _face_lines(vertices: IntArray, points: IntArray) -> Iterator[bytes]:
@@ -162,7 +165,11 @@ def _grid_of_obj(path: Path, content: bytes) -> IntegerGrid:
     faces, places = mesh.corners.reshape(-1, 3), mesh.uv[mesh.texture].reshape(-1, 3, 2)
     _require_mesh(path, mesh.vertices, faces)
     match = _REPORT.search(content)
-    return grid_of_corners(mesh.vertices, faces, places, **({} if match is None else _known(path, match[1])))
+    known = {} if match is None else _known(path, match[1])
+    features = np.array(_LINE.findall(content), dtype=np.int64).reshape(-1, 2) - 1
+    if len(features) and not (features.min() >= 0 and features.max() < len(mesh.vertices)):
+        raise MeshFileError(f"{path} has lines between vertices that it does not have")
+    return grid_of_corners(mesh.vertices, faces, places, **known, features=features)
 
 
 def _require_mesh(path: Path, vertices: FloatArray, faces: IntArray) -> None:
@@ -216,6 +223,7 @@ def _grid_of_archive(reading: CheckedArrays) -> IntegerGrid:
         quarters=reading.indices("quarters", (len(cones),), None),
         corners=corners,
         corner_quarters=reading.indices("corner_quarters", (len(corners),), None),
+        features=reading.indices("features", (None, 2), n),
         **numbers,
         notes=reading.notes(report),
     )

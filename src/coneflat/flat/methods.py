@@ -12,7 +12,7 @@ import numpy as np
 from .._arrays import BoolArray, FloatArray
 from ..cones import ConeSolution
 from ..cones.choose import Surface, Turned
-from ..errors import OptionError
+from ..errors import ConvergenceError, OptionError
 from ..geometry.handles import open_turning
 from ..input.constraints import Constraints
 from ..mesh import TriangleMesh
@@ -37,8 +37,17 @@ def find_metric(
             return replace(metric, split=options.split and options.lengths is None)
         return metric
     choices = _exact_choices(surface, solution, constraints, options)
-    if options.correct_handles and options.quantise is not None and mesh.genus():
-        return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantise)
+    if options.correct_handles and options.quantise is not None:
+        if not held_boundary(mesh, constraints, options).any():
+            turning = open_turning(mesh, holes=True)
+            try:
+                if len(turning.loops) > 2 * mesh.genus():
+                    return corrected_flattening(lengths, solution, choices, turning, options.quantise)
+            except ConvergenceError:
+                # Triangles cannot turn as far; handles alone may.
+                pass
+        if mesh.genus():
+            return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantise)
     return exact_flattening(mesh, lengths, solution, choices)
 
 

@@ -108,12 +108,12 @@ def off_multiple(angles: FloatArray, quantum: float) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Turning:
-    """The turning of loops across the handles of a connected mesh.
+    """The turning of loops across the handles of a connected mesh, and around its holes.
 
     Attributes:
         mesh: the mesh.
-        loops: the half-edges that each of the 2 genus loops crosses.
-        signs: (2 genus, 3m) of the corner angles in the sum.
+        loops: the half-edges that each of the l loops crosses: two for each handle, and one for each hole.
+        signs: (l, 3m) of the corner angles in the sum.
     """
 
     mesh: TriangleMesh
@@ -121,21 +121,21 @@ class Turning:
     signs: csr_matrix
 
     def of_flat(self, flat: FlatTriangles) -> FloatArray:
-        """Return (2 genus,) the turning in a flat metric, up to full turns."""
+        """Return (l,) the turning in a flat metric, up to full turns."""
         return np.array([np.angle(np.prod(flat.turns[loop])) for loop in self.loops])
 
     def by_log_lengths(self, lengths: FloatArray) -> csr_matrix:
-        """Return (2 genus, e) the derivative by the logs of edge lengths; lengths are (m, 3)."""
+        """Return (l, e) the derivative by the logs of edge lengths; lengths are (m, 3)."""
         return csr_matrix(self.signs @ _angles_by_log_lengths(self.mesh, lengths))
 
     def by_log_scale(self, lengths: FloatArray) -> FloatArray:
-        """Return (2 genus, n) the derivative by the log scale at the vertices."""
+        """Return (l, n) the derivative by the log scale at the vertices."""
         return np.asarray((self.by_log_lengths(lengths) @ edge_means(self.mesh)).todense())
 
 
-def open_turning(mesh: TriangleMesh) -> Turning:
-    """Return the turning of the loops across a mesh's handles."""
-    loops = handle_loops(mesh)
+def open_turning(mesh: TriangleMesh, holes: bool = False) -> Turning:
+    """Return the turning of the loops across a mesh's handles; with holes, of those around them, too."""
+    loops = handle_loops(mesh, holes)
     twin = halfedge_twins(mesh)
     parts = [corner_signs(loop, twin) for loop in loops]
     rows = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])

@@ -110,7 +110,7 @@ def nearest_in_triangle(
     area, v, w = bb * cc - bc * bc, cc * pb - bc * pc, bb * pc - bc * pb
     if area > 0 and v >= 0 and w >= 0 and v + w <= area:
         v, w = v / area, w / area
-        weights[0] = 1 - v - w
+        weights[0] = max(1 - v - w, 0.0)  # but for rounding
         weights[1] = v
         weights[2] = w
         x, y, z = px - v * bx - w * cx, py - v * by - w * cy, pz - v * bz - w * cz

@@ -11,19 +11,22 @@ from ..geometry.triangles import double_areas, edge_lengths
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from ..text import list_some, plural
 from .exact_grid import LOOSE
-from .integer_grid import IntegerGrid
+from .integer_map import IntegerGrid
 from .motions import find_motions
 
 
 def grid_of_corners(
-    vertices: FloatArray, faces: IntArray, corner_grid: FloatArray, **known: float | tuple[str, ...]
+    vertices: FloatArray,
+    faces: IntArray,
+    corner_grid: FloatArray,
+    **known: float | tuple[str, ...] | IntArray,
 ) -> IntegerGrid:
     """Return the integer grid that corners of triangles are in, with all that follows from their places.
 
     Args:
         vertices, faces: (n, 3), (m, 3) a manifold mesh whose triangles run the same way round.
         corner_grid: (m, 3, 2) the place of every triangle corner, in units of the grid.
-        known: measures of the grid and notes; what is left out is not a number, but for the size.
+        known: measures of the grid, notes and features; measures left out are not a number, but for the size.
 
     Raises:
         GridError: triangles are turned over, or the sides of seams are no copies of each other by quarter turns and

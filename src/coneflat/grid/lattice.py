@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,8 @@ from ..errors import GridError
 LARGEST = 2**40
 # How much shorter a vector must be than the one before it to come first (Lenstra, Lenstra, Lovasz 1982).
 LOVASZ = 0.99
+# Steps of the reduction for each vector at most; where rounding exchanges two for ever, less than reduced will do.
+MOST_STEPS = 200
 # Places of the search tree that are visited in all, at most.
 VISITS = 200_000
 
@@ -77,53 +80,69 @@ def _eliminate(work: IntArray, row: int, open_columns: IntArray) -> int | None:
             raise GridError(f"the equations between {work.shape[1]} translations of seams overflow")
 
 
-class Metric(NamedTuple):
-    """Coordinates of a lattice in which its basis is nearly orthogonal.
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """The whole vectors one + basis y, and how far they are from each other.
 
     Attributes:
-        basis: (d, d) whole numbers, a unimodular matrix.
-        root: (d, d) upper triangular: the squared length of basis y is |root y|^2.
+        one: (d,) one of them.
+        basis: (d, k) whole numbers.
+        gram: (d, d) scalar products of all vectors.
     """
 
+    one: IntArray
     basis: IntArray
-    root: FloatArray
+    gram: FloatArray
 
+    def where(self, row: IntArray, value: int) -> Lattice | None:
+        """Return the part where (d,) row times the vector is a whole number; None where there is none."""
+        within = whole_solutions((row @ self.basis)[None], np.array([value - int(row @ self.one)]))
+        if within is None:
+            return None
+        return replace(self, one=self.one + self.basis @ within.one, basis=self.basis @ within.basis)
 
-def reduced(gram: FloatArray) -> Metric:
-    """Return a reduced basis of the lattice of whole vectors, whose scalar products are (d, d) gram."""
-    root = np.ascontiguousarray(scipy.linalg.cholesky(gram))
-    basis = np.eye(len(root), dtype=np.int64)
-    reduce_basis(root, basis)
-    return Metric(basis, root)
+    def reduced(self) -> Lattice:
+        """Return the same lattice by a basis that is nearly orthogonal."""
+        return replace(self, basis=self.basis @ self._reduction()[1])
 
+    def nearest(self, place: FloatArray, count: int, visits: int = VISITS) -> IntArray:
+        """Return (k, d) the vectors nearest to a real one (d,), the nearest first.
 
-def nearest_points(metric: Metric, place: FloatArray, count: int) -> tuple[IntArray, FloatArray]:
-    """Return (k, d) whole vectors that are nearest to a real one (d,), and (k,) their squared distances, rising.
+        The first k = count found are exact if the search ends by itself; it begins at Babai's point and ends after so
+        many visits of places in any case.
 
-    The first k = count found are exact if the search ends by itself; it begins at Babai's point and ends after
-    `VISITS` places in any case.
+        Notes:
+            C. P. Schnorr, M. Euchner, "Lattice basis reduction: improved practical algorithms", 1994.
+        """
+        size = self.basis.shape[1]
+        if not size:
+            return self.one[None]
+        root, change = self._reduction()
+        basis = self.basis @ change
+        products = basis.T @ self.gram
+        target = np.linalg.solve(products @ basis, products @ (place - self.one))
+        found = np.zeros((count, size), dtype=np.int64)
+        squares: FloatArray = np.full(count, np.inf)
+        number = enumerate_points(root, target, found, squares, visits)
+        order = np.argsort(squares[:number], kind="stable")
+        nearest: IntArray = self.one + found[order] @ basis.T
+        return nearest
 
-    Notes:
-        C. P. Schnorr, M. Euchner, "Lattice basis reduction: improved practical algorithms", 1994.
-    """
-    size = len(place)
-    if not size:
-        return np.zeros((1, 0), dtype=np.int64), np.zeros(1)
-    # As a float matrix the basis, unimodular with small entries, is inverted to the last digits.
-    target = np.asarray(np.linalg.solve(metric.basis.astype(np.float64), place), dtype=np.float64)
-    found = np.zeros((count, size), dtype=np.int64)
-    squares: FloatArray = np.full(count, np.inf)
-    number = enumerate_points(metric.root, target, found, squares, VISITS)
-    order = np.argsort(squares[:number], kind="stable")
-    return found[order] @ metric.basis.T, squares[order]
+    def _reduction(self) -> tuple[FloatArray, IntArray]:
+        """Return an upper triangular root of the reduced basis' scalar products, and (k, k) what reduces it."""
+        change = np.eye(self.basis.shape[1], dtype=np.int64)
+        root = np.ascontiguousarray(scipy.linalg.cholesky(self.basis.T @ self.gram @ self.basis))
+        reduce_basis(root, change)
+        return root, change
 
 
 @compiled
 def reduce_basis(root: FloatArray, basis: IntArray) -> None:
     """Reduce the columns of an upper triangular matrix in place, and those of `basis` likewise (LLL)."""
     size = len(root)
-    k = 1
-    while k < size:
+    k, steps = 1, 0
+    while k < size and steps < MOST_STEPS * size:
+        steps += 1
         for j in range(k - 1, -1, -1):
             times = round(root[j, k] / root[j, j])
             if times != 0:

@@ -12,10 +12,12 @@ from ..errors import OptionError
 from ..progress import Stages
 from ..text import plural
 from .extract import extract_quads
-from .integer_grid import IntegerGrid, integer_grid
+from .integer_grid import integer_grid
+from .integer_map import IntegerGrid
 from .jacobians import least_jacobians
 from .quad_mesh import QuadMesh
 from .smooth import smooth_quads
+from .untangle import untangled
 
 # Rounds of smoothing by default: more change little.
 ROUNDS = 10
@@ -27,6 +29,7 @@ def quads(
     *,
     quads: int | None = None,
     size: float | None = None,
+    coarsest: bool = False,
     stretch: float = 0.0,
     sharp_angle: float | str | None = None,
     smooth: int = ROUNDS,
@@ -39,6 +42,7 @@ def quads(
             `progress`.
         quads: about how many; None: 10,000, unless a size is given.
         size: of a quad's edges in model units, instead.
+        coarsest: the fewest for which a grid is found, instead: the patches of a quad layout.
         stretch: from angles, 0, to areas, 1: what quads are to be alike in; see `integer_grid`.
         sharp_angle: radians: quads' edges run along edges at which the surface bends by more; None for none.
         smooth: rounds of smoothing on the surface, see `smooth_quads`; 0 for none.
@@ -51,18 +55,20 @@ def quads(
     """
     progress = options.get("progress")
     if isinstance(mesh, IntegerGrid):
-        if (
-            faces is not None
-            or quads is not None
-            or size is not None
-            or sharp_angle is not None
-            or options.keys() - {"progress"}
-        ):
+        said = (faces, quads, size, sharp_angle)
+        if any(one is not None for one in said) or coarsest or options.keys() - {"progress"}:
             raise OptionError("a grid has its faces, size and options: none can be given beside it")
         grid = mesh
     else:
         grid = integer_grid(
-            mesh, faces, quads=quads, size=size, stretch=stretch, sharp_angle=sharp_angle, **options
+            mesh,
+            faces,
+            quads=quads,
+            size=size,
+            coarsest=coarsest,
+            stretch=stretch,
+            sharp_angle=sharp_angle,
+            **options,
         )
     stages = Stages(progress)
     stages.done = 1.0
@@ -70,6 +76,8 @@ def quads(
         found = extract_quads(grid)
     with stages("smooth"):
         found = smooth_quads(found, smooth, grid.features)
+        if smooth:
+            found = untangled(found)
     return replace(found, notes=(*grid.notes, *_notes(found)), seconds={**grid.seconds, **stages.seconds})
 
 

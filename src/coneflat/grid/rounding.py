@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import dijkstra
 from .._arrays import ComplexArray, FloatArray, IntArray
 from ..errors import GridError
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
-from .lattice import nearest_points, reduced, whole_solutions
+from .lattice import VISITS, Lattice, whole_solutions
 from .near_sides import PathVector, distances_to_sides, paths_to_sides
 from .stiffness import Stiffness
 from .transitions import TURNS, UNITS, Transitions
@@ -23,8 +23,13 @@ NEAR = 3.0
 FACING = 0.45
 # Units below which they are on one line.
 APART = 1e-6
+# Radians by which the vector between such cones may turn, and pairs that are kept apart at once, as long as cones can
+# be kept apart so; if not, the next of these.
+WAYS = ((np.deg2rad(60.0), 1000), (np.deg2rad(90.0), 1000), (np.deg2rad(60.0), 1), (np.deg2rad(90.0), 1))
 # Lattice points that are looked at for each set of pairs kept apart, and sets of such at most.
-CANDIDATES, REPAIRS = 64, 200
+CANDIDATES, REPAIRS = 64, 60
+# Places of the search tree visited for the nearest one alone, of which only that cones fall together is asked.
+QUICK = 2_000
 # Of these, whether they turn triangles over is looked at beforehand.
 FORESEEN = 16
 
@@ -36,15 +41,30 @@ class ConePairs:
     Attributes:
         rows: (p, 2, d) the vector from the one to the other, by coordinates of the lattice.
         before: (p, 2) as it is in the smooth layout.
+        ends: (p, 2) the two cones, by their numbers.
     """
 
     rows: IntArray
     before: FloatArray
+    ends: IntArray
 
-    def collapsed(self, coordinates: IntArray) -> IntArray:
-        """Return the pairs that a lattice point puts on one place or exchanges, the nearest ones first."""
+    def apart(self, pairs: IntArray) -> IntArray:
+        """Return those of some pairs that have no cone in common with one before."""
+        seen: set[int] = set()
+        kept = []
+        for pair in pairs.tolist():
+            ends = set(self.ends[pair].tolist())
+            if not ends & seen:
+                kept.append(pair)
+                seen |= ends
+        return np.array(kept, dtype=np.int64)
+
+    def collapsed(self, coordinates: IntArray, turned: float) -> IntArray:
+        """Return the pairs that a lattice point puts on one place, or turns by so much, the nearest ones first."""
         after = self.rows @ coordinates
-        is_bad = (after * self.before).sum(axis=1) <= 0
+        along = (after * self.before).sum(axis=1)
+        sizes = np.linalg.norm(after, axis=1) * np.linalg.norm(self.before, axis=1)
+        is_bad = along <= np.cos(turned) * sizes + np.finfo(float).eps
         order = np.argsort((self.before**2).sum(axis=1), kind="stable")
         bad: IntArray = order[is_bad[order]]
         return bad
@@ -85,20 +105,46 @@ class Rounding:
         Raises:
             GridError: cones cannot be kept apart.
         """
-        size = self.basis.shape[1]
-        rows, right = np.zeros((0, size), dtype=np.int64), np.zeros(0, dtype=np.int64)
-        for _ in range(REPAIRS):
-            found = self._nearest(rows, right)
-            bad = self.pairs.collapsed(found[0])
-            if not len(bad):
+        lattice = self._lattice()
+        apart: list[IntArray] = []
+        for turned, at_once in WAYS:
+            try:
+                apart = self._apart(lattice, turned, at_once)
                 break
-            rows, right = self._kept_apart(int(bad[0]), rows, right)
-        else:
-            raise GridError(f"cones fall together in spite of {REPAIRS} equations between them")
-        apart = [each for each in found if not len(self.pairs.collapsed(each))][:FORESEEN]
+            except GridError:
+                if (turned, at_once) == WAYS[-1]:
+                    raise
         values = [np.asarray(self.basis @ each) for each in apart]
         turned = self.turned_over(np.stack(values, axis=1) - self.smooth[:, None])
         return [values[i] for i in np.argsort(turned, kind="stable")]
+
+    def _apart(self, lattice: Lattice, turned: float, at_once: int) -> list[IntArray]:
+        """Return near vectors of a lattice that keep all cones apart, and turn those near each other by less."""
+        for _ in range(REPAIRS):
+            bad = self.pairs.collapsed(lattice.nearest(self.start, 1, QUICK)[0], turned)
+            if not len(bad):
+                break
+            for pair in self.pairs.apart(bad)[:at_once].tolist():
+                part = self._kept_apart(pair, lattice)
+                if part is None and pair == bad[0]:
+                    distance = float(np.hypot(*self.pairs.before[pair]))
+                    raise GridError(
+                        f"two cones {distance:.2g} units from each other cannot be kept apart: ask for more quads"
+                    )
+                lattice = lattice if part is None else part
+            lattice = lattice.reduced()
+        else:
+            raise GridError(f"cones fall together in spite of {REPAIRS} rounds of equations between them")
+        # The nearest of all may be another than that of the quick search.
+        found = np.concatenate(
+            [lattice.nearest(self.start, CANDIDATES, VISITS), lattice.nearest(self.start, 1, QUICK)]
+        )
+        return [each for each in found if not len(self.pairs.collapsed(each, turned))][:FORESEEN]
+
+    def _lattice(self) -> Lattice:
+        size = len(self.start)
+        whole = Lattice(np.zeros(size, dtype=np.int64), np.eye(size, dtype=np.int64), self.metric)
+        return whole.reduced()
 
     def turned_over(self, changes: FloatArray) -> FloatArray:
         """Return (k,) the area of triangles that the shifts of least energy turn over, for changes (v, k)."""
@@ -109,30 +155,23 @@ class Rounding:
         areas: FloatArray = -np.minimum(doubled, 0.0).sum(axis=0)
         return areas
 
-    def _nearest(self, rows: IntArray, right: IntArray) -> IntArray:
-        """Return (k, d) coordinates of lattice points that satisfy equations, the nearest first."""
-        solutions = whole_solutions(rows, right)
-        assert solutions is not None
-        one, basis = solutions
-        pull = basis.T @ self.metric
-        gram = pull @ basis
-        metric = reduced(gram)
-        place = np.linalg.solve(gram, pull @ (self.start - one)) if len(gram) else np.zeros(0)
-        points, _ = nearest_points(metric, place, CANDIDATES)
-        found: IntArray = one + points @ basis.T
-        return found
+    def _kept_apart(self, pair: int, lattice: Lattice) -> Lattice | None:
+        """Return the part of a lattice where two cones are as far apart along an axis as they were, a unit at least.
 
-    def _kept_apart(self, pair: int, rows: IntArray, right: IntArray) -> tuple[IntArray, IntArray]:
-        """Return equations with one more: two cones are as far apart along an axis as they were, a unit at least."""
-        before = self.pairs.before[pair]
-        for axis in np.argsort(-np.abs(before), kind="stable").tolist():
-            distance = max(1, round(abs(before[axis]))) * (1 if before[axis] >= 0 else -1)
-            more = np.concatenate([rows, self.pairs.rows[pair, [axis]]]), np.append(right, distance)
-            if whole_solutions(*more) is not None:
-                return more
-        raise GridError(
-            f"two cones {np.hypot(*before):.2g} units from each other cannot be kept apart: ask for more quads"
-        )
+        Where they are already, their vector gets the direction that it had, as nearly as may be. None if it is given.
+        """
+        before, rows = self.pairs.before[pair], self.pairs.rows[pair]
+        main = int(np.argmax(np.abs(before)))
+        distance = max(1, round(abs(before[main])))
+        ratio = distance / max(abs(before[main]), np.finfo(float).tiny)
+        away = [round(ratio * before[0]), round(ratio * before[1])]
+        is_free = (rows @ lattice.basis).any(axis=1)
+        aside = 1 if before[1 - main] >= 0 else -1
+        for axis, value in ((main, away[main]), (1 - main, away[1 - main]), (1 - main, aside)):
+            part = lattice.where(rows[axis], value) if is_free[axis] else None
+            if part is not None:
+                return part
+        return None
 
 
 def find_rounding(
@@ -171,7 +210,7 @@ def _near_pairs(
     halfedge = csr_matrix((np.arange(1, len(tails) + 1), (tails, heads)), shape=graph.shape)
     is_cone = np.zeros(len(mesh.vertices), dtype=bool)
     is_cone[cones] = True
-    rows = []
+    rows, ends_of = [], []
 
     def joining(path: list[int]) -> PathVector:
         sides = [_side(int(halfedge[a, b]), int(halfedge[b, a]), starts, ends) for a, b in pairwise(path)]
@@ -187,13 +226,16 @@ def _near_pairs(
         if is_cone[path[1:-1]].any():
             continue
         rows.append(joining(path).rows)
+        ends_of.append((i, j))
     cones_apart = np.array(rows, dtype=np.int64).reshape(len(rows), 2, basis.shape[0])
     paths = paths_to_sides(mesh, corners, points, cones, transitions, NEAR)
     sides_apart, length = distances_to_sides([joining(path) for path in paths], transitions)
     sides_apart = sides_apart @ basis
     facing = np.abs(sides_apart[:, 0] @ start) > np.maximum(FACING * length, APART)
     joined = np.concatenate([cones_apart @ basis, sides_apart[facing]])
-    return ConePairs(joined, joined @ start)
+    # Those with sides have no cone in common, as far as is told here.
+    ends_of += [(len(cones) + k, len(cones) + k) for k in range(int(facing.sum()))]
+    return ConePairs(joined, joined @ start, np.array(ends_of, dtype=np.int64).reshape(-1, 2))
 
 
 def _side(forth: int, back: int, starts: IntArray, ends: IntArray) -> tuple[int, int]:

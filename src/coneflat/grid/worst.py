@@ -21,6 +21,7 @@ def lift_worst(
     barycentric: FloatArray,
     movable: BoolArray,
     surface: Stars,
+    below: float = BAD,
 ) -> None:
     """Move vertices of bad quads to where the worst quad around each is best, on the surface.
 
@@ -32,12 +33,13 @@ def lift_worst(
         faces, barycentric: (q,), (q, 3) where in which triangle the vertices lie, changed.
         movable: (q,) which may move.
         surface: that they lie on.
+        below: scaled Jacobian of quads that count as bad.
     """
     order = np.argsort(quads.ravel(), kind="stable") // 4
     start = np.concatenate([[0], np.cumsum(np.bincount(quads.ravel(), minlength=len(points)))])
     for _ in range(SWEEPS):
         least = least_jacobians(points, quads)
-        bad = np.flatnonzero(least < BAD)
+        bad = np.flatnonzero(least < below)
         worst_first = quads[bad[np.argsort(least[bad], kind="stable")]].ravel()
         _, first = np.unique(worst_first, return_index=True)
         tried = worst_first[np.sort(first)]

@@ -181,8 +181,8 @@ class ConeOptions(ConeBounds, ConeNumber):
     correct_handles: bool = option(
         False,
         Flag(),
-        "With quantised cones and the exact metric: make rotations along handles multiples, too, by a map that is as "
-        "little off conformal as can be.",
+        "With quantised cones and the exact metric: make rotations along handles, and around holes where the boundary "
+        "is free, multiples, too, by a map that is as little off conformal as can be.",
         only="pursuit",
     )
     epsilon: float = option(

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from .declared import ConeBounds, ConeNumber, RunOptions, option
-from .kinds import Choice, Count, Number, Strength, WordOrVertices
+from .kinds import Choice, Count, Flag, Number, Strength, WordOrVertices
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,6 +21,9 @@ class QuadOptions(RunOptions, ConeBounds, ConeNumber):
     quads: int | None = option(None, Count(), "About how many quads; 10,000 unless a size is given.")
     size: float | None = option(
         None, Number(optional=True, positive=True), "The length of their edges in model units, instead."
+    )
+    coarsest: bool = option(
+        False, Flag(), "The fewest for which a grid is found, instead: the patches of a quad layout."
     )
     stretch: float = option(
         0.0, Strength(1.0), "What quads are to be alike in: from angles, 0, to sizes as well, 1."

@@ -115,8 +115,8 @@ def quads(
 
 def _check_combinations(context: click.Context, mesh: Path) -> None:
     """Refuse options that would have no effect."""
-    if is_given(context, "quads") and is_given(context, "size"):
-        raise click.UsageError("--quads (--faces) and --size say the same: leave one out", context)
+    if sum(is_given(context, name) for name in ("quads", "size", "coarsest")) > 1:
+        raise click.UsageError("--quads (--faces), --size and --coarsest say the same: give one", context)
     searched = [*declarations(ConeBounds), *declarations(ConeNumber), "max_cones"]
     rules = [
         (is_given(context, "cone_count"), ["distortion", "max_cones"], "the number of cones is given"),
@@ -154,7 +154,7 @@ def _grid_of(mesh: Path, console: Console, options: dict[str, Any], weld: bool |
     return replace(found, notes=joined.notes_of(found.notes))
 
 
-def _quads_of(grid: IntegerGrid, console: Console, rounds: dict[str, int]) -> QuadMesh:
+def _quads_of(grid: IntegerGrid, console: Console, rounds: dict[str, Any]) -> QuadMesh:
     """Return the quads of a grid."""
     from ...grid.quads import quads as find_quads
     from .run import FLATTENED, READ

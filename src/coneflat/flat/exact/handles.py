@@ -1,4 +1,4 @@
-"""Exact metrics whose rotations along handles are multiples of a quantum.
+"""Exact metrics whose rotations along handles and around holes are multiples of a quantum.
 
 With the cones given, an exactly conformal metric has no freedom left, and its rotations along the handles are what
 they are (Abel and Jacobi). Here the conformal structure is changed: edge lengths, as little as can be.
@@ -19,7 +19,6 @@ from ...geometry.handles import Turning, curvature_by_log_lengths, edge_means, o
 from ...geometry.triangles import slacks
 from ...mesh import TriangleMesh
 from ...quality.distortion import measure
-from ...quality.rotations import measure_rotations
 from ...solver import factorize
 from ..base import LaidOut
 from .flatten import ExactChoices, ExactFlatMetric, exact_flattening
@@ -39,26 +38,24 @@ RINGS, SPARED = 3, 1e3
 
 @dataclass(frozen=True, eq=False)
 class CorrectedMetric:
-    """A flat metric whose rotations along handles are multiples of a quantum, beside the conformal one it was made of.
+    """A flat metric whose rotations are multiples of a quantum, beside the conformal one it was made of.
 
     Attributes:
         conformal, corrected: the metrics.
-        quantum: radians.
+        off: by how much rotations were off multiples, at most, radians.
     """
 
     conformal: ExactFlatMetric
     corrected: ExactFlatMetric
-    quantum: float
+    off: float
 
     def lay_out(self, disk: TriangleMesh, seams: IntArray) -> LaidOut:
         """Lay out the corrected metric, with a note that says what the correction cost."""
         before, after = (metric.lay_out(disk, seams) for metric in (self.conformal, self.corrected))
-        flat = before.points[before.corners]
         qc = [measure(one.mesh, one.points[one.corners]).qc_mean for one in (before, after)]
-        off = np.abs(measure_rotations(before.mesh, flat, self.quantum).handles).max(initial=0.0)
         cost = (
-            f"Rotations along handles were off by up to {off:.2g} rad; making them whole changed the mean QC "
-            f"distortion from {qc[0]:.5f} to {qc[1]:.5f}."
+            f"Rotations around holes and along handles were off by up to {self.off:.2g} rad; making them whole changed "
+            f"the mean QC distortion from {qc[0]:.5f} to {qc[1]:.5f}."
         )
         return replace(after, notes=(*after.notes, cost))
 
@@ -66,7 +63,7 @@ class CorrectedMetric:
 def corrected_flattening(
     lengths: FloatArray, solution: ConeSolution, choices: ExactChoices, turning: Turning, quantum: float
 ) -> CorrectedMetric:
-    """Return a flat metric with the cones of a solution whose rotations along handles are multiples of a quantum.
+    """Return a flat metric with the cones of a solution whose loops turn by multiples of a quantum.
 
     For each loop there is a change of edge lengths that turns it and no other, with the least shear. Large changes are
     made in steps; the last ones, on the few rotations, are Broyden's.
@@ -74,7 +71,7 @@ def corrected_flattening(
     Args:
         lengths: (m, 3) side lengths.
         solution, choices: as for `exact_flattening`.
-        turning: of the mesh's handles.
+        turning: of the mesh's handles, and around its holes where the boundary is free.
         quantum: radians.
 
     Raises:
@@ -83,11 +80,12 @@ def corrected_flattening(
     mesh = turning.mesh
     conformal = metric = exact_flattening(mesh, lengths, solution, choices)
     off = off_multiple(turning.of_flat(metric.straight()), quantum)
+    first = float(np.abs(off).max())
     fixed = choices.is_open(mesh)
     changes = None
     for _ in range(STEPS):
         if np.abs(off).max() <= TOLERANCE:
-            return CorrectedMetric(conformal, metric, quantum)
+            return CorrectedMetric(conformal, metric, first)
         if changes is None:
             sides = np.abs(metric.straight().sides).reshape(-1, 3)
             changes = least_changes(turning, sides, shear_norm(mesh, lengths, solution.cones), fixed)
@@ -110,8 +108,8 @@ def corrected_flattening(
         gained = inverse @ (off - before)
         inverse += np.outer(step - gained, step @ inverse) / (step @ gained)
     raise ConvergenceError(
-        f"rotations along handles did not get to multiples of {quantum / np.pi:.4g} pi: they are off by "
-        f"{np.abs(off).max():.2g} rad; other cones (--distortion, --cone-count) may help"
+        f"rotations around holes and along handles did not get to multiples of {quantum / np.pi:.4g} pi: they are off "
+        f"by {np.abs(off).max():.2g} rad; other cones (--distortion, --cone-count) may help"
     )
 
 
@@ -120,7 +118,7 @@ def _sheared(mesh: TriangleMesh, lengths: FloatArray, change: FloatArray) -> Flo
 
 
 def least_changes(turning: Turning, sides: FloatArray, norm: csc_matrix, fixed: BoolArray) -> FloatArray:
-    """Return (e, 2 genus) changes of the logs of edge lengths, each of which turns one loop by a radian at first.
+    """Return (e, l) changes of the logs of edge lengths, each of which turns one loop by a radian at first.
 
     Args:
         turning: of the loops.

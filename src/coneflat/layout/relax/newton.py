@@ -21,6 +21,8 @@ ROUNDING = 1e-14
 # What is left of the way to where the constraints hold counts as none below this, and as out of reach after a step that
 # goes less than this part of it.
 ARRIVED, STUCK = 1e-12, 1e-3
+# Steps on the way there at most: what is reached takes ten or twenty.
+ON_THE_WAY = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +120,7 @@ def descend(
         if remaining:
             remaining = 1.0 - float(total[-1])
             remaining = remaining if remaining > ARRIVED else 0.0
-            if length[0] < STUCK:
+            if length[0] < STUCK or taken >= ON_THE_WAY:
                 break
         if tell is not None and tell(taken, float(here.sum())):
             break

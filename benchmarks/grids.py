@@ -1,0 +1,50 @@
+"""What becomes of random surfaces asked for integer grids and quads: `python benchmarks/grids.py --cases 200 --jobs 2`.
+
+Surfaces of all topologies, deformed, renumbered and scaled by a million either way, some of them as bad as those of the
+hostile trial; from three squares to thousands, or the coarsest grid; with all stretches, boundaries and cone bounds.
+Each case must end in a grid whose equations hold exactly and a manifold mesh of quads on the surface, measured anew by
+`trials/grids.py`, or in an error of the package's own, in one line. All else, a case that takes too long among it, is a
+breach; the exit code is 1 if there is any. `--case 17` runs one alone in this process and tells all about it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+
+from hostile import run_alone, summary
+from trials.outcome import Outcome
+from trials.workers import run_all
+
+# Seconds of a process's own work that a case may take.
+WORK = 120.0
+
+
+def main() -> int:
+    """Run the cases, print the summary, and return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=200)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--case", metavar="SEED")
+    chosen = parser.parse_args()
+    if chosen.case:
+        return run_alone(f"grid:{chosen.case}")
+    outcomes: list[Outcome] = []
+    began = time.perf_counter()
+
+    def say(outcome: Outcome, done: int) -> None:
+        outcomes.append(outcome)
+        for cause, details in outcome.breaches:
+            print(f"breach grid:{outcome.seed}  {cause}: {details[:200]}", flush=True)
+
+    run_all(
+        [("grid", seed) for seed in range(chosen.seed, chosen.seed + chosen.cases)], chosen.jobs, say, WORK
+    )
+    print(f"\n{summary(outcomes)}\n\n{len(outcomes):,} cases in {time.perf_counter() - began:.0f} s")
+    return int(any(one.breaches for one in outcomes))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

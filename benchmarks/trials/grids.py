@@ -1,0 +1,215 @@
+"""Integer grids and quad meshes of random surfaces, and what they promise, measured anew in plain numpy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import shapes
+
+from . import meshes
+from .choices import in_short
+from .outcome import Outcome
+from .topology import Topology
+
+Random = np.random.Generator
+
+MAKERS = (
+    meshes.sheet,
+    meshes.ball,
+    meshes.hemisphere,
+    meshes.ring,
+    meshes.tube,
+    meshes.handles,
+    meshes.polycube,
+    meshes.crate,
+    meshes.spikes,
+    meshes.random_hull,
+    meshes.patch,
+    meshes.patch,
+)
+CHANGES = (
+    (meshes.hole, 0.15),
+    (meshes.jitter, 0.15),
+    (meshes.slivers, 0.05),
+    (meshes.flips, 0.05),
+    (meshes.stretched, 0.15),
+    (meshes.two_parts, 0.05),
+    (meshes.loose_vertices, 0.05),
+    (meshes.shuffled, 0.3),
+)
+#: Part of cases whose meshes are as bad as those of the hostile trial.
+HOSTILE = 0.2
+#: Part of the model's size by which a quad's vertex may be off where its barycentric coordinates say.
+ROUNDING = 1e-9
+TURNS = np.array([1, 1j, -1, -1j])
+
+
+def make_surface(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return vertices, faces and how they were made; more of these can be flattened than of `meshes.make_mesh`."""
+    if rng.random() < HOSTILE:
+        return meshes.make_mesh(rng)
+    maker = MAKERS[int(rng.integers(len(MAKERS)))]
+    vertices, faces = maker(rng)
+    vertices, faces = np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.int64)
+    recipe = [maker.__name__]
+    while len(faces) < 60 and rng.random() < 0.8:
+        vertices, faces = shapes.subdivide(vertices, faces)
+        recipe.append("subdivide")
+    for change, chance in CHANGES:
+        if rng.random() < chance and len(faces):
+            vertices, faces = change(vertices, faces, rng)
+            recipe.append(change.__name__)
+    scale = float(rng.choice([1.0, 1.0, 1e-6, 1e6]))
+    return vertices * scale, faces, f"{' + '.join(recipe)} x {scale:g}, {len(faces)} faces"
+
+
+def make_grid_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[str, Any]:
+    """Return keywords of `coneflat.integer_grid`."""
+    options: dict[str, Any] = {}
+    kind = rng.random()
+    if kind < 0.15:
+        options["coarsest"] = True
+    elif kind < 0.8:
+        options["quads"] = int(10 ** rng.uniform(0.5, 3.7))
+    else:
+        corners = vertices[faces] if len(faces) and faces.min() >= 0 and faces.max() < len(vertices) else None
+        with np.errstate(all="ignore"):
+            sides = np.ones(1) if corners is None else np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)
+        options["size"] = float(np.nan_to_num(np.median(sides)) * 10 ** rng.uniform(-0.5, 0.7))
+    if rng.random() < 0.3:
+        options["stretch"] = float(rng.choice([0.1, 0.5, 1.0, 2.0]))
+    if rng.random() < 0.3:
+        options["boundary"] = "straight"
+    if rng.random() < 0.15:
+        options["min_cone_angle"] = float(rng.choice([np.pi / 2, np.pi]))
+    if rng.random() < 0.15:
+        options["max_cone_angle"] = float(rng.choice([2.5, 4]) * np.pi)
+    if rng.random() < 0.15:
+        options["distortion"] = float(rng.choice([0.1, 0.5]))
+    if rng.random() < 0.1:
+        options["repair"] = True
+    return options
+
+
+def grid_case(rng: Random, outcome: Outcome) -> None:
+    """A surface under options of all kinds: its grid, and its quads, smoothed or not."""
+    import coneflat
+
+    vertices, faces, made = make_surface(rng)
+    options = make_grid_options(rng, vertices, faces)
+    smooth = int(rng.choice([0, 3, 10]))
+    outcome.recipe = f"{made}; {in_short(options)}, smooth={smooth}"
+    grid = found = None
+    with outcome.guarded(expects_nan=not np.isfinite(vertices).all()):
+        grid = coneflat.integer_grid(vertices, faces, **options)
+        check_grid(outcome, grid, options)
+        found = coneflat.quads(grid, smooth=smooth)
+    if grid is not None and found is not None:
+        check_quads(outcome, found, grid)
+        if options.get("coarsest") and len(found.surface.faces) and outcome.status == "refused":
+            outcome.breach("coarsest grid without quads")
+
+
+def check_grid(outcome: Outcome, grid: Any, options: dict[str, Any]) -> None:
+    """All that an integer grid promises; equations hold exactly."""
+    z = grid.corner_grid @ [1, 1j]
+    if not np.isfinite(z).all():
+        outcome.breach("grid: not finite")
+        return
+    faces = grid.faces
+    topology = Topology.of(faces, len(grid.vertices))
+    # Half-edge 3 f + i of a grid lies opposite corner i; that of Topology runs from corner i.
+    starts, ends = z[:, [1, 2, 0]].ravel(), z[:, [2, 0, 1]].ravel()
+    opposite = topology.sides - topology.sides % 3 + (topology.sides + 2) % 3
+    shift = grid.shifts @ [1, 1j]
+    for h, t in (opposite.T, opposite[:, ::-1].T):
+        off = np.abs(TURNS[grid.turns[h] % 4] * ends[t] + shift[h] - starts[h])
+        off = np.maximum(off, np.abs(TURNS[grid.turns[h] % 4] * starts[t] + shift[h] - ends[h]))
+        if off.max(initial=0) > 0:
+            outcome.breach("grid: seams do not fit exactly", f"by up to {off.max():.2g}")
+    doubled = (np.conj(z[:, 1] - z[:, 0]) * (z[:, 2] - z[:, 0])).imag
+    if not (doubled > 0).all():
+        outcome.breach("grid: triangles turned over", int((doubled <= 0).sum()))
+    sides = z[:, [2, 0, 1]] - z[:, [1, 2, 0]]
+    angles = np.angle(-sides[:, [1, 2, 0]] * np.conj(sides[:, [2, 0, 1]]))
+    sums = np.bincount(faces.ravel(), angles.ravel(), len(grid.vertices)) / (np.pi / 2)
+    wanted = np.full(len(sums), 4)
+    wanted[grid.cones] = grid.quarters
+    inside = topology.is_used & ~topology.is_border
+    if np.abs(sums - wanted)[inside].max(initial=0) > 1e-3:
+        outcome.breach("grid: angles are not those of cones", np.abs(sums - wanted)[inside].max())
+    whole = np.isin(faces, np.concatenate([grid.cones, grid.corners]))
+    if (grid.corner_grid[whole] != np.rint(grid.corner_grid[whole])).any():
+        outcome.breach("grid: cones off the grid points")
+    most = options.get("max_cone_angle", 3 * np.pi) / (np.pi / 2) + 1e-6
+    least = (
+        options.get("min_cone_angle", 1.5 * np.pi if "boundary" not in options else 0) / (np.pi / 2) - 1e-6
+    )
+    if len(grid.quarters) and (grid.quarters.max() > most or grid.quarters.min() < least):
+        outcome.breach("grid: cones beyond bounds", sorted(set(grid.quarters.tolist())))
+
+
+def check_quads(outcome: Outcome, found: Any, grid: Any) -> None:
+    """A manifold mesh of quads on the surface, oriented and of its topology."""
+    quads, points = found.quads, found.vertices
+    notes = " ".join(found.notes)
+    if any("\n" in note or "nan" in note.split() for note in found.notes):
+        outcome.breach("quads: a note of several lines, or of nan", notes)
+    if not len(quads) or quads.shape[1:] != (4,) or quads.min() < 0 or quads.max() >= len(points):
+        outcome.breach("quads: none, or bad indices")
+        return
+    if (np.diff(np.sort(quads, axis=1), axis=1) == 0).any():
+        outcome.breach("quads: a vertex twice in a quad")
+    tails, heads = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
+    if len(np.unique(tails * len(points) + heads)) < len(tails):
+        outcome.breach("quads: two beside an edge on the same side, or three")
+    edges = np.unique(np.minimum(tails, heads) * len(points) + np.maximum(tails, heads))
+    _check_fans(outcome, quads, len(points))
+    euler = len(points) - len(edges) + len(quads)
+    surface = Topology.of(grid.faces, len(grid.vertices))
+    own = int(surface.is_used.sum()) - len(surface.edges) + len(grid.faces)
+    if euler != own:
+        if "Euler characteristic" in notes or "left out" in notes.lower():
+            outcome.excuse("Euler characteristic")
+        else:
+            outcome.breach("quads: another Euler characteristic", f"{euler}, not {own}")
+    z = grid.corner_grid @ [1, 1j]
+    doubled = (np.conj(z[:, 1] - z[:, 0]) * (z[:, 2] - z[:, 0])).imag
+    if not surface.is_border.any() and abs(doubled.sum() / 2 - len(quads)) > 1e-3:
+        outcome.breach("quads: not as many as squares", f"{len(quads)}, {doubled.sum() / 2:.6f}")
+    corners = grid.vertices[grid.faces[found.faces]]
+    placed = np.einsum("qi,qix->qx", found.barycentric, corners)
+    size = np.ptp(grid.vertices[surface.is_used], axis=0).max()
+    off = np.abs(placed - points).max() if np.isfinite(points).all() else np.inf
+    if not off <= ROUNDING * size or found.barycentric.min() < 0:
+        outcome.breach("quads: vertices off the surface", f"{off:.2g} of {size:.2g}")
+    if not (np.abs(found.barycentric.sum(axis=1) - 1) <= 1e-9).all():
+        outcome.breach("quads: barycentric coordinates that are none")
+    inverted = _inverted(points, quads)
+    if inverted:
+        if "180 degrees" in notes:
+            outcome.excuse("inverted quads")
+        else:
+            outcome.breach("quads: inverted without a note", inverted)
+
+
+def _check_fans(outcome: Outcome, quads: np.ndarray, count: int) -> None:
+    """Around each vertex the quads must be one fan: as many joints between them as they are, or one fewer."""
+    before, after = np.roll(quads, 1, axis=1).ravel(), np.roll(quads, -1, axis=1).ravel()
+    at = quads.ravel()
+    spokes = np.unique(np.concatenate([at * count + before, at * count + after])) // count
+    quads_at, spokes_at = np.bincount(at, minlength=count), np.bincount(spokes, minlength=count)
+    if not np.isin(spokes_at - quads_at, [0, 1]).all():
+        outcome.breach("quads: a vertex with other than one fan")
+
+
+def _inverted(points: np.ndarray, quads: np.ndarray) -> int:
+    """Return how many quads have a corner that turns the other way than their diagonals do."""
+    corners = points[quads] / max(np.abs(points).max(), np.finfo(float).tiny)
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    least = np.full(len(quads), np.inf)
+    for i in range(4):
+        one, two = corners[:, (i + 1) % 4] - corners[:, i], corners[:, i - 1] - corners[:, i]
+        least = np.minimum(least, (np.cross(one, two) * normal).sum(axis=1))
+    return int((least < 0).sum())
