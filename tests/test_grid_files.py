@@ -210,7 +210,7 @@ class TestWhatIsNone:
 
 @pytest.mark.parametrize("ending", [".obj", ".npz"])
 def test_sharp_edges_are_kept(tmp_path, ending):
-    grid = integer_grid(*shapes.box(4, (1.0, 1.0, 1.0)), quads=96, sharp_angle=1.0)
+    grid = coneflat.integer_grid(*shapes.box(4, (1.0, 1.0, 1.0)), quads=96, sharp_angle=1.0)
     again = IntegerGrid.load(grid.save(tmp_path / f"box{ending}"))
     assert len(grid.features) >= 12 * 4
     np.testing.assert_array_equal(again.features, grid.features)

@@ -103,7 +103,7 @@ def test_command_refuses_before_the_work(tmp_path, ball):
     path = write_obj(tmp_path / "ball.obj", *ball)
     done = run(path, "--faces", 600, "--size", 0.1)
     assert done.exit_code == 2
-    assert "leave one out" in done.output
+    assert "give one" in done.output
     for words, message in (
         (("-o", tmp_path / "quads.stl"), "quads are written as .obj, .ply, .glb, .npz"),
         (("-o", path), "the input and the output"),
@@ -240,8 +240,8 @@ def test_a_straight_boundary_loses_nothing(tmp_path):
 def test_defaults_are_those_that_are_declared():
     declared = {name: each.default for name, (each, _) in declarations(QuadOptions).items()}
     for function, names in (
-        (coneflat.quads, ("quads", "size", "stretch", "smooth")),
-        (coneflat.integer_grid, ("stretch",)),
+        (coneflat.quads, ("quads", "size", "coarsest", "stretch", "smooth", "sharp_angle")),
+        (coneflat.integer_grid, ("coarsest", "stretch", "sharp_angle")),
     ):
         parameters = inspect.signature(function).parameters
         for name in names:
@@ -249,7 +249,7 @@ def test_defaults_are_those_that_are_declared():
     assert OPTIONS["min_cone_angle"] == declared["min_cone_angle"]
     assert OPTIONS["max_cone_angle"] == declared["max_cone_angle"]
     # What is not of the grid's own is an option of a flattening.
-    own = {"quads", "size", "stretch", "smooth"}
+    own = {"quads", "size", "coarsest", "stretch", "smooth"}
     assert set(declared) - own <= set(declarations(Options))
 
 

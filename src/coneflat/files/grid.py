@@ -45,7 +45,8 @@ _LINE = re.compile(rb"(?m)^l +(\d+) +(\d+)[ \t]*\r?$")
 _HEAD = (
     "# An integer grid by coneflat: texture coordinates are in squares of the grid, which goes on across seams.",
     "# seam V W TURNS X Y: across the edge from V to W, p of the triangle on its right is R p + (X, Y) in that on its",
-    "# left, R being so many quarter turns to the left. Other edges are no seams. Lines (l) are sharp edges on grid lines.",
+    "# left, R being so many quarter turns to the left. Other edges are no seams.",
+    "# Lines (l) are sharp edges on grid lines.",
 )
 
 
