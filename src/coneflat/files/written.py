@@ -114,6 +114,8 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
         uv_faces=uv_faces,
         face_corners=corners,
         face_origin=face_origin[order],
+        # What these were before relaxing is known of other triangles alone.
+        solve=replace(result.solve, qc_mean_unrelaxed=float("nan"), qc_max_unrelaxed=float("nan")),
     )
     return remeasured(result, fans, DOUBLE, notes)
 

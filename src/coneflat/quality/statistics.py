@@ -23,7 +23,7 @@ class SolveStatistics:
         untangled_move: how far one was moved at most, relative to the mean edge around them.
         relaxed_vertices: vertices that were free to move so that triangles are less distorted.
         qc_mean_unrelaxed, qc_max_unrelaxed: the mean and the largest quasi-conformal distortion before; NaN where
-            nothing was to be relaxed.
+            nothing was to be relaxed, and of polygons in a file, which programs split into triangles of their own.
         refined_triangles: triangles that were added by the common subdivision.
         split_triangles: triangles that were added where straight sides left some inverted.
         area_distortion_linear: E of the linear model that the cones were chosen in: the standard deviation of

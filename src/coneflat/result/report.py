@@ -148,10 +148,11 @@ def as_rows(result: Flattening) -> list[Row]:
         added = f"; {solve.split_triangles:,} triangles more where they could not be upright"
     of_map = map_rows(d)
     if solve.relaxed_vertices:
-        relaxed = (
-            f"; before {plural(solve.relaxed_vertices, 'vertex', 'vertices')} moved "
-            f"{number_text(solve.qc_mean_unrelaxed, '.4f')}, worst {number_text(solve.qc_max_unrelaxed, '.4g')}"
-        )
+        moved = f"{plural(solve.relaxed_vertices, 'vertex', 'vertices')} moved"
+        relaxed = f"; {moved} to lessen it"
+        if np.isfinite(solve.qc_mean_unrelaxed):
+            before = number_text(solve.qc_mean_unrelaxed, ".4f"), number_text(solve.qc_max_unrelaxed, ".4g")
+            relaxed = f"; before {moved} {before[0]}, worst {before[1]}"
         name, value, meaning = of_map["QC distortion"]
         of_map["QC distortion"] = (name, value, meaning + relaxed)
     if untangled:
