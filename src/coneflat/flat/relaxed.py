@@ -8,7 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from .._arrays import BoolArray, ComplexArray, FloatArray
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ..compiled import compiled
 from ..errors import LengthError, SeamError
 from ..geometry import double_areas, edge_lengths
 from ..geometry.operators import LEAST_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
@@ -139,12 +140,8 @@ class _Surface:
 
     def ratios(self, laid_out: LaidOut) -> FloatArray:
         """Return (m,) ratios of singular values, infinite for triangles that are turned over or have no area."""
-        along, across = self._factors
-        corners = laid_out.points[laid_out.corners]
-        places = (corners - corners[:, :1]) @ np.array([1.0, 1j])
-        with np.errstate(invalid="ignore"):
-            one, two = np.abs((along * places).sum(axis=1)), np.abs((across * places).sum(axis=1))
-        return np.divide(one + two, one - two, out=np.full(len(one), np.inf), where=one > two)
+        found: FloatArray = map_ratios(*self._factors, laid_out.points, laid_out.corners)
+        return found
 
     def mean(self, ratios: FloatArray) -> float:
         """The mean ratio by area, over upright triangles."""
@@ -200,6 +197,31 @@ class _Surface:
             log_scale=log_scale,
             statistics=statistics,
         )
+
+
+@compiled
+def map_ratios(
+    along: ComplexArray, across: ComplexArray, points: FloatArray, corners: IntArray
+) -> FloatArray:
+    """Return (m,) ratios of singular values of the maps z -> a z + b conj(z), infinite for those turned over.
+
+    Args:
+        along, across: (m, 3) the derivatives of a and b by the places of the corners.
+        points: (u, 2).
+        corners: (m, 3) indices of points.
+    """
+    ratios = np.full(len(corners), np.inf)
+    for f in range(len(corners)):
+        a, b = 0j, 0j
+        x, y = points[corners[f, 0]]
+        for i in range(1, 3):
+            place = complex(points[corners[f, i], 0] - x, points[corners[f, i], 1] - y)
+            a += along[f, i] * place
+            b += across[f, i] * place
+        one, two = abs(a), abs(b)
+        if one > two:
+            ratios[f] = (one + two) / (one - two)
+    return ratios
 
 
 def _largest(ratios: FloatArray) -> float:
