@@ -234,13 +234,16 @@ def order_pairs(one: IntArray, two: IntArray, bound: int, order: IntArray, first
         place[min(one[p], two[p]) + 1] += 1
     for v in range(bound):
         place[v + 1] += place[v]
-    for p in by_high:
-        low = min(one[p], two[p])
-        order[place[low]] = p
+    for i in range(len(one)):
+        pair = by_high[i]
+        low = min(one[pair], two[pair])
+        order[place[low]] = pair
         place[low] += 1
     for i in range(len(order)):
-        p, q = order[i], order[i - 1]
-        is_same = (one[p] == one[q] and two[p] == two[q]) or (one[p] == two[q] and two[p] == one[q])
+        here, last = order[i], order[i - 1]
+        is_same = (one[here] == one[last] and two[here] == two[last]) or (
+            one[here] == two[last] and two[here] == one[last]
+        )
         first[i] = i == 0 or not is_same
 
 

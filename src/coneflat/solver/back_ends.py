@@ -68,7 +68,11 @@ def solving(name: str) -> Iterator[Choice]:
 
 
 def factorize(
-    matrix: csc_matrix, used_up: Factor | None = None, is_noted: bool = True, is_scattered: bool = False
+    matrix: csc_matrix,
+    used_up: Factor | None = None,
+    is_noted: bool = True,
+    whole: int = 0,
+    is_scattered: bool = False,
 ) -> Factor:
     """Factorize a sparse symmetric positive definite matrix.
 
@@ -76,6 +80,8 @@ def factorize(
         matrix: (n, n), both triangles, with sorted indices.
         used_up: the factor of another matrix of the same size, needed no more, whose analysis may serve.
         is_noted: whether the back end counts as used, as it does not for a small part of something larger.
+        whole: unknowns of something larger that it is a part of: what is loaded for that factorizes it, too, and has an
+            analysis that serves again, which takes most of the time.
         is_scattered: whether it is of small parts that hardly hang together. SuperLU finds an order of elimination
             for these in a fraction of the time that others take.
 
@@ -88,7 +94,7 @@ def factorize(
     choice = _choice.get() or Choice("auto")
     name = choice.name
     if name == "auto":
-        name = "scipy" if is_scattered and size < LARGE else best_for(size)
+        name = "scipy" if is_scattered and size < LARGE else best_for(max(size, min(whole, LARGE)))
     try:
         factor = _open(name, matrix) if used_up is None else used_up.renewed(matrix)
     except NotPositiveDefinite:
