@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ..compiled import compiled
 from ..errors import LengthError, SeamError
 from ..geometry import double_areas, edge_lengths
@@ -156,9 +156,9 @@ class _Surface:
         The vertices there, (n,), too. before: (m,) the ratios of the layout that nothing may be worse than.
         """
         after, (mesh, faces) = self.ratios(moved), (self.mesh, self.mesh.faces)
-        edges = mesh.edges[was_free[mesh.edges].all(axis=1)]
+        edges = mesh.edges[was_free[mesh.edges[:, 0]] & was_free[mesh.edges[:, 1]]]
         count, patch = label_components(len(mesh.vertices), edges[:, 0], edges[:, 1])
-        touched = np.flatnonzero(was_free[faces].any(axis=1) & np.isfinite(before))
+        touched = np.flatnonzero(has_any(was_free, faces) & np.isfinite(before))
         corner = np.argmax(was_free[faces[touched]], axis=1)
         of_face = patch[faces[touched, corner]]
         gain = before[touched] - after[touched]
@@ -233,5 +233,5 @@ def _around(mesh: TriangleMesh, is_bent: BoolArray) -> BoolArray:
     inside = np.zeros(len(mesh.vertices), dtype=bool)
     inside[mesh.faces[is_bent]] = True
     for _ in range(RINGS):
-        inside[mesh.faces[inside[mesh.faces].any(axis=1)]] = True
+        inside[mesh.faces[has_any(inside, mesh.faces)]] = True
     return inside

@@ -108,7 +108,8 @@ def mollify(
     Raises:
         DegenerateFaceError: with `strict`, or when the mesh as a whole has no area.
     """
-    areas, squares = double_areas(lengths), lengths.max(axis=1) ** 2
+    longest = np.maximum(np.maximum(lengths[:, 0], lengths[:, 1]), lengths[:, 2])
+    areas, squares = double_areas(lengths), longest**2
     bad = np.flatnonzero(areas <= ZERO_AREA * squares)
     if not len(bad):
         return lengths, None
