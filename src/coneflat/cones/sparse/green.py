@@ -62,10 +62,9 @@ class GreenOperator:
 
     def _solve_closed(self, rows: FloatArray) -> FloatArray:
         """Return (k, f) mean-free solutions, written over sources (k, f) that sum to 0 each, on a closed surface."""
-        solution = self._factor.solve(rows[:, 1:].T).T
-        mean = solution @ self.areas[1:]
-        np.subtract(solution, mean[:, None], out=rows[:, 1:])
-        rows[:, 0] = -mean
+        rows[:, 1:] = self._factor.solve(rows[:, 1:].T).T
+        rows[:, 0] = 0.0
+        rows -= (rows @ self.areas)[:, None]
         return rows
 
     def weighted(self, values: FloatArray) -> FloatArray:
