@@ -10,6 +10,7 @@ from spheres import cones_on, lengths_of, random_curvatures, random_sphere
 from coneflat import TriangleMesh, errors
 from coneflat.flat.exact.hessian import HessianPattern
 from coneflat.flat.exact.metric import double, exact_metric
+from coneflat.flat.exact.newton import find_suspects
 from coneflat.flat.linear import scaled_lengths
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths
 from coneflat.geometry.intrinsic import intrinsic_triangulation
@@ -307,3 +308,17 @@ def test_double_keeps_the_numbers_that_refine_relies_on():
     given, original = double(intrinsic_triangulation(mesh, edge_lengths(mesh.vertices, mesh.faces)))
     assert np.array_equal(original[: len(mesh.vertices)], np.arange(len(mesh.vertices)))
     assert np.array_equal(given.faces[: len(mesh.faces)], mesh.faces)
+
+
+def test_edges_beside_triangles_that_do_not_close_are_suspects():
+    # Two triangles on an edge: half-edges 0 and 3 are twins.
+    twin = np.array([3, -1, -1, 0, -1, -1])
+    found = np.empty(6, dtype=np.int64)
+    for cots, expected in (
+        ([1, 1, 1, 1, 1, 1], []),
+        ([0, 1, 1, 1, 1, 1], []),  # a right angle
+        ([0, 0, 0, 1, 1, 1], [0]),
+        ([1, 1, 1, 0, 0, 0], [0]),
+        ([0.5, 1, 1, -0.6, 2, 2], [0]),
+    ):
+        assert found[: find_suspects(twin, np.array(cots, dtype=float), found)].tolist() == expected

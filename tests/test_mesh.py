@@ -7,7 +7,7 @@ import shapes
 from coneflat import TriangleMesh, check_mesh
 from coneflat._arrays import unit_exponent
 from coneflat.geometry.charts import joined_edges, label_charts, point_seams, uv_seams
-from coneflat.mesh import corner_fans
+from coneflat.mesh import corner_fans, sort_pairs
 
 CASES = [
     (shapes.tetrahedron(), 0, 0),
@@ -89,3 +89,12 @@ def test_seams_are_where_sides_have_different_points_and_charts_what_is_left_bet
 def test_by_its_exponent_a_value_is_brought_to_between_a_half_and_one(value):
     scaled = np.ldexp(value, -unit_exponent(np.array([value, value / 3])))
     assert 0.5 <= abs(scaled) < 1
+
+
+def test_pairs_are_sorted_stably_by_the_smaller_index_first():
+    one, two = np.random.default_rng(0).integers(0, 9, (2, 200))
+    order, first = sort_pairs(one, two, 9)
+    low, high = np.minimum(one, two), np.maximum(one, two)
+    assert order.tolist() == np.lexsort((high, low)).tolist()
+    keys = (9 * low + high)[order]
+    assert first.tolist() == [True, *(np.diff(keys) > 0).tolist()]

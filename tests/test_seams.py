@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
+from scipy.sparse.csgraph import dijkstra
 
 from coneflat import TriangleMesh, cut_open, errors, find_seams
 from coneflat.geometry.graph import MultiGraph
@@ -201,3 +202,39 @@ def test_graph_prefers_the_cheaper_of_parallel_edges_and_ignores_loops():
     assert distance.tolist() == [0, 2, 3]
     assert before.tolist() == [-1, 0, 1]
     assert source.tolist() == [0, 0, 0]
+
+
+def random_graph(seed, nodes=60, edges=150):
+    rng = np.random.default_rng(seed)
+    return MultiGraph(nodes, *rng.integers(0, nodes, (2, edges)), rng.uniform(0.1, 1.0, edges))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_paths_are_those_of_scipy_and_the_nearest_target_is_reached(seed):
+    graph, sources = random_graph(seed), np.array([3, 7])
+    matrix = np.full((graph.nodes, graph.nodes), np.inf)
+    for pair in (graph.tails, graph.heads), (graph.heads, graph.tails):
+        np.minimum.at(matrix, pair, graph.costs)
+    expected = dijkstra(np.where(np.isfinite(matrix), matrix, 0), indices=sources, min_only=True)
+    distance, before, source = graph.shortest_paths(sources)
+    assert distance == pytest.approx(expected)
+    reached = np.flatnonzero(before >= 0)
+    assert distance[reached] == pytest.approx(distance[before[reached]] + matrix[before[reached], reached])
+    assert (source[reached] == source[before[reached]]).all()
+    targets = np.array([11, 23, 42])
+    short, _, _ = graph.shortest_paths(sources, targets)
+    assert short[targets].min() == distance[targets].min()
+    assert (short >= distance).all()
+
+
+@pytest.mark.parametrize("least", [0.0, 5.0, 100.0])
+def test_sets_are_widened_by_what_is_nearest(least):
+    graph = random_graph(5)
+    label = np.full(graph.nodes, -1)
+    label[[3, 30]] = 0, 1
+    wide = graph.widened(label, np.ones(graph.nodes), least)
+    distance, _, source = graph.shortest_paths(np.array([3, 30]))
+    for one, seed in enumerate((3, 30)):
+        own = np.flatnonzero(source == seed)
+        nearest = own[np.argsort(distance[own])][: max(1, int(least))]
+        assert set(np.flatnonzero(wide == one)) == set(nearest)

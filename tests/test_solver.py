@@ -161,3 +161,15 @@ def test_mkl_is_found_where_no_package_tells_of_it(monkeypatch, found):
     monkeypatch.setattr(pardiso.metadata, "files", files)
     assert pardiso._library()["pardiso"] is not None
     assert usual["pardiso"] is not None
+
+
+def test_scattered_parts_and_parts_of_a_whole_are_solved_by_what_is_fastest_for_them(matrix):
+    right = np.ones(matrix.shape[0])
+    expected = np.linalg.solve(matrix.toarray(), right)
+    assert factorize(matrix, is_scattered=True).solve(right) == pytest.approx(expected, abs=1e-9)
+    with solving("auto") as choice:
+        for whole in (0, LARGE, 2 * HUGE):
+            factor = factorize(matrix, whole=whole)
+            assert factor.solve(right) == pytest.approx(expected, abs=1e-9)
+            # No part is so large that nothing but multigrid fits into memory.
+            assert list(choice.used)[-1] == best_for(min(max(whole, 1), LARGE))

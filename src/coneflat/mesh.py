@@ -49,12 +49,15 @@ def sort_by_counting(keys: IntArray, bound: int) -> IntArray:
 
 def sort_pairs(one: IntArray, two: IntArray, bound: int) -> tuple[IntArray, BoolArray]:
     """Return the stable order of unordered pairs, by the smaller index first, and where in it each pair comes first."""
-    low, high = np.minimum(one, two), np.maximum(one, two)
-    by_high = sort_by_counting(high, bound)
-    order = by_high[sort_by_counting(low[by_high], bound)].astype(np.int64)
-    first = np.ones(len(order), dtype=bool)
-    low, high = low[order], high[order]
-    first[1:] = (low[1:] != low[:-1]) | (high[1:] != high[:-1])
+    order = np.empty(len(one), dtype=np.int64)
+    first = np.empty(len(one), dtype=bool)
+    order_pairs(
+        np.ascontiguousarray(one, dtype=np.int64),
+        np.ascontiguousarray(two, dtype=np.int64),
+        bound,
+        order,
+        first,
+    )
     return order, first
 
 
@@ -77,13 +80,10 @@ class TriangleMesh:
         """Edges as vertex pairs (e, 2), edge of each half-edge (3m,), half-edges of each edge (e, 2)."""
         tails, heads = self.tails, self.heads
         order, first = sort_pairs(tails, heads, len(self.vertices))
+        pairs, sides = np.empty((2, np.count_nonzero(first), 2), dtype=np.int64)
         edge_of = np.empty(len(order), dtype=np.int64)
-        edge_of[order] = np.cumsum(first) - 1
-        one = order[first]
-        two = np.full(len(one), -1, dtype=np.int64)
-        two[edge_of[order[~first]]] = order[~first]
-        pairs = np.sort(np.stack([tails[one], heads[one]], axis=1), axis=1)
-        return pairs, edge_of, np.stack([one, two], axis=1)
+        list_edges(tails, heads, order, first, pairs, edge_of, sides)
+        return pairs, edge_of, sides
 
     @cached_property
     def tails(self) -> IntArray:
@@ -211,6 +211,66 @@ def end_corners(halfedges: IntArray) -> tuple[IntArray, IntArray]:
     corner = halfedges % 3
     base = halfedges - corner
     return base + NEXT[corner], base + PREVIOUS[corner]
+
+
+@compiled
+def order_pairs(one: IntArray, two: IntArray, bound: int, order: IntArray, first: BoolArray) -> None:
+    """Fill the stable order of unordered pairs below a bound, and where in it each pair comes first.
+
+    By counting, first for the larger indices and then for the smaller ones: linear even where thousands meet.
+    """
+    by_high = np.empty(len(one), dtype=np.int64)
+    place = np.zeros(bound + 1, dtype=np.int64)
+    for p in range(len(one)):
+        place[max(one[p], two[p]) + 1] += 1
+    for v in range(bound):
+        place[v + 1] += place[v]
+    for p in range(len(one)):
+        high = max(one[p], two[p])
+        by_high[place[high]] = p
+        place[high] += 1
+    place[:] = 0
+    for p in range(len(one)):
+        place[min(one[p], two[p]) + 1] += 1
+    for v in range(bound):
+        place[v + 1] += place[v]
+    for i in range(len(one)):
+        pair = by_high[i]
+        low = min(one[pair], two[pair])
+        order[place[low]] = pair
+        place[low] += 1
+    for i in range(len(order)):
+        here, last = order[i], order[i - 1]
+        is_same = (one[here] == one[last] and two[here] == two[last]) or (
+            one[here] == two[last] and two[here] == one[last]
+        )
+        first[i] = i == 0 or not is_same
+
+
+@compiled
+def list_edges(
+    tails: IntArray,
+    heads: IntArray,
+    order: IntArray,
+    first: BoolArray,
+    pairs: IntArray,
+    edge_of: IntArray,
+    sides: IntArray,
+) -> None:
+    """Fill the ends of each edge (e, 2), the edge of each half-edge, and the half-edges of each edge (e, 2) or -1.
+
+    order, first: of the half-edges as pairs of vertices, see `sort_pairs`.
+    """
+    edge = -1
+    for i in range(len(order)):
+        h = order[i]
+        if first[i]:
+            edge += 1
+            pairs[edge, 0], pairs[edge, 1] = min(tails[h], heads[h]), max(tails[h], heads[h])
+            sides[edge, 0], sides[edge, 1] = h, -1
+        else:
+            sides[edge, 1] = h
+        edge_of[h] = edge
 
 
 @compiled

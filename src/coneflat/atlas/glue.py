@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..geometry.overlap import find_overlaps
-from ..geometry.planar import signed_double_areas
+from ..geometry.planar import bounds, signed_double_areas
 from ..mesh import TriangleMesh
 from .chart_seams import Layout, Seams, same_points
 
@@ -53,8 +53,7 @@ class _Gluing:
         self.stretches = [members for members in stretches if len(members)]
         self.corners, self.chart = layout.corners.copy(), layout.chart.copy()
         self.faces = _members(layout.chart, np.arange(len(layout.chart)))
-        corners = layout.points[layout.corners]
-        self.low, self.high = corners.min(axis=1), corners.max(axis=1)
+        self.low, self.high = bounds(layout.points[layout.corners])
 
     @property
     def layout(self) -> Layout:
@@ -136,8 +135,7 @@ class _Gluing:
         seams.charts[seams.charts == moved] = self.chart[self.faces[moved]] = kept
         self.faces[kept] = np.concatenate([self.faces[kept], self.faces[moved]])
         self.faces[moved] = self.faces[moved][:0]
-        corners = self._corners(self.faces[kept])
-        self.low[self.faces[kept]], self.high[self.faces[kept]] = corners.min(axis=1), corners.max(axis=1)
+        self.low[self.faces[kept]], self.high[self.faces[kept]] = bounds(self._corners(self.faces[kept]))
         return True
 
     def _corners(self, faces: IntArray) -> FloatArray:
@@ -148,7 +146,7 @@ class _Gluing:
         corners = self._corners(self.faces[moved])
         if not (signed_double_areas(corners) > 0).all():
             return False
-        low, high = corners.min(axis=1), corners.max(axis=1)
+        low, high = bounds(corners)
         others = self.faces[kept]
         others = others[_touches(self.low[others], self.high[others], low.min(axis=0), high.max(axis=0))]
         if not len(others):

@@ -143,8 +143,8 @@ def _to_the_border(
     inside = disk.edge_faces[~disk.is_boundary_edge]
     inside = inside[~barred[inside].any(axis=1)]
     dual = MultiGraph(len(disk.faces), inside[:, 0], inside[:, 1], np.ones(len(inside)))
-    distance, before, _ = dual.shortest_paths(np.flatnonzero(chosen))
     free = beside[~barred[beside]]
+    distance, before, _ = dual.shortest_paths(np.flatnonzero(chosen), free)
     if not np.isfinite(distance[free]).any():
         return None
     nodes, _ = trace_back(free[[np.argmin(distance[free])]], before)
@@ -161,20 +161,14 @@ def widen(
     areas: (m,) of the triangles.
     """
     inside = disk.edge_faces[~disk.is_boundary_edge]
-    middles = disk.vertices[disk.faces].mean(axis=1)
-    lengths = np.linalg.norm(middles[inside[:, 0]] - middles[inside[:, 1]], axis=1)
+    middles = (
+        disk.vertices[disk.faces[:, 0]] + disk.vertices[disk.faces[:, 1]] + disk.vertices[disk.faces[:, 2]]
+    )
+    steps = (middles[inside[:, 0]] - middles[inside[:, 1]]) / 3
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
     dual = MultiGraph(len(disk.faces), inside[:, 0], inside[:, 1], lengths)
-    distance, _, source = dual.shortest_paths(np.flatnonzero(one | other))
-    order = np.argsort(distance, kind="stable")
-
-    def widened(chosen: BoolArray) -> BoolArray:
-        own = order[chosen[source[order]]]
-        full = max(np.count_nonzero(chosen), 1 + int(np.searchsorted(np.cumsum(areas[own]), least)))
-        wide = np.zeros_like(chosen)
-        wide[own[:full]] = True
-        return wide
-
-    return widened(one), widened(other)
+    wide = dual.widened(np.where(one, 0, np.where(other, 1, -1)), areas, least)
+    return wide == 0, wide == 1
 
 
 def _between(disk: TriangleMesh, border: IntArray, mark: IntArray) -> tuple[IntArray, IntArray]:
@@ -201,12 +195,12 @@ def _cheapest_path(
 ) -> IntArray:
     """Return the edges of the cheapest path inside a disk that runs through neither set of triangles."""
     faces = disk.edge_faces
-    passable = ~disk.is_boundary_edge
-    passable &= ~(one[faces].all(axis=1) | other[faces].all(axis=1))
+    left, right = faces.T
+    passable = ~(disk.is_boundary_edge | (one[left] & one[right]) | (other[left] & other[right]))
     edges = np.flatnonzero(passable)
     ends_of = disk.edges[edges]
     graph = MultiGraph(len(disk.vertices), ends_of[:, 0], ends_of[:, 1], costs[edges])
-    distance, before, _ = graph.shortest_paths(starts)
+    distance, before, _ = graph.shortest_paths(starts, ends)
     nodes, previous = trace_back(ends[[np.argmin(distance[ends])]], before)
     return edges[graph.edges_between(nodes, previous)]
 

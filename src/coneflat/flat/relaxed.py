@@ -8,7 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from .._arrays import BoolArray, ComplexArray, FloatArray
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
+from ..compiled import compiled
 from ..errors import LengthError, SeamError
 from ..geometry import double_areas, edge_lengths
 from ..geometry.operators import LEAST_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
@@ -139,12 +140,8 @@ class _Surface:
 
     def ratios(self, laid_out: LaidOut) -> FloatArray:
         """Return (m,) ratios of singular values, infinite for triangles that are turned over or have no area."""
-        along, across = self._factors
-        corners = laid_out.points[laid_out.corners]
-        places = (corners - corners[:, :1]) @ np.array([1.0, 1j])
-        with np.errstate(invalid="ignore"):
-            one, two = np.abs((along * places).sum(axis=1)), np.abs((across * places).sum(axis=1))
-        return np.divide(one + two, one - two, out=np.full(len(one), np.inf), where=one > two)
+        found: FloatArray = map_ratios(*self._factors, laid_out.points, laid_out.corners)
+        return found
 
     def mean(self, ratios: FloatArray) -> float:
         """The mean ratio by area, over upright triangles."""
@@ -159,9 +156,9 @@ class _Surface:
         The vertices there, (n,), too. before: (m,) the ratios of the layout that nothing may be worse than.
         """
         after, (mesh, faces) = self.ratios(moved), (self.mesh, self.mesh.faces)
-        edges = mesh.edges[was_free[mesh.edges].all(axis=1)]
+        edges = mesh.edges[was_free[mesh.edges[:, 0]] & was_free[mesh.edges[:, 1]]]
         count, patch = label_components(len(mesh.vertices), edges[:, 0], edges[:, 1])
-        touched = np.flatnonzero(was_free[faces].any(axis=1) & np.isfinite(before))
+        touched = np.flatnonzero(has_any(was_free, faces) & np.isfinite(before))
         corner = np.argmax(was_free[faces[touched]], axis=1)
         of_face = patch[faces[touched, corner]]
         gain = before[touched] - after[touched]
@@ -202,6 +199,31 @@ class _Surface:
         )
 
 
+@compiled
+def map_ratios(
+    along: ComplexArray, across: ComplexArray, points: FloatArray, corners: IntArray
+) -> FloatArray:
+    """Return (m,) ratios of singular values of the maps z -> a z + b conj(z), infinite for those turned over.
+
+    Args:
+        along, across: (m, 3) the derivatives of a and b by the places of the corners.
+        points: (u, 2).
+        corners: (m, 3) indices of points.
+    """
+    ratios = np.full(len(corners), np.inf)
+    for f in range(len(corners)):
+        a, b = 0j, 0j
+        x, y = points[corners[f, 0]]
+        for i in range(1, 3):
+            place = complex(points[corners[f, i], 0] - x, points[corners[f, i], 1] - y)
+            a += along[f, i] * place
+            b += across[f, i] * place
+        one, two = abs(a), abs(b)
+        if one > two:
+            ratios[f] = (one + two) / (one - two)
+    return ratios
+
+
 def _largest(ratios: FloatArray) -> float:
     return float(ratios[np.isfinite(ratios)].max(initial=1.0))
 
@@ -211,5 +233,5 @@ def _around(mesh: TriangleMesh, is_bent: BoolArray) -> BoolArray:
     inside = np.zeros(len(mesh.vertices), dtype=bool)
     inside[mesh.faces[is_bent]] = True
     for _ in range(RINGS):
-        inside[mesh.faces[inside[mesh.faces].any(axis=1)]] = True
+        inside[mesh.faces[has_any(inside, mesh.faces)]] = True
     return inside

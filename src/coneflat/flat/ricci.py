@@ -114,8 +114,8 @@ class PackingProblem(ConformalProblem):
         radii = self.radii * np.exp(centred(log_scale))
         return sum_packing_angles(self.triangulation.tail, self.triangulation.length, radii, sums, cots)
 
-    def flip(self, log_scale: FloatArray, suspects: IntArray | None) -> IntArray:
-        """Flip to weighted Delaunay for the radii, from some half-edges or all; return the half-edges flipped."""
+    def flip(self, log_scale: FloatArray, suspects: IntArray) -> IntArray:
+        """Flip to weighted Delaunay for the radii, from some half-edges; return the half-edges flipped."""
         radii = self.radii * np.exp(centred(log_scale))
         return make_delaunay(self.triangulation, radii=radii, has_lengths=False, suspects=suspects)
 

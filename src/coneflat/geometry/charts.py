@@ -29,9 +29,7 @@ def both_sides(mesh: TriangleMesh, edges: IntArray, at_corners: Values) -> tuple
 
 def point_seams(mesh: TriangleMesh, corners: IntArray) -> IntArray:
     """Return the inner edges whose two sides have different points; `corners` (m, 3) numbers those of the corners."""
-    inside = np.flatnonzero(~mesh.is_boundary_edge)
-    here, there = both_sides(mesh, inside, corners)
-    return inside[(here != there).any(axis=1)]
+    return np.flatnonzero(find_split(mesh.edge_halfedges, np.ascontiguousarray(corners)))
 
 
 def uv_seams(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
@@ -50,6 +48,26 @@ def label_charts(mesh: TriangleMesh, joined: BoolArray) -> tuple[int, IntArray]:
     """Return the number of charts, and (m,) the chart of each triangle; `joined` (e,) are inner edges within charts."""
     faces = mesh.edge_faces[joined]
     return label_components(len(mesh.faces), faces[:, 0], faces[:, 1])
+
+
+@compiled
+def find_split(edge_halfedges: IntArray, corners: IntArray) -> BoolArray:
+    """Return (e,) whether the two sides of each edge have different points at their ends; not so on the boundary.
+
+    Args:
+        edge_halfedges: (e, 2) the half-edges of each edge, which run opposite ways; -1 on the boundary.
+        corners: (m, 3) numbers of points.
+    """
+    split = np.zeros(len(edge_halfedges), np.bool_)
+    for e in range(len(edge_halfedges)):
+        h, t = edge_halfedges[e]
+        if t >= 0:
+            f, g = h // 3, t // 3
+            split[e] = (
+                corners[f, (h + 1) % 3] != corners[g, (t + 2) % 3]
+                or corners[f, (h + 2) % 3] != corners[g, (t + 1) % 3]
+            )
+    return split
 
 
 @compiled

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import FloatArray, IntArray
 from ..compiled import compiled
@@ -16,8 +17,9 @@ from ..mesh import NEXT, PREVIOUS
 TAU = 2 * np.pi
 # Corners at one point from which on it is worth it; fewer triangles meet in few enough pairs.
 MANY = 500
-# Points are counted by this many bits that depend on all of theirs.
-HASHED = 20
+# Points are counted by numbers that depend on all of their bits, one for so many points: few enough that the counts
+# stay near the processor.
+TOGETHER = 32
 # By how much angles computed of coordinates up to 1 may be off, radians, and more.
 ROUNDED = 2.0**-46
 
@@ -65,11 +67,17 @@ class Fans:
 
 def find_fans(corners: FloatArray) -> Fans | None:
     """Return the fans of many triangles (m, 3, 2), counterclockwise, coordinates up to 1; None if there is none."""
-    points = (corners.reshape(-1, 2) + 0.0) @ np.array([1, 1j])  # a zero has one sign
-    hashed = _hashed(points)
-    suspected = np.flatnonzero((np.bincount(hashed, minlength=1 << HASHED) >= MANY)[hashed])
-    if not len(suspected):
+    if len(corners) < MANY:
         return None
+    places = corners.reshape(-1, 2) + 0.0  # a zero has one sign
+    bits = (len(places) // TOGETHER).bit_length()
+    hashed = np.empty(len(places), dtype=np.int32)
+    counts = np.zeros(1 << bits, dtype=np.int32)
+    count_hashed(places.view(np.uint64), np.uint64(64 - bits), hashed, counts)
+    if counts.max() < MANY:
+        return None
+    points = places.view(np.complex128)[:, 0]
+    suspected = np.flatnonzero((counts >= MANY)[hashed])
     _, number, count = np.unique(points[suspected], return_inverse=True, return_counts=True)
     is_many = count[number.ravel()] >= MANY
     suspected, number = suspected[is_many], number.ravel()[is_many]
@@ -80,20 +88,28 @@ def find_fans(corners: FloatArray) -> Fans | None:
     numbers[triangles] = number[first]
     angles = np.zeros((len(corners), 2))
     apex = suspected[first] % 3
-    places = points.reshape(-1, 3)
-    one, two = (places[triangles, step[apex]] - places[triangles, apex] for step in (NEXT, PREVIOUS))
+    at = points.reshape(-1, 3)
+    one, two = (at[triangles, step[apex]] - at[triangles, apex] for step in (NEXT, PREVIOUS))
     angles[triangles, 0] = np.angle(one)
     angles[triangles, 1] = np.angle(one) + np.angle(one.conj() * two)
     return Fans(numbers, angles)
 
 
-def _hashed(points: FloatArray) -> IntArray:
-    """Return numbers of few bits that are the same for the same points, and seldom for others."""
-    bits = np.ascontiguousarray(points).view(np.uint64).reshape(-1, 2)
-    mixed = bits[:, 0] * np.uint64(0x9E3779B97F4A7C15) + bits[:, 1] * np.uint64(0xC2B2AE3D27D4EB4F)
-    mixed ^= mixed >> np.uint64(29)
-    mixed *= np.uint64(0xBF58476D1CE4E5B9)
-    return (mixed >> np.uint64(64 - HASHED)).astype(np.int64)
+@compiled
+def count_hashed(
+    points: NDArray[np.uint64], shift: np.uint64, hashed: NDArray[np.int32], counts: NDArray[np.int32]
+) -> None:
+    """Fill numbers that are the same for the same points, and seldom for others, and how often there is each.
+
+    points: (p, 2) bits of coordinates. shift: how many bits of 64 the numbers do not have. counts: zeros on entry.
+    """
+    for p in range(len(points)):
+        mixed = points[p, 0] * np.uint64(0x9E3779B97F4A7C15) + points[p, 1] * np.uint64(0xC2B2AE3D27D4EB4F)
+        mixed ^= mixed >> np.uint64(29)
+        mixed *= np.uint64(0xBF58476D1CE4E5B9)
+        number = np.int32(mixed >> shift)
+        hashed[p] = number
+        counts[number] += 1
 
 
 @compiled

@@ -7,9 +7,10 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
+from scipy.sparse.csgraph import minimum_spanning_tree
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..compiled import compiled
 from ..mesh import sort_pairs
 
 
@@ -31,6 +32,9 @@ class MultiGraph:
     @cached_property
     def _simple(self) -> tuple[IntArray, IntArray]:
         """The cheapest edge of each pair of adjacent nodes, and the sorted keys of the pairs."""
+        keys = self._keys(self.tails, self.heads)
+        if (np.diff(keys) > 0).all() and (self.tails != self.heads).all():  # as the edges of a mesh are
+            return np.arange(len(keys)), keys
         order, first = sort_pairs(self.tails, self.heads, self.nodes)
         if not first.all():
             group = np.cumsum(first)
@@ -48,24 +52,50 @@ class MultiGraph:
         chosen, keys = self._simple
         return chosen[np.searchsorted(keys, self._keys(one, two))]
 
-    def shortest_paths(self, sources: IntArray) -> tuple[FloatArray, IntArray, IntArray]:
+    @cached_property
+    def _beside(self) -> tuple[IntArray, IntArray]:
+        """Where the edges at each node begin, and these: at `2 e` edge e from its tail, at `2 e + 1` from its head."""
+        starts = np.zeros(self.nodes + 1, dtype=np.int64)
+        sides = np.empty(2 * len(self.costs), dtype=np.int64)
+        list_sides(*self._ends, starts, sides)
+        return starts, sides
+
+    @cached_property
+    def _ends(self) -> tuple[IntArray, IntArray]:
+        """Tails and heads, in one piece each."""
+        return np.ascontiguousarray(self.tails), np.ascontiguousarray(self.heads)
+
+    def shortest_paths(
+        self, sources: IntArray, targets: IntArray | None = None
+    ) -> tuple[FloatArray, IntArray, IntArray]:
         """Return each node's distance to the nearest source, its predecessor, and that source.
 
         The predecessor is -1 at a source; both are -1 at a node that no source reaches.
+
+        Args:
+            sources: nodes.
+            targets: nodes of which only the nearest is of interest: the search ends there, and what lies farther away
+                is as if it could not be reached, or farther than it is.
         """
-        chosen, _ = self._simple
-        matrix = csr_matrix(
-            (self.costs[chosen], (self.tails[chosen], self.heads[chosen])), shape=(self.nodes, self.nodes)
-        )
-        distance, predecessor, source = dijkstra(
-            matrix, directed=False, indices=sources, min_only=True, return_predecessors=True
-        )
-        none = -1
-        return (
-            distance,
-            np.maximum(predecessor, none).astype(np.int64),
-            np.maximum(source, none).astype(np.int64),
-        )
+        is_target = np.zeros(self.nodes, dtype=bool)
+        if targets is not None:
+            is_target[targets] = True
+        distance = np.full(self.nodes, np.inf)
+        before, source = np.full((2, self.nodes), -1)
+        find_paths(*self._beside, *self._ends, self.costs, sources, is_target, distance, before, source)
+        return distance, before, source
+
+    def widened(self, label: IntArray, weights: FloatArray, least: float) -> IntArray:
+        """Return sets of nodes, each with those nearest to it, and nearer to it than to others, up to a weight.
+
+        Args:
+            label: (n,) the set of each node, from 0, or -1.
+            weights: (n,) of the nodes.
+            least: the weight that each set is to have at least, if it can.
+        """
+        wide = label.copy()
+        widen_sets(*self._beside, *self._ends, self.costs, np.flatnonzero(label >= 0), weights, least, wide)
+        return wide
 
     def minimum_spanning_tree(self) -> IntArray:
         """Return the edges of a minimum spanning forest."""
@@ -87,3 +117,138 @@ def trace_back(starts: IntArray, predecessor: IntArray) -> tuple[IntArray, IntAr
             steps[node] = before
             node = before
     return np.array(list(steps.keys()), dtype=np.int64), np.array(list(steps.values()), dtype=np.int64)
+
+
+@compiled
+def list_sides(tails: IntArray, heads: IntArray, starts: IntArray, sides: IntArray) -> None:
+    """Fill where the sides of edges at each node begin, (n + 1,) zeros on entry, and the sides: 2 e and 2 e + 1."""
+    for e in range(len(tails)):
+        starts[tails[e]] += 1
+        starts[heads[e]] += 1
+    total = 0
+    for v in range(len(starts)):
+        total += starts[v]
+        starts[v] = total
+    for e in range(len(tails) - 1, -1, -1):
+        starts[heads[e]] -= 1
+        sides[starts[heads[e]]] = 2 * e + 1
+        starts[tails[e]] -= 1
+        sides[starts[tails[e]]] = 2 * e
+
+
+@compiled
+def find_paths(
+    starts: IntArray,
+    sides: IntArray,
+    tails: IntArray,
+    heads: IntArray,
+    costs: FloatArray,
+    sources: IntArray,
+    is_target: BoolArray,
+    distance: FloatArray,
+    before: IntArray,
+    source: IntArray,
+) -> None:
+    """Fill distances (infinite on entry), predecessors and sources (-1 on entry), as far as the nearest target.
+
+    starts, sides: of the edges at each node, see `list_sides`.
+    """
+    keys, items = np.empty(len(sides) + len(sources)), np.empty(len(sides) + len(sources), np.int64)
+    size = 0
+    for v in sources:
+        if distance[v] > 0.0:
+            distance[v], source[v] = 0.0, v
+            size = push(keys, items, size, 0.0, v)
+    while size > 0:
+        key, v = keys[0], items[0]
+        if is_target[v]:
+            break
+        size = drop_first(keys, items, size)
+        if key > distance[v]:
+            continue
+        for i in range(starts[v], starts[v + 1]):
+            e = sides[i] // 2
+            other = tails[e] if sides[i] % 2 else heads[e]
+            if key + costs[e] < distance[other]:
+                distance[other], before[other], source[other] = key + costs[e], v, source[v]
+                size = push(keys, items, size, distance[other], other)
+
+
+@compiled
+def widen_sets(
+    starts: IntArray,
+    sides: IntArray,
+    tails: IntArray,
+    heads: IntArray,
+    costs: FloatArray,
+    seeds: IntArray,
+    weights: FloatArray,
+    least: float,
+    label: IntArray,
+) -> None:
+    """Widen sets of nodes; see `MultiGraph.widened`. starts, sides: of the edges at each node, see `list_sides`."""
+    keys, items = np.empty(len(sides) + len(seeds)), np.empty(len(sides) + len(seeds), np.int64)
+    distance = np.full(len(label), np.inf)
+    near = label.copy()
+    total = np.zeros(label.max() + 1)
+    size, lacking = 0, len(total)
+    for v in seeds:
+        distance[v] = 0.0
+        size = push(keys, items, size, 0.0, v)
+        total[label[v]] += weights[v]
+    for i in range(len(total)):
+        lacking -= total[i] >= least
+    while size > 0 and lacking > 0:
+        key, v = keys[0], items[0]
+        size = drop_first(keys, items, size)
+        if key > distance[v]:
+            continue
+        own = near[v]
+        if label[v] < 0 and total[own] < least:
+            label[v] = own
+            total[own] += weights[v]
+            lacking -= total[own] >= least
+        for i in range(starts[v], starts[v + 1]):
+            e = sides[i] // 2
+            other = tails[e] if sides[i] % 2 else heads[e]
+            if key + costs[e] < distance[other]:
+                distance[other], near[other] = key + costs[e], own
+                size = push(keys, items, size, distance[other], other)
+
+
+@compiled
+def push(keys: FloatArray, items: IntArray, size: int, key: float, item: int) -> int:
+    """Put an item on a binary heap and return its new size."""
+    i = size
+    while i > 0:
+        parent = (i - 1) // 2
+        if keys[parent] <= key:
+            break
+        keys[i] = keys[parent]
+        items[i] = items[parent]
+        i = parent
+    keys[i] = key
+    items[i] = item
+    return size + 1
+
+
+@compiled
+def drop_first(keys: FloatArray, items: IntArray, size: int) -> int:
+    """Take the least item off a binary heap and return its new size."""
+    size -= 1
+    key, item = keys[size], items[size]
+    i = 0
+    while True:
+        child = 2 * i + 1
+        if child >= size:
+            break
+        if child + 1 < size and keys[child + 1] < keys[child]:
+            child += 1
+        if keys[child] >= key:
+            break
+        keys[i] = keys[child]
+        items[i] = items[child]
+        i = child
+    keys[i] = key
+    items[i] = item
+    return size

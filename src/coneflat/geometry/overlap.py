@@ -7,6 +7,7 @@ be 0 or have magnitudes from 2^-420 to 2^420 for this, so that nothing over- or 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,30 +151,46 @@ ROUNDED = 2.0**-48
 SNUG = 0.5
 
 
-def bounding_boxes(corners: FloatArray) -> FloatArray:
-    """Return (m, 4) x0, y0, -x1, -y1 of triangles (m, 3, 2): the box around several is their minimum."""
-    one, two, three = corners[:, 0], corners[:, 1], corners[:, 2]
-    low = np.minimum(np.minimum(one, two), three)
-    high = np.maximum(np.maximum(one, two), three)
-    return np.concatenate([low, -high], axis=1)
-
-
 def snug_boxes(corners: FloatArray) -> FloatArray:
-    """Return (m, 4) bounding boxes as above, along the axes or along the sides of long triangles askew to them.
+    """Return (m, 4) x0, y0, -x1, -y1 of triangles (m, 3, 2), none above 1: the box around several is their minimum.
 
-    Boxes of the latter kind are larger by what rounding may have taken. corners: (m, 3, 2), none of them above 1.
+    They are along the axes, or along the sides of long triangles askew to them; these are larger by what rounding may
+    have taken.
     """
-    straight = bounding_boxes(corners)
-    places = corners @ np.array([1, 1j])
-    sides = places[:, [1, 2, 0]] - places
-    turned = places * np.exp(-0.5j * np.angle((sides**2).sum()))
-    askew = bounding_boxes(np.stack([turned.real, turned.imag], axis=2)) - ROUNDED
-    return askew if _areas(askew).sum() < SNUG * _areas(straight).sum() else straight
+    straight, askew = np.empty((2, len(corners), 4))
+    flat = np.ascontiguousarray(corners).reshape(-1, 6)
+    area, x, y = fill_boxes(flat, 1.0, 0.0, 0.0, straight)
+    turn = -math.atan2(y, x) / 2
+    turned_area, _, _ = fill_boxes(flat, math.cos(turn), math.sin(turn), ROUNDED, askew)
+    return askew if turned_area < SNUG * area else straight
 
 
-def _areas(boxes: FloatArray) -> FloatArray:
-    areas: FloatArray = (boxes[:, 0] + boxes[:, 2]) * (boxes[:, 1] + boxes[:, 3])
-    return areas
+@compiled
+def fill_boxes(
+    corners: FloatArray, cos: float, sin: float, margin: float, boxes: FloatArray
+) -> tuple[float, float, float]:
+    """Fill the boxes of triangles (m, 6), turned; return their area, and the sum of the squares of sides as complex.
+
+    margin: by which boxes are larger on every side.
+    """
+    area, real, imaginary = 0.0, 0.0, 0.0
+    for t in range(len(corners)):
+        c = corners[t]
+        x0, y0, x1, y1 = math.inf, math.inf, math.inf, math.inf
+        for i in range(0, 6, 2):
+            x, y = cos * c[i] - sin * c[i + 1], sin * c[i] + cos * c[i + 1]
+            x0, y0, x1, y1 = min(x0, x), min(y0, y), min(x1, -x), min(y1, -y)
+            u, v = c[(i + 2) % 6] - c[i], c[(i + 3) % 6] - c[i + 1]
+            real += u * u - v * v
+            imaginary += 2 * u * v
+        boxes[t, 0], boxes[t, 1], boxes[t, 2], boxes[t, 3] = (
+            x0 - margin,
+            y0 - margin,
+            x1 - margin,
+            y1 - margin,
+        )
+        area += (x0 + x1) * (y0 + y1)
+    return area, real, imaginary
 
 
 def z_order(boxes: FloatArray) -> IntArray:

@@ -6,9 +6,12 @@ The formulas go through the slacks b + c - a, evaluated so that needles and caps
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..compiled import compiled
 from ..errors import DegenerateFaceError, FaceIndexError
 from ..mesh import NEXT, PREVIOUS
 from ..text import list_some, plural
@@ -33,10 +36,9 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 def slacks(lengths: FloatArray) -> FloatArray:
     """Return (m, 3) b + c - a for every side a; negative where the triangle inequality is broken."""
+    lengths = np.ascontiguousarray(lengths, dtype=np.float64)
     slack = np.empty_like(lengths)
-    for i in range(3):
-        a, b, c = lengths[:, i], lengths[:, NEXT[i]], lengths[:, PREVIOUS[i]]
-        slack[:, i] = np.minimum(b, c) - (a - np.maximum(b, c))
+    fill_slacks(lengths, slack)
     return slack
 
 
@@ -47,8 +49,10 @@ def is_broken(lengths: FloatArray) -> BoolArray:
 
 def double_areas(lengths: FloatArray) -> FloatArray:
     """Return (m,) twice the area of each triangle; 0 where the triangle inequality is broken."""
-    slack = np.maximum(slacks(lengths), 0)
-    return np.sqrt(_perimeter(lengths) * (slack[:, 0] * slack[:, 1] * slack[:, 2])) / 2
+    lengths = np.ascontiguousarray(lengths, dtype=np.float64)
+    areas = np.empty(len(lengths))
+    fill_double_areas(lengths, areas)
+    return areas
 
 
 def corner_angles(lengths: FloatArray) -> FloatArray:
@@ -104,7 +108,8 @@ def mollify(
     Raises:
         DegenerateFaceError: with `strict`, or when the mesh as a whole has no area.
     """
-    areas, squares = double_areas(lengths), lengths.max(axis=1) ** 2
+    longest = np.maximum(np.maximum(lengths[:, 0], lengths[:, 1]), lengths[:, 2])
+    areas, squares = double_areas(lengths), longest**2
     bad = np.flatnonzero(areas <= ZERO_AREA * squares)
     if not len(bad):
         return lengths, None
@@ -125,3 +130,29 @@ def mollify(
         f"by {growth / mean:.1e} of the mean edge."
     )
     return lengths + growth, note
+
+
+@compiled
+def slack_beside(lengths: FloatArray, t: int, i: int) -> float:
+    """Return by how much the two other sides of a triangle are longer than side i."""
+    b, c = lengths[t, (i + 1) % 3], lengths[t, (i + 2) % 3]
+    return float(min(b, c) - (lengths[t, i] - max(b, c)))
+
+
+@compiled
+def fill_slacks(lengths: FloatArray, slack: FloatArray) -> None:
+    """Fill (m, 3) b + c - a for every side a of triangles with sides (m, 3)."""
+    for t in range(len(lengths)):
+        for i in range(3):
+            slack[t, i] = slack_beside(lengths, t, i)
+
+
+@compiled
+def fill_double_areas(lengths: FloatArray, areas: FloatArray) -> None:
+    """Fill (m,) twice the area of triangles with sides (m, 3)."""
+    for t in range(len(lengths)):
+        product = 1.0
+        for i in range(3):
+            slack = slack_beside(lengths, t, i)
+            product *= 0.0 if slack < 0.0 else slack  # what is no number stays so
+        areas[t] = math.sqrt((lengths[t, 0] + lengths[t, 1] + lengths[t, 2]) * product) / 2

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse import bsr_matrix
 
-from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ..compiled import compiled
 from ..errors import MetricError
 from ..geometry.planar import map_factors
@@ -61,7 +61,7 @@ class Patches:
         wanted: Callable[[ComplexArray], ComplexArray],
     ) -> None:
         self.vertices = np.flatnonzero(movable)
-        self.faces = np.flatnonzero(movable[faces].any(axis=1))
+        self.faces = np.flatnonzero(has_any(movable, faces))
         self.sides = sides[self.faces]
         local = np.full(len(movable), -1)
         local[self.vertices] = np.arange(len(self.vertices))

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ..geometry.planar import heights, signed_angles
 from ..geometry.straight import FlatTriangles
 from .patches import DEGENERATE, Patches
@@ -150,7 +150,7 @@ class _Untangling:
                 return
             around = np.zeros(len(stay), dtype=bool)
             around[winding] = True
-            spared[faces[around[faces].any(axis=1)]] = True
+            spared[faces[has_any(around, faces)]] = True
 
     def _patches(self, movable: BoolArray, least: float) -> Patches | None:
         """Return the patches of movable vertices, without those that have failed as they are; None if none are left."""
@@ -199,7 +199,7 @@ class _Untangling:
         """Return the vertices around which triangles would wind that do not now, with sides (f, 3) for the patches'."""
         near = np.zeros(len(self.angles), dtype=bool)
         near[self.faces[patches.faces]] = True
-        rows = np.flatnonzero(near[self.faces].any(axis=1))
+        rows = np.flatnonzero(has_any(near, self.faces))
         is_free = np.zeros(len(self.angles), dtype=bool)
         is_free[patches.vertices] = self.on_boundary[patches.vertices]
         before = self.sides[rows]
@@ -235,7 +235,7 @@ def _neighbourhood(faces: IntArray, seeds: IntArray, rings: int, count: int) -> 
     inside = np.zeros(count, dtype=bool)
     inside[faces[seeds]] = True
     for _ in range(rings - 1):
-        inside[faces[inside[faces].any(axis=1)]] = True
+        inside[faces[has_any(inside, faces)]] = True
     return inside
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .._arrays import IntArray
+from .._arrays import IntArray, has_any
 from ..errors import MetricError
 from ..mesh import TriangleMesh, corner_fans, label_components
 from ..text import plural
@@ -60,8 +60,8 @@ def open_along(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
     on_seam = np.zeros(len(mesh.vertices), dtype=bool)
     on_seam[mesh.edges[seams]] = True
     # Only the fans of vertices on seams fall apart.
-    is_near = on_seam[mesh.faces].any(axis=1)
-    glued = on_seam[mesh.edges].any(axis=1) & ~mesh.is_boundary_edge
+    is_near = has_any(on_seam, mesh.faces)
+    glued = has_any(on_seam, mesh.edges) & ~mesh.is_boundary_edge
     glued[seams] = False
     pairs = mesh.edge_halfedges[glued]
     near = mesh.faces[is_near]

@@ -12,6 +12,7 @@ import math
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..compiled import compiled
+from ..geometry.graph import drop_first, push
 
 
 @compiled
@@ -47,44 +48,6 @@ def label_terminals(
         count += 1
         starts[count] = n
     return count
-
-
-@compiled
-def push(keys: FloatArray, items: IntArray, size: int, key: float, item: int) -> int:
-    """Put an item on a binary heap and return its new size."""
-    i = size
-    while i > 0:
-        parent = (i - 1) // 2
-        if keys[parent] <= key:
-            break
-        keys[i] = keys[parent]
-        items[i] = items[parent]
-        i = parent
-    keys[i] = key
-    items[i] = item
-    return size + 1
-
-
-@compiled
-def drop_first(keys: FloatArray, items: IntArray, size: int) -> int:
-    """Take the least item off a binary heap and return its new size."""
-    size -= 1
-    key, item = keys[size], items[size]
-    i = 0
-    while True:
-        child = 2 * i + 1
-        if child >= size:
-            break
-        if child + 1 < size and keys[child + 1] < keys[child]:
-            child += 1
-        if keys[child] >= key:
-            break
-        keys[i] = keys[child]
-        items[i] = items[child]
-        i = child
-    keys[i] = key
-    items[i] = item
-    return size
 
 
 @compiled

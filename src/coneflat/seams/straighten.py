@@ -8,9 +8,9 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..compiled import compiled
+from ..geometry.graph import drop_first, push
 from .key_paths import Fixed, KeyPaths, Parts, find_key_paths
 from .open_mesh import OpenMesh
-from .shortest_paths import drop_first, push
 
 # What a zigzag that turns back by a right angle at every vertex adds to the length of a seam, so many times: a path
 # without turns is preferred if it is longer by no more.

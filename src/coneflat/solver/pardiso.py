@@ -38,6 +38,9 @@ TOGETHER = 2
 # MKL's file on each system, and what tells pypardiso of another one.
 RUNTIMES = ("libmkl_rt.", "mkl_rt.")
 LIBRARY_GIVEN = "PYPARDISO_MKL_RT"
+# How long, in milliseconds, a thread of MKL that has nothing to do turns in circles on its core before it sleeps; by
+# default 200, which other stages or other processes need.
+WAITING_TIME = "KMP_BLOCKTIME"
 # PARDISO's codes.
 OUT_OF_MEMORY, ZERO_PIVOT = -2, -4
 
@@ -179,6 +182,7 @@ def _routines() -> tuple[Any, Any]:
 
 def _library() -> ctypes.CDLL:
     """Load MKL from the package that brings it; pypardiso, which knows more places, looks through all folders."""
+    os.environ.setdefault(WAITING_TIME, "0")
     try:
         installed = metadata.files("mkl") or ()
     except metadata.PackageNotFoundError:

@@ -211,10 +211,20 @@ def _order_of_aggregates(part: csr_matrix, order: IntArray) -> IntArray:
 def representatives(basis: csr_matrix, fitness: FloatArray) -> IntArray:
     """Return for each coarse function the vertex where it is largest, times the fitness, without repetitions."""
     columns = basis.tocsc()
-    values = columns.data * fitness[columns.indices]
-    of = np.repeat(np.arange(columns.shape[1]), np.diff(columns.indptr))
-    largest = np.zeros(columns.shape[1])
-    np.maximum.at(largest, of, values)
-    near = np.flatnonzero((values > 0) & (values >= largest[of] * (1 - TIE)))
-    first = near[np.unique(of[near], return_index=True)[1]]
-    return np.unique(columns.indices[first]).astype(np.int64)
+    first = first_of_largest(columns.indptr, columns.data * fitness[columns.indices])
+    return np.unique(columns.indices[first[first >= 0]]).astype(np.int64)
+
+
+@compiled
+def first_of_largest(starts: IntArray, values: FloatArray) -> IntArray:
+    """Return the first of the largest positive values, but for ties, of each run that begins at a start; -1 if none."""
+    first = np.full(len(starts) - 1, -1)
+    for run in range(len(first)):
+        largest = 0.0
+        for at in range(starts[run], starts[run + 1]):
+            largest = max(largest, values[at])
+        for at in range(starts[run], starts[run + 1]):
+            if values[at] > 0.0 and values[at] >= largest * (1 - TIE):
+                first[run] = at
+                break
+    return first

@@ -45,8 +45,9 @@ class ExactModel(DenseModel):
         self._indices = operator.laplacian.indices.astype(np.int64)
         self._slope = operator.solve(operator.weighted(log_scale))
         self._least = least
-        # The Green's functions of the unknowns, in blocks as they came.
+        # The Green's functions of the unknowns, in blocks as they came, and their means.
         self._responses: list[FloatArray] = []
+        self._means: list[FloatArray] = []
         self.unknowns: IntArray = np.empty(0, dtype=np.int64)
         self.insert(required)
 
@@ -64,10 +65,7 @@ class ExactModel(DenseModel):
             new = unknowns if not len(self.unknowns) else new
             old = len(self.unknowns)
             self.unknowns = np.concatenate([self.unknowns, new])
-            self._responses.append(self._operator.responses(new))
-            rows = np.hstack(
-                [self._operator.products(self._responses[-1], block) for block in self._responses]
-            )
+            rows = self._covariances(self._operator.responses(new))
             gram = np.empty((len(self.unknowns), len(self.unknowns)))
             gram[:old, :old] = self.gram
             gram[old:] = rows
@@ -80,6 +78,19 @@ class ExactModel(DenseModel):
             self.least = self._least[self.unknowns]
         order = np.argsort(self.unknowns, kind="stable")
         return order[np.searchsorted(self.unknowns, unknowns, sorter=order)]
+
+    def _covariances(self, responses: FloatArray) -> FloatArray:
+        """Add the Green's functions (k, f) of k unknowns more; return (k, m + k) their covariances with all."""
+        areas = self._operator.areas
+        weighted, means = responses * areas, responses @ areas
+        self._responses.append(responses)
+        self._means.append(means)
+        return np.hstack(
+            [
+                weighted @ block.T - np.outer(means, others)
+                for block, others in zip(self._responses, self._means, strict=True)
+            ]
+        )
 
     def polish(self, members: IntArray) -> float:
         """Move cones over the mesh until E comes to rest; return E^2 of the best set of their number."""

@@ -57,11 +57,15 @@ class GreenOperator:
             return self._factor.solve(source)
         # By rows, each in one piece: what sources look like as columns.
         rows = np.atleast_2d(source.T)
-        rows = rows - np.outer(rows.sum(axis=1), self.areas)
-        solution = np.zeros_like(rows)
-        solution[:, 1:] = self._factor.solve(rows[:, 1:].T).T
-        solution -= (solution @ self.areas)[:, None]
+        solution = self._solve_closed(rows - np.outer(rows.sum(axis=1), self.areas))
         return solution[0] if source.ndim == 1 else solution.T
+
+    def _solve_closed(self, rows: FloatArray) -> FloatArray:
+        """Return (k, f) mean-free solutions, written over sources (k, f) that sum to 0 each, on a closed surface."""
+        rows[:, 1:] = self._factor.solve(rows[:, 1:].T).T
+        rows[:, 0] = 0.0
+        rows -= (rows @ self.areas)[:, None]
+        return rows
 
     def weighted(self, values: FloatArray) -> FloatArray:
         """Return (f,) A values."""
@@ -83,11 +87,8 @@ class GreenOperator:
         batch = min(BATCH, max(1, NUMBERS // len(self.vertices)))
         for start in range(0, len(unknowns), batch):
             some = unknowns[start : start + batch]
-            source = np.zeros((len(some), len(self.vertices)))
-            source[np.arange(len(some)), some] = 1.0
-            rows[start : start + batch] = self.solve(source.T).T
+            own, each = rows[start : start + batch], np.arange(len(some))
+            own[:] = -self.areas if self.is_closed else 0.0
+            own[each, some] += 1.0
+            own[:] = self._solve_closed(own) if self.is_closed else self._factor.solve(own.T).T
         return rows
-
-    def products(self, one: FloatArray, other: FloatArray) -> FloatArray:
-        """Return (k, l) the covariances of functions (k, f) and (l, f) under the areas."""
-        return (one * self.areas) @ other.T - np.outer(one @ self.areas, other @ self.areas)

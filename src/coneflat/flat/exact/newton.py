@@ -110,8 +110,8 @@ class ConformalProblem:
         scale = np.exp(centred(log_scale) / 2)
         return sum_angles(self.triangulation.tail, self.triangulation.length, scale, sums, cots)
 
-    def flip(self, log_scale: FloatArray, suspects: IntArray | None) -> IntArray:
-        """Flip to Delaunay in the scaled metric, from some half-edges or all; return the half-edges flipped."""
+    def flip(self, log_scale: FloatArray, suspects: IntArray) -> IntArray:
+        """Flip to Delaunay in the scaled metric, from some half-edges; return the half-edges flipped."""
         return make_delaunay(self.triangulation, log_scale, suspects=suspects)
 
     def evaluate(self, log_scale: FloatArray) -> State:
@@ -121,9 +121,9 @@ class ConformalProblem:
         broken = self.sum_angles(log_scale, sums, cots)
         # The cotangents are needed anyway and tell at a glance where there is nothing to flip.
         found = np.empty(len(cots), dtype=np.int64)
-        suspects = found[: find_negative_weights(self.triangulation.twin, cots, found)]
-        if broken or len(suspects):
-            flipped = self.flip(log_scale, None if broken else suspects)
+        suspects = found[: find_suspects(self.triangulation.twin, cots, found)]
+        if len(suspects):
+            flipped = self.flip(log_scale, suspects)
             if len(flipped):
                 self.records.append(flipped)
                 self._pattern = None
@@ -252,13 +252,31 @@ def sum_angles(
 
 
 @compiled
-def find_negative_weights(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
-    """Write a half-edge of each edge whose cotangents sum to less than 0, so is not Delaunay; return their number."""
+def has_no_weights(cots: FloatArray, h: int) -> bool:
+    """Return whether the triangle of a half-edge has no cotangents."""
+    base = h - h % 3
+    return bool(cots[base] == 0.0 and cots[base + 1] == 0.0 and cots[base + 2] == 0.0)
+
+
+@compiled
+def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
+    """Write a half-edge of each edge that may not be Delaunay; return their number.
+
+    Its cotangents sum to less than 0, or it is one of a triangle that has none, as its sides close to none.
+    """
     count = 0
     for h in range(len(twin)):
         t = twin[h]
+        if t <= h:
+            continue
+        total = cots[h] + cots[t]
         # The margin is the rounding of the cotangents; the test that decides on a flip has its own.
-        if t > h and cots[h] + cots[t] < -1e-13 * (abs(cots[h]) + abs(cots[t])):
+        is_negative = total < -1e-13 * (abs(cots[h]) + abs(cots[t]))
+        if (
+            is_negative
+            or (cots[h] == 0.0 and has_no_weights(cots, h))
+            or (cots[t] == 0.0 and has_no_weights(cots, t))
+        ):
             found[count] = h
             count += 1
     return count

@@ -111,7 +111,7 @@ def corrected(inverse: Inverse, matrix: csc_matrix, held: BoolArray) -> Inverse:
     columns = matrix[:, chosen]
     block = csc_matrix(columns.T.tocsc()[:, chosen].T)
     try:
-        return CorrectedInverse(inverse, chosen, columns, factorize(block, is_noted=False))
+        return CorrectedInverse(inverse, chosen, columns, factorize(block, is_noted=False, is_scattered=True))
     except MetricError:  # what is broken there leaves no unique solution
         return inverse
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix
 
-from ..._arrays import ComplexArray, FloatArray, IntArray
+from ..._arrays import ComplexArray, FloatArray, IntArray, has_any
 from ...compiled import compiled
 from ...geometry.planar import map_factors
 from ...mesh import label_components
@@ -69,7 +69,7 @@ class Elements:
 
     def __init__(self, motions: Motions, corners: IntArray, rest: ComplexArray, weight: FloatArray) -> None:
         moves = np.diff(motions.start) > 0
-        self.faces = np.flatnonzero(moves[corners].any(axis=1))
+        self.faces = np.flatnonzero(has_any(moves, corners))
         self.count, self.weight = motions.count, weight[self.faces]
         corners = corners[self.faces]
         self._corners = corners

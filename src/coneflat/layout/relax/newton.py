@@ -87,7 +87,7 @@ def descend(
     taken = 0
     while taken < steps and ((elements.count and active.any()) or remaining > ARRIVED):
         gradient, pull, matrix = elements.newton_system(energy, maps, remaining)
-        factor = factorize(matrix, used_up=factor, is_noted=False)
+        factor = factorize(matrix, used_up=factor, is_noted=False, whole=len(points))
         step = np.append(factor.solve(-gradient - pull), remaining)
         if not np.isfinite(step).all():
             raise MetricError(f"relaxation found no finite step of {elements.count:,} unknowns")
