@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +14,12 @@ from click.testing import CliRunner
 
 import coneflat
 
-uvicorn = pytest.importorskip("uvicorn", reason="the extra studio is not installed")
-pytest.importorskip("starlette")
+pytest.importorskip("uvicorn", reason="the extra studio is not installed")
+pytest.importorskip("starlette", reason="the extra studio is not installed")
 
 from coneflat.apps.cli.main import cli
 from coneflat.apps.studio.serve import HOST, _listening
-from coneflat.apps.studio.server import studio_app
+from coneflat.apps.studio.server import StudioServer
 from coneflat.apps.studio.session import Session
 
 TOKEN = "a-token-of-some-length"
@@ -32,9 +33,7 @@ class Studio:
         listener = _listening(0)
         port = listener.getsockname()[1]
         self.address = f"http://{HOST}:{port}/?token={TOKEN}"
-        config = uvicorn.Config(studio_app(self.session, TOKEN, port), log_level="error", ws="none")
-        config.timeout_graceful_shutdown = 1
-        self.server = uvicorn.Server(config)
+        self.server = StudioServer(self.session, TOKEN, port)
         self.thread = threading.Thread(target=self.server.run, args=([listener],), daemon=True)
         self.thread.start()
 
@@ -63,10 +62,11 @@ class StudioVisit(Visit):
             route.abort()
 
     def settle(self):
-        self.wait("!studio.isBusy() && studio.news.layout === studio.layout")
+        """Wait until the page shows what the session has come to."""
+        self.wait("!studio.isBusy()")
         assert self.studio.session.wait_until_idle(60)
-        # Both know of the same.
-        self.wait(f"studio.news.version >= {self.studio.session.version} && !studio.isBusy()")
+        version = self.studio.session.version
+        self.wait(f"studio.news.version >= {version} && studio.news.layout === studio.layout")
         self.rest()
 
     def cones(self):
@@ -96,7 +96,7 @@ class StudioVisit(Visit):
             "if (studio.tools.vertexAt(pane, at[0], at[1]) === vertex &&"
             "coneflat.renderer.pick(pane, at[0], at[1], coneflat.state).kind === 'triangle')"
             "found.push(studio.numberOf(vertex)); } }"
-            f"const step = Math.floor(found.length / {count});"
+            f"const step = Math.max(1, Math.floor(found.length / {count}));"
             f"return found.filter((one, i) => i % step === 0).slice(0, {count}); }})()"
         )
 
@@ -212,7 +212,7 @@ def test_a_whole_story(visit, studio, tmp_path, browser):
     done = CliRunner().invoke(cli, ["flatten", "--project", project, "-o", str(made)])
     assert done.exit_code == 0, done.output
     np.testing.assert_array_equal(coneflat.read_flattening(made).uv, saved.uv)
-    edges = {frozenset(edge) for edge in zip(path, path[1:], strict=False)}
+    edges = {frozenset(edge) for edge in pairwise(path)}
     assert edges <= {frozenset(edge) for edge in _seams(saved)}
 
 

@@ -28,9 +28,7 @@ def run_studio(file: Path | None, port: int, opens: bool, say: Callable[[str], N
         MeshFileError, ProjectError: the file cannot be read.
     """
     try:
-        import uvicorn
-
-        from .server import studio_app
+        from .server import StudioServer
     except ImportError as error:
         raise OptionError(
             f'the studio needs {error.name or "a server"}: pip install "coneflat[studio]"'
@@ -49,15 +47,7 @@ def run_studio(file: Path | None, port: int, opens: bool, say: Callable[[str], N
             say(address)
             if opens:
                 open_address(address)
-            config = uvicorn.Config(
-                studio_app(session, token, port),
-                log_level="error",
-                access_log=False,  # It would hold the token.
-                server_header=False,
-                ws="none",
-                timeout_graceful_shutdown=1,
-            )
-            uvicorn.Server(config).run(sockets=[listener])
+            StudioServer(session, token, port).run(sockets=[listener])
         finally:
             session.close()
 

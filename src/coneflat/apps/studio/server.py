@@ -5,11 +5,13 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
+import socket
 import struct
 from collections.abc import AsyncIterator
 from contextlib import suppress
 from pathlib import Path
 
+import uvicorn
 from anyio.to_thread import run_sync
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
@@ -26,6 +28,28 @@ from .session import Session
 MOST_UPLOADED = 512 * 1024 * 1024  # bytes of a mesh
 LONG_POLL = 20.0  # seconds that a question for news waits for some
 TYPES = {".svg": "image/svg+xml", ".obj": "text/plain"}
+
+
+class StudioServer(uvicorn.Server):
+    """Serves a session until it is interrupted; then nobody waits for news any more."""
+
+    def __init__(self, session: Session, token: str, port: int) -> None:
+        super().__init__(
+            uvicorn.Config(
+                studio_app(session, token, port),
+                log_level="error",
+                access_log=False,  # It would hold the token.
+                server_header=False,
+                ws="none",
+                timeout_graceful_shutdown=1,
+            )
+        )
+        self._session = session
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End."""
+        self._session.close()
+        await super().shutdown(sockets)
 
 
 class TooLarge(Exception):

@@ -237,8 +237,10 @@ class Session:
             return self._changed.wait_for(lambda: self._busy is None, seconds)
 
     def close(self) -> None:
-        """End the process that flattens."""
+        """End the process that flattens, and every wait for news."""
         self._worker.end()
+        with self._changed:
+            self._tell()
 
     @property
     def worker_process(self) -> int | None:

@@ -46,8 +46,8 @@ class Studio {
   async hear() {
     document.body.classList.toggle("empty", !this.news.mesh);
     if (this.news.layout && this.news.layout !== this.layout) {
-      this.layout = this.news.layout;
       this.take(await this.server.layout());
+      this.layout = this.news.layout;
     }
     this.panel.show();
     this.viewer?.remark();
