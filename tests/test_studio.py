@@ -368,6 +368,15 @@ class TestSession:
         assert state["choices"]["options"] == {"stretch": 0.5}
         assert session.worker_process != first
 
+    def test_what_a_killed_process_had_is_made_again_to_be_saved(self, session):
+        settled(session)
+        before = uv_of(session.export(".npz"))
+        os.kill(session.worker_process, signal.SIGKILL)
+        end = time.monotonic() + 60
+        while session.state()["trouble"] is None and time.monotonic() < end:
+            time.sleep(0.01)
+        np.testing.assert_array_equal(uv_of(session.export(".npz")), before)
+
     def test_everything_is_kept_at_once(self, session, tmp_path):
         session.act({"do": "set", "name": "stretch", "value": 0.5})
         again = Session(tmp_path)  # as if the first had been killed

@@ -18,7 +18,7 @@ pytest.importorskip("uvicorn", reason="the extra studio is not installed")
 pytest.importorskip("starlette", reason="the extra studio is not installed")
 
 from coneflat.apps.cli.main import cli
-from coneflat.apps.studio.serve import HOST, _listening
+from coneflat.apps.studio.serve import HOST, listening
 from coneflat.apps.studio.server import StudioServer
 from coneflat.apps.studio.session import Session
 
@@ -30,7 +30,7 @@ class Studio:
 
     def __init__(self, folder):
         self.session = Session(folder)
-        listener = _listening(0)
+        listener = listening(0)
         port = listener.getsockname()[1]
         self.address = f"http://{HOST}:{port}/?token={TOKEN}"
         self.server = StudioServer(self.session, TOKEN, port)

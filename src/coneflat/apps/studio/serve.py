@@ -37,7 +37,7 @@ def run_studio(file: Path | None, port: int, opens: bool, say: Callable[[str], N
 
     is_project = file is not None and file.suffix.lower() == ".json"
     session = Session(file.parent if file is not None and is_project else Path())
-    with _listening(port) as listener:
+    with listening(port) as listener:
         port = listener.getsockname()[1]
         token = secrets.token_urlsafe(24)
         address = f"http://{HOST}:{port}/?token={token}"
@@ -52,7 +52,7 @@ def run_studio(file: Path | None, port: int, opens: bool, say: Callable[[str], N
             session.close()
 
 
-def _listening(port: int) -> socket.socket:
+def listening(port: int) -> socket.socket:
     """Return a socket of this machine alone."""
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

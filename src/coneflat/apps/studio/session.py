@@ -216,6 +216,8 @@ class Session:
         with self._changed:
             if self._mesh is None:
                 raise StudioError("there is no mesh yet")
+            if not self._worker.is_alive:  # What it had is gone.
+                self._flatten()
             # A number of its own, which no flattening has.
             job = -1 - len(self._answers)
             self._answers[job] = ({}, b"")

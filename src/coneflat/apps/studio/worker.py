@@ -49,6 +49,12 @@ class Worker:
             process.wait()
 
     @property
+    def is_alive(self) -> bool:
+        """Whether there is a process."""
+        process = self._process
+        return process is not None and process.poll() is None
+
+    @property
     def process_id(self) -> int | None:
         """The number of the process that there is."""
         process = self._process
@@ -57,7 +63,10 @@ class Worker:
     def _started(self) -> subprocess.Popen[bytes]:
         if self._process is None or self._process.poll() is not None:
             try:
-                self._process = subprocess.Popen(COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+                # What interrupts us must not interrupt it: we end it, and it ends where nobody is left to hear it.
+                self._process = subprocess.Popen(
+                    COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+                )
             except OSError as error:
                 raise StudioError(f"no process could be started: {error.strerror or error}") from error
             threading.Thread(target=self._listen, args=(self._process,), daemon=True).start()

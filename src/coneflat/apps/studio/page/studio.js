@@ -124,6 +124,10 @@ class Studio {
   }
 
   setTool(mode) {
+    if (["cut", "keep"].includes(mode) && this.viewer?.model.head.left_out) {
+      this.refuse(new Refusal("on a mesh that is thinned for display there are no edges to draw along"));
+      return;
+    }
     this.tools.set(mode);
     this.panel.show();
     this.viewer?.remark();
