@@ -25,13 +25,14 @@ from coneflat.view.page.webpage import write_page
 ARGUMENTS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 WIDE, NARROW = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
-STUDIO_SIZE = {"width": 1040, "height": 590}
+STUDIO_SIZE = {"width": 1000, "height": 560}
 #: The highest of the cones in front is picked.
 PICK_SEEN = """
 (() => {
   const pane = coneflat.panes[0], {cones} = coneflat.model.arrays;
-  const seen = Array.from(cones, (vertex, index) => ({kind: "cone", index, at: pane.camera.project(coneflat.model.place(vertex))}))
-    .filter((thing) => coneflat.marks.isSeen(pane, thing, coneflat.state));
+  const place = (vertex) => pane.camera.project(coneflat.model.place(vertex));
+  const seen = Array.from(cones, (vertex, index) => ({kind: "cone", index, at: place(vertex)})).filter(
+    (thing) => coneflat.marks.isSeen(pane, thing, coneflat.state));
   seen.sort((one, other) => one.at[1] - other.at[1]);
   coneflat.state.set({picked: {kind: "cone", index: seen[0].index}});
 })()
