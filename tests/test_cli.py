@@ -99,7 +99,7 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "--epsilon", "few"], "not a valid float"),
         (["model.obj", "--max-cones", "0"], "0 cones of at most 1.5 pi each cannot carry"),
         (["model.obj", "--cones", "magic"], "magic"),
-        (["model.obj", "--cones", "1:pi,2"], "vertex 2 has none"),
+        (["model.obj", "--boundary", "1:pi,2"], "vertex 2 has none"),
         (["model.obj", "--cones", "1:pi", "--cones", "2:pi"], "sum to 6.283185 (2 pi)"),
         (["model.obj", "--cones", "1x"], "'1x' is not VERTEX"),
         (["model.obj", "--cones", "1", "--max-cones", "3"], "leave out --max-cones"),

@@ -18,6 +18,8 @@ from coneflat import (
     errors,
     greedy_cones,
 )
+from coneflat.cones.fitted import fitted_cones
+from coneflat.geometry.operators import vertex_areas
 
 
 def surface(shape):
@@ -105,6 +107,51 @@ def test_given_curvatures_are_met():
     solution = cones_with_curvature(laplacian, curvature, is_boundary, chi, cones, wanted)
     np.testing.assert_allclose(solution.curvatures, wanted)
     np.testing.assert_allclose(laplacian @ solution.log_scale, solution.target - curvature, atol=1e-9)
+
+
+def fitted(shape, cones, curvatures, **bounds):
+    laplacian, curvature, is_boundary, chi = surface(shape)
+    areas = vertex_areas(shape[1], edge_lengths(*shape), len(curvature))
+    areas /= areas.sum()
+    bounds = {"min_cone_angle": 0.1, "max_cone_angle": None, **bounds}
+    given = laplacian, curvature, areas, is_boundary, chi, np.array(cones), np.array(curvatures)
+    solution = fitted_cones(*given, **bounds)
+
+    def energy(curvatures):
+        log_scale = cones_with_curvature(
+            laplacian, curvature, is_boundary, chi, np.array(cones), curvatures
+        ).log_scale
+        return areas @ (log_scale - areas @ log_scale) ** 2
+
+    return solution, energy
+
+
+@pytest.mark.parametrize(
+    ("shape", "cones"), [(shapes.sphere(3), (5, 60, 140, 300)), (shapes.hill(12, 12), (30, 80, 100, 110))]
+)
+def test_cones_without_a_curvature_have_the_best_beside_the_others(shape, cones):
+    solution, energy = fitted(shape, cones, [1.1, np.nan, np.nan, np.nan])
+    assert solution.curvatures[0] == pytest.approx(1.1)
+    least = energy(solution.curvatures)
+    for one, other in ((1, 2), (2, 3), (1, 3)):
+        for step in (-0.05, 0.05):
+            changed = solution.curvatures.copy()
+            changed[[one, other]] += step, -step  # which leaves the sum
+            assert energy(changed) > least
+
+
+def test_the_last_cone_takes_what_the_surface_needs():
+    solution, _ = fitted(shapes.sphere(2), (5, 40, 99), [1.5 * np.pi, 1.5 * np.pi, np.nan])
+    np.testing.assert_allclose(solution.curvatures[2], np.pi)
+
+
+def test_bounds_hold_for_what_is_computed_alone():
+    bounds = {"min_cone_angle": np.pi, "max_cone_angle": 2.5 * np.pi}
+    solution, _ = fitted(shapes.sphere(3), (5, 60, 140, 300, 200), [5.0, *[np.nan] * 4], **bounds)
+    assert solution.curvatures[0] == pytest.approx(5.0)
+    assert solution.curvatures[1:].max() <= np.pi + 1e-9
+    assert solution.curvatures[1:].min() >= -np.pi / 2 - 1e-9
+    assert solution.curvatures.sum() == pytest.approx(4 * np.pi)
 
 
 def test_the_boundary_takes_what_cones_leave():

@@ -144,7 +144,8 @@ def test_cones_of_the_users_own():
         ({"cones": None}, errors.OptionError, "not NoneType"),
         ({"cones": {10**30: 1.0}}, errors.OptionError, "whole number"),
         ({"cones": [True, False]}, errors.OptionError, "whole number"),
-        ({"cones": {1: 2.0, 2: None}}, errors.OptionError, "vertex 2 has none"),
+        ({"boundary": {1: 2.0, 2: None}}, errors.OptionError, "vertex 2 has none"),
+        ({"cones": {1: 7.0, 2: None}}, errors.CurvatureError, "vertex 1 has 2.2282 pi"),
         ({"cones": {1: float("nan")}}, errors.OptionError, "curvature of cone 1 is nan"),
         ({"cones": {1: 2.0, 2: 3.0}}, errors.CurvatureError, r"must sum to 2 pi chi = 12\.56637"),
         (

@@ -40,7 +40,7 @@ def test_pointing_at_the_model_finds_what_is_in_front(visit, viewed):
         visit.page.mouse.move(*place)
         found = visit.state("hovered")
         facing = visit.run(
-            f"coneflat.input.marked_edges.isSeen(coneflat.panes[0], {thing('triangle', index)}, coneflat.state)"
+            f"coneflat.marks.isSeen(coneflat.panes[0], {thing('triangle', index)}, coneflat.state)"
         )
         if found == {"kind": "triangle", "index": index}:
             seen += 1
@@ -73,9 +73,7 @@ def test_a_click_keeps_a_cone_and_turns_the_model_to_it(visit, viewed):
         visit.page.mouse.click(*visit.at("layout", thing("cone", index))[0])
         assert visit.state("picked") == {"kind": "cone", "index": index}
         visit.rest()
-        assert visit.run(
-            f"coneflat.input.marked_edges.isSeen(coneflat.panes[0], {thing('cone', index)}, coneflat.state)"
-        )
+        assert visit.run(f"coneflat.marks.isSeen(coneflat.panes[0], {thing('cone', index)}, coneflat.state)")
         (x, y), box = visit.at("model", thing("cone", index))[0], visit.box("model")
         assert 0 < x - box["x"] < box["width"]
         assert 0 < y - box["y"] < box["height"]
@@ -201,11 +199,9 @@ def test_the_model_glides_to_what_was_picked(browser, viewed_page):
     before = visit.run("coneflat.panes[0].camera.turn")
     hidden = visit.run(
         "Array.from({length: coneflat.model.coneCount}, (_, index) => index).find((index) =>"
-        "!coneflat.input.marked_edges.isSeen(coneflat.panes[0], {kind: 'cone', index}, coneflat.state))"
+        "!coneflat.marks.isSeen(coneflat.panes[0], {kind: 'cone', index}, coneflat.state))"
     )
     visit.run(f"coneflat.find({thing('cone', hidden)})")
-    visit.wait(
-        f"coneflat.input.marked_edges.isSeen(coneflat.panes[0], {thing('cone', hidden)}, coneflat.state)"
-    )
+    visit.wait(f"coneflat.marks.isSeen(coneflat.panes[0], {thing('cone', hidden)}, coneflat.state)")
     assert visit.run("coneflat.panes[0].camera.turn") != before
     visit.close()

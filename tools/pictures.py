@@ -77,7 +77,7 @@ def draw_pictures(measured: Measured, names: list[str]) -> None:
             save_figure_small(draw(measured), name)
     if any(fnmatch("convergence", pattern) for pattern in names):
         _draw_convergence()
-    for name, model in (("viewer", "bunny"), ("viewer-quads", "spot")):
+    for name, model in (("viewer", "bunny"), ("viewer-quads", "spot"), ("studio", "bunny")):
         if any(fnmatch(name, pattern) for pattern in names) and measured.has(model):
             _take_screenshots(name, model, measured)
 
@@ -98,12 +98,19 @@ def _take_screenshots(name: str, model: str, measured: Measured) -> None:
     if find_spec("playwright") is None:
         print("playwright is not installed: the pictures of the viewer are left as they are")
         return
-    from screenshots import browser_path, take_screenshot_of_quads, take_screenshots
+    from screenshots import (
+        browser_path,
+        take_screenshot_of_quads,
+        take_screenshot_of_studio,
+        take_screenshots,
+    )
 
     if browser_path() is None:
         print("there is no Chromium: the pictures of the viewer are left as they are")
     elif name == "viewer":
         take_screenshots(measured.flattening(model))
+    elif name == "studio":
+        take_screenshot_of_studio(measured.path(model))
     else:
         take_screenshot_of_quads(coneflat.quads(measured.path(model), quads=3000), model)
 

@@ -80,3 +80,11 @@ class MeshFileError(ConeflatError, OSError):
 
 class UnknownFormatError(MeshFileError):
     """The file's ending names no format that coneflat knows."""
+
+
+class ProjectError(ConeflatError, ValueError):
+    """A project of the studio cannot be read, or its mesh is not the one that it was made with."""
+
+
+class StudioError(ConeflatError, ValueError):
+    """The studio cannot do what it is asked for."""

@@ -12,7 +12,7 @@ from scipy.sparse import csc_matrix
 from .._arrays import BoolArray, FloatArray
 from ..geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
 from ..geometry.delaunay import intrinsic_delaunay
-from ..geometry.operators import vertex_areas
+from ..geometry.operators import vertex_areas, weighted_areas
 from ..geometry.ties import tie_key
 from ..input.constraints import Constraints
 from ..input.symmetry import Symmetry
@@ -150,6 +150,8 @@ def choose_cones(
         )
     elif len(constraints.cones) and np.isfinite(constraints.cones.curvatures).all():
         solution = cones_with_curvature(*given, constraints.cones.vertices, constraints.cones.curvatures)
+    elif np.isfinite(constraints.cones.curvatures).any():
+        solution = _fitted(surface, constraints, options)
     else:
         solution = cones_at(*given, constraints.cones.vertices)
     if options.scale_at_cones and options.method == "exact":
@@ -158,6 +160,24 @@ def choose_cones(
         advice = "allow more of them (--max-cones)" if is_greedy else "add cones or move them"
         check_feasible(solution.cones, solution.curvatures, constraints.names, advice)
     return solution
+
+
+def _fitted(surface: Surface, constraints: Constraints, options: Options) -> ConeSolution:
+    """Return the cones of which some have curvatures, the others with the best."""
+    from .fitted import fitted_cones
+
+    mesh = surface.mesh
+    return fitted_cones(
+        surface.laplacian,
+        surface.curvature,
+        weighted_areas(surface.areas, constraints.weights),
+        mesh.is_boundary_vertex,
+        mesh.euler_characteristic,
+        constraints.cones.vertices,
+        constraints.cones.curvatures,
+        min_cone_angle=options.min_cone_angle,
+        max_cone_angle=options.max_cone_angle,
+    )
 
 
 def corners_alone(surface: Surface, constraints: Constraints, options: Options) -> ConeSolution | None:

@@ -158,11 +158,12 @@ class ConeOptions(ConeBounds, ConeNumber):
 
     cones: Cones = option(
         "auto",
-        WordOrVertices(CONES, "cone"),
+        WordOrVertices(CONES, "cone", may_differ=True),
         "How cones are found. pursuit: the fewest for the distortion allowed. greedy: the paper's search, which takes "
         "three to six times as many. none: none, for bounded meshes and tori. Or vertices, each with its curvature, "
-        "or all without: the best curvatures are computed then. auto: pursuit, but none where the boundary is "
-        "prescribed, the corners of a polyhedron that has few, and greedy where handles need over a hundred.",
+        "or all without: the best curvatures are computed then; or some without, which have the least area distortion "
+        "beside the others. auto: pursuit, but none where the boundary is prescribed, the corners of a polyhedron that "
+        "has few, and greedy where handles need over a hundred.",
     )
     max_cones: int | None = option(None, Count(), "Searches stop at so many cones per component.")
     quality: float | None = option(

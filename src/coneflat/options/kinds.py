@@ -176,22 +176,24 @@ class Vertices(Kind):
 
 @dataclass(frozen=True)
 class WordOrVertices(Kind):
-    """A word, or vertices, each with a curvature (radians) or all without: a map to curvature or None.
+    """A word, or vertices, with curvatures (radians) or without: a map to curvature or None.
 
     Attributes:
         words: the words.
         noun: what a vertex becomes.
         lacking: what is said of no vertices; "" if they may be none.
+        may_differ: some may have a curvature and others none; else all or none have.
     """
 
     words: tuple[str, ...]
     noun: str
     lacking: str = ""
+    may_differ: bool = False
 
     def parse(self, name: str, value: Any) -> str | dict[int, float | None]:
         if isinstance(value, str):
             return Choice(self.words).parse(name, value)
-        given = given_vertices(self.noun, value)
+        given = given_vertices(self.noun, value, self.may_differ)
         if self.lacking and not given:
             raise OptionError(self.lacking)
         return given
@@ -294,8 +296,8 @@ def _pairs(noun: str, given: object) -> IntArray:
     return pairs.astype(np.int64)
 
 
-def given_vertices(noun: str, vertices: object) -> dict[int, float | None]:
-    """Return vertex -> curvature, None where it is to be computed: for all or for none."""
+def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dict[int, float | None]:
+    """Return vertex -> curvature, None where it is to be computed: for all or for none, unless they may differ."""
     import numpy as np
 
     if isinstance(vertices, Mapping):
@@ -316,7 +318,7 @@ def given_vertices(noun: str, vertices: object) -> dict[int, float | None]:
             f"{noun}s must be vertices, or a map from vertex to curvature, not {type(vertices).__name__}"
         )
     unknown = [v for v, k in given.items() if k is None]
-    if unknown and len(unknown) < len(given):
+    if unknown and len(unknown) < len(given) and not may_differ:
         raise OptionError(
             f"{len(given) - len(unknown)} of {len(given)} {noun}s have a curvature and vertex {unknown[0]} has "
             "none: give curvatures to all, or to none"

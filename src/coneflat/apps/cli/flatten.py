@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from ...options import Options
-from .options import check_combinations, keywords, option_flags, paper_option
+from ...options import Options, declarations
+from .options import check_combinations, flag_of, is_given, keywords, option_flags, paper_option
 from .shared import checking, input_options, measures_alone, require_option, verbosity_options
 
 
@@ -16,7 +16,7 @@ from .shared import checking, input_options, measures_alone, require_option, ver
     short_help="Flatten a mesh and write it with UV coordinates.",
     context_settings={"allow_extra_args": True},
 )
-@click.argument("mesh", type=click.Path(path_type=Path))
+@click.argument("mesh", type=click.Path(path_type=Path), required=False)
 @click.option(
     "-o",
     "--output",
@@ -39,19 +39,25 @@ from .shared import checking, input_options, measures_alone, require_option, ver
     metavar="checker|IMAGE",
     help="Of a .glb: the texture that it carries, a checkerboard or an image file.",
 )
+@click.option(
+    "--project",
+    type=click.Path(path_type=Path),
+    help="In place of MESH and of all that says how it is flattened: a project of `coneflat studio`, .json.",
+)
 @click.option("--report", type=click.Path(path_type=Path), help="Write all measures to this JSON file.")
 @verbosity_options
 @click.pass_context
 def flatten(
     context: click.Context,
     /,
-    mesh: Path,
+    mesh: Path | None,
     output: Path | None,
     form: str | None,
     required: tuple[str, ...],
     repair: bool,
     weld: bool | None,
     texture: str | None,
+    project: Path | None,
     report: Path | None,
     verbosity: str | None,
     **method: Any,
@@ -65,6 +71,7 @@ def flatten(
       coneflat flatten part.stl --cones 12,507,1044
       coneflat flatten bracket.stl -o bracket.obj --sharp-angle 40deg
       coneflat flatten sheet.obj -o flat.obj --boundary 10,95,230,310
+      coneflat flatten --project hand_studio.json -o hand.glb
       curl -s https://example.org/part.stl | coneflat flatten - -o - --format glb > part.glb
     """
     if context.args:
@@ -78,11 +85,16 @@ def flatten(
 
     requirements = parse_requirements(measures_alone(required), REPORTED)
     check_combinations(context)
+    if project is not None:
+        mesh, options = of_project(context, project)
+    elif mesh is None:
+        raise click.MissingParameter(ctx=context, param_hint="'MESH'", param_type="argument")
+    else:
+        options = {**keywords(method), **checking(repair)}
     ending = f".{form or 'obj'}"
     output = named_output(mesh, ending) if output is None else output
     if form is not None and output.suffix.lower() not in ("", ending):
         raise click.UsageError(f"{output} is no {ending} file: leave out --format", context)
-    options = {**keywords(method), **checking(repair)}
     run(
         mesh,
         output,
@@ -94,3 +106,17 @@ def flatten(
         ending=ending,
         requirements=requirements,
     )
+
+
+def of_project(context: click.Context, project: Path) -> tuple[Path, dict[str, Any]]:
+    """Return the mesh of a project, and the keyword arguments of `coneflat.flatten` that it holds."""
+    from ..studio.project import read_project
+
+    taken = [name for name in (*declarations(Options), "mesh", "paper", "weld") if name in context.params]
+    for name in taken:
+        if is_given(context, name):
+            what = "MESH" if name == "mesh" else flag_of(name)
+            raise click.UsageError(f"a project has its own mesh and options: leave out {what}", context)
+    opened = read_project(project)
+    opened.check_mesh()
+    return opened.mesh, opened.choices.keywords()

@@ -19,6 +19,7 @@ from .figure import figure
 from .flatten import flatten
 from .measure import measure
 from .quads import quads
+from .studio import studio
 from .view import view
 
 USER_ERROR = 2
@@ -39,6 +40,7 @@ cli.add_command(measure)
 cli.add_command(cones)
 cli.add_command(figure)
 cli.add_command(view)
+cli.add_command(studio)
 cli.add_command(compare)
 cli.add_command(paper)
 cli.add_command(demo)

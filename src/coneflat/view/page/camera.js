@@ -61,6 +61,14 @@ class Camera {
     this.middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
   }
 
+  /** Look at other points: all of them if all were seen, else from where one looked. */
+  showOthers(points) {
+    const fitted = this.zoom === 1 && this.pan.every((x, k) => x === this.middle[k]);
+    this.measure(points);
+    if (fitted) this.fit();
+    else this.note();
+  }
+
   fit() {
     this.turn = [...this.home];
     this.pan = [...this.middle];

@@ -20,7 +20,7 @@ class Controls {
     const shown = this.viewer.model.triangleCount;
     const thinned = head.left_out ? `  ·  drawn with ${grouped(shown)} of ${grouped(head.triangles)} triangles` : "";
     this.part("title").textContent = this.part("title").title = head.title + thinned;
-    for (const [key, name] of SHOWS) this.part("show").append(new Option(name, key));
+    this.part("show").replaceChildren(...SHOWS.map(([key, name]) => new Option(name, key)));
     this.part("key-shows").textContent = `show: ${SHOWS.map(([, name], i) => `${i + 1} ${name.toLowerCase()}`).join(", ")}`;
     this.part("table").replaceChildren(...this.reportParts(head, shown));
   }

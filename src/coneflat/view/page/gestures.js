@@ -6,7 +6,8 @@ const STILL = 5; // pixels within which a press is a click
 const CLICK_TIME = 600; // milliseconds
 
 class Gestures {
-  /** pane: {element, camera}; hears: {hover(pane, x, y), leave(pane), pick(pane, x, y), use(pane)}. */
+  /** pane: {element, camera}; hears: {hover(pane, x, y), leave(pane), pick(pane, x, y), grab(pane, x, y), use(pane)};
+   *  grab returns null, or who takes a drag, {move(x, y), drop(), stop()}, of which stop comes last in any case. */
   constructor(pane, hears) {
     this.pane = pane;
     this.hears = hears;
@@ -32,8 +33,13 @@ class Gestures {
     this.hears.use(this.pane);
     this.pane.element.setPointerCapture(event.pointerId);
     this.fingers.set(event.pointerId, this.at(event));
-    if (this.fingers.size === 1) this.press = {...this.at(event), time: event.timeStamp, still: true};
-    else if (this.press) this.press.still = false;
+    if (this.fingers.size === 1) {
+      this.press = {...this.at(event), time: event.timeStamp, still: true};
+      if (!event.button && !event.shiftKey) this.grabbed = this.hears.grab(this.pane, this.press.x, this.press.y);
+    } else {
+      this.letGo();
+      if (this.press) this.press.still = false;
+    }
     this.hears.leave(this.pane);
   }
 
@@ -45,7 +51,8 @@ class Gestures {
     }
     if (this.press && Math.hypot(now.x - this.press.x, now.y - this.press.y) > STILL) this.press.still = false;
     if (this.press?.still) return; // A trembling finger does not turn the model.
-    if (this.fingers.size === 1) this.drag(now.x - before.x, now.y - before.y, event);
+    if (this.grabbed) this.grabbed.move(now.x, now.y);
+    else if (this.fingers.size === 1) this.drag(now.x - before.x, now.y - before.y, event);
     else this.pinch(event.pointerId, before, now);
     this.fingers.set(event.pointerId, now);
   }
@@ -69,7 +76,8 @@ class Gestures {
   }
 
   up(event) {
-    const press = this.press;
+    const {press, grabbed} = this;
+    if (grabbed && !press?.still) grabbed.drop();
     this.cancel(event);
     if (!press?.still || event.timeStamp - press.time > CLICK_TIME || event.button > 0) return;
     const {x, y} = this.at(event);
@@ -78,7 +86,14 @@ class Gestures {
 
   cancel(event) {
     this.fingers.delete(event.pointerId);
-    if (!this.fingers.size) this.press = null;
+    if (this.fingers.size) return;
+    this.press = null;
+    this.letGo();
+  }
+
+  letGo() {
+    this.grabbed?.stop();
+    this.grabbed = null;
   }
 
   wheel(event) {

@@ -66,6 +66,11 @@ class Shape {
     gl.bindVertexArray(null);
   }
 
+  discard() {
+    this.buffers.forEach((buffer) => this.gl.deleteBuffer(buffer));
+    this.gl.deleteVertexArray(this.handle);
+  }
+
   refill(location, array) {
     this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.buffers[location]);
     this.gl.bufferData(this.gl.ARRAY_BUFFER, array, this.gl.STATIC_DRAW);

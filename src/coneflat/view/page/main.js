@@ -46,6 +46,7 @@ class Viewer {
       new Pane("layout", new Camera(this.flatPlaces(), [1, 0, 0, 0, 1, 0, 0, 0, 1], false), true, this),
     ];
     this.used = this.panes[0];
+    this.tool = null; // What clicks and drags do instead: {hover(pane, x, y), pick(pane, x, y), grab(pane, x, y)}.
     this.moving = this.slowFrames = 0;
     this.renderer = new Renderer(document.getElementById("scene"), model);
     if (picture) this.renderer.setPicture(picture);
@@ -78,6 +79,26 @@ class Viewer {
     this.drawStale();
   }
 
+  /** Show another model; what is seen of it stays in sight, and what is picked, if there still is such a thing. */
+  takeModel(model) {
+    const [space, plane] = this.panes.map((pane) => pane.camera);
+    const isSame = model.hasSurfaceOf(this.model);
+    this.renderer.takeModel(model);
+    this.model = this.marks.model = model;
+    const picked = this.state.get("picked");
+    this.state.set({hovered: null, picked: isSame && picked?.kind === "triangle" ? picked : null});
+    this.marks.seen.clear();
+    plane.showOthers(this.flatPlaces());
+    if (!isSame) {
+      space.home = model.head.turn.flat();
+      space.measure(model.arrays.places);
+      space.fit();
+    }
+    this.controls.fill();
+    this.controls.show();
+    this.redraw();
+  }
+
   flatPlaces() {
     const points = this.model.arrays.uv.length / 2;
     const out = new Float32Array(3 * points);
@@ -88,11 +109,14 @@ class Viewer {
   /** Some of the state has changed. */
   note(names) {
     if (names.has("dark")) this.readColours();
-    if (names.has("hovered") || names.has("picked")) {
-      this.marksStale = true;
-      this.schedule();
-    }
+    if (names.has("hovered") || names.has("picked")) this.remark();
     if (["show", "squares", "seams", "cones", "edges", "dark"].some((name) => names.has(name))) this.redraw();
+  }
+
+  /** What is drawn over the views has changed. */
+  remark() {
+    this.marksStale = true;
+    this.schedule();
   }
 
   redraw() {
@@ -160,8 +184,14 @@ class Viewer {
   }
 
   hover(pane, x, y) {
+    this.tool?.hover(pane, x, y);
     const thing = this.renderer.pick(pane, x, y, this.state);
     if (!sameThing(thing, this.state.get("hovered"))) this.state.set({hovered: thing});
+  }
+
+  /** Return who hears of a drag that begins here instead of the camera, {move(x, y), drop()}, or null. */
+  grab(pane, x, y) {
+    return this.tool?.grab(pane, x, y) ?? null;
   }
 
   leave() {
@@ -169,6 +199,7 @@ class Viewer {
   }
 
   pick(pane, x, y) {
+    if (this.tool?.pick(pane, x, y)) return;
     this.find(this.renderer.pick(pane, x, y, this.state), pane);
   }
 
@@ -235,22 +266,3 @@ function trouble(message) {
   place.hidden = !message;
   place.textContent = message ? message[0].toUpperCase() + message.slice(1) + "." : "";
 }
-
-/** Start with the data that the page itself carries. */
-async function startFromPage() {
-  try {
-    if (typeof DecompressionStream === "undefined") throw new Error("this browser is too old for the page");
-    const head = JSON.parse(document.getElementById("head").textContent);
-    const arrays = document.getElementById("arrays");
-    const model = await unpackModel(head, arrays.textContent.trim());
-    arrays.remove();
-    const picture = head.picture ? await pictureOf(new Blob([model.arrays.picture], {type: head.picture})) : null;
-    window.coneflat = new Viewer(model, picture);
-    document.documentElement.dataset.ready = String(Math.round(performance.now()));
-  } catch (error) {
-    trouble(error.message);
-    throw error;
-  }
-}
-
-startFromPage();

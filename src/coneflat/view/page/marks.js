@@ -9,6 +9,7 @@ class Marks {
     this.model = model;
     this.renderer = renderer;
     this.seen = new Map();
+    this.overlay = null; // What else draws over a pane: a function of a pen and the pane.
   }
 
   resize(width, height, pixel) {
@@ -31,6 +32,7 @@ class Marks {
       pen.translate(pane.left, pane.top);
       if (picked) this.drawThing(pen, pane, state, picked, ink, true, settled);
       if (hovered && !sameThing(hovered, picked)) this.drawThing(pen, pane, state, hovered, ink, false, settled);
+      this.overlay?.(pen, pane);
       pen.restore();
     }
   }

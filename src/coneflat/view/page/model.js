@@ -6,10 +6,14 @@ const ARRAY_TYPES = {f4: Float32Array, u4: Uint32Array, i4: Int32Array, u2: Uint
 async function unpackModel(head, text) {
   const packed = Uint8Array.fromBase64 ? Uint8Array.fromBase64(text) : bytesOfBase64(text);
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const block = await new Response(stream).arrayBuffer();
+  return modelOf(head, await new Response(stream).arrayBuffer(), 0);
+}
+
+/** Return the model whose arrays lie in a block of bytes from some place on, a multiple of four. */
+function modelOf(head, block, begin) {
   const arrays = {};
   for (const {name, type, offset, count} of head.arrays) {
-    arrays[name] = new ARRAY_TYPES[type](block, offset, count);
+    arrays[name] = new ARRAY_TYPES[type](block, begin + offset, count);
   }
   return new Model(head, arrays);
 }
@@ -89,6 +93,17 @@ class Model {
     let worst = 0;
     for (let i = 1; i < qc.length; i++) if (qc[i] > qc[worst] || !(qc[worst] >= 0)) worst = i;
     return worst;
+  }
+
+  /** Whether another model has the same triangles in space, in the same order. */
+  hasSurfaceOf(other) {
+    const mine = this.arrays, its = other.arrays;
+    if (mine.faces.length !== its.faces.length || mine.places.length !== its.places.length) return false;
+    for (let i = 0; i < mine.places.length; i++) if (mine.places[i] !== its.places[i]) return false;
+    for (let c = 0; c < mine.faces.length; c++) {
+      if (mine.point_vertex[mine.faces[c]] !== its.point_vertex[its.faces[c]]) return false;
+    }
+    return true;
   }
 
   findConePoints() {

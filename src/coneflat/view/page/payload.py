@@ -67,6 +67,20 @@ def payload_of(
     Raises:
         OptionError: `up` names no axis.
     """
+    head, block = head_and_block(result, content, picture, name, up, show, told)
+    return Payload(_safe_json(head), base64.b64encode(zlib.compress(block, COMPRESSION)).decode("ascii"))
+
+
+def head_and_block(
+    result: Flattening,
+    content: Content,
+    picture: Texture | None,
+    name: str,
+    up: str,
+    show: str,
+    told: Told | None = None,
+) -> tuple[dict[str, Any], bytes]:
+    """Return the numbers and texts of a page, and its arrays as they lie in memory; see `payload_of`."""
     if told is None:
         told = Told(title(replace(result, source=None)), shown_rows(result))
     low, high = content.uv.min(axis=0), content.uv.max(axis=0)
@@ -95,7 +109,7 @@ def payload_of(
         "show": show,
         "arrays": listed,
     }
-    return Payload(_safe_json(head), base64.b64encode(zlib.compress(block, COMPRESSION)).decode("ascii"))
+    return head, block
 
 
 def _arrays(content: Content) -> dict[str, NDArray[Any]]:

@@ -38,15 +38,8 @@ class Renderer {
       this.programs[name] = new Program(gl, vertex, fragment, false);
       this.pickPrograms[name] = new Program(gl, vertex, fragment, true);
     }
-    const places = cornerPlaces(model);
-    this.surface = new Shape(gl, [
-      {array: places, size: 3},
-      {array: cornerUVs(model), size: 2},
-      {array: cornerNormals(model, places), size: 4, type: gl.INT_2_10_10_10_REV, normalised: true},
-      {array: new Float32Array(3 * model.triangleCount), size: 1},
-    ]);
-    this.lines = [false, true].map((inPlane) => this.quads(outlineLines(model, inPlane)));
-    this.dots = [false, true].map((inPlane) => this.quads(coneDots(model, inPlane)));
+    this.prepareSurface();
+    this.prepareLayout();
     const {sequential, diverging, tints} = model.arrays;
     this.tables = {
       sequential: tableTexture(gl, sequential, true),
@@ -59,6 +52,36 @@ class Renderer {
     this.shown = null;
     this.targets = new Map();
     this.samples = Math.min(SAMPLES, gl.getParameter(gl.MAX_SAMPLES) ?? 0);
+  }
+
+  prepareSurface() {
+    const gl = this.gl, model = this.model, places = cornerPlaces(model);
+    this.surface = new Shape(gl, [
+      {array: places, size: 3},
+      {array: cornerUVs(model), size: 2},
+      {array: cornerNormals(model, places), size: 4, type: gl.INT_2_10_10_10_REV, normalised: true},
+      {array: new Float32Array(3 * model.triangleCount), size: 1},
+    ]);
+  }
+
+  prepareLayout() {
+    this.lines = [false, true].map((inPlane) => this.quads(outlineLines(this.model, inPlane)));
+    this.dots = [false, true].map((inPlane) => this.quads(coneDots(this.model, inPlane)));
+  }
+
+  /** Draw another model from now on; of one with the same surface only the layout is sent. */
+  takeModel(model) {
+    const isSame = model.hasSurfaceOf(this.model);
+    this.model = model;
+    this.shown = null;
+    this.targets.forEach((target) => (target.key = null));
+    [...this.lines, ...this.dots].forEach((shape) => shape.discard());
+    if (isSame) this.surface.refill(1, cornerUVs(model));
+    else {
+      this.surface.discard();
+      this.prepareSurface();
+    }
+    this.prepareLayout();
   }
 
   /** Return lines or dots of two attributes of three numbers. */

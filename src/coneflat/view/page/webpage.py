@@ -42,6 +42,8 @@ _SCRIPTS = (
     "state", "model", "corners", "camera", "shaders", "graphics", "renderer", "marks", "gestures", "facts",
     "picture", "controls", "main",
 )  # fmt: skip
+#: What a page that carries its data may do: nothing but draw.
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
 
 def page_of(
@@ -118,13 +120,18 @@ def write_page(page: str, path: str | PathLike[str] | None) -> Path:
 
 def open_page(path: Path) -> bool:
     """Open a page in the user's browser; return whether there is one that could."""
+    return open_address(path.resolve().as_uri())
+
+
+def open_address(address: str) -> bool:
+    """Open an address in the user's browser; return whether there is one that could."""
     has_display = (
         not sys.platform.startswith("linux") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     )
     if not has_display:  # A text browser would take the terminal, and show nothing.
         return False
     try:
-        return webbrowser.open(path.resolve().as_uri())
+        return webbrowser.open(address)
     except (OSError, webbrowser.Error):
         return False
 
@@ -141,17 +148,42 @@ def notebook_html(result: Flattening) -> str:
 @cache
 def _template() -> tuple[str, str, str]:
     """Return the parts of the page before, between and after its two blocks of data."""
-    folder = files(__package__)
-
-    def read(name: str) -> str:
-        return (folder / name).read_text(encoding="utf-8")
-
-    page = read("page.html")
-    for mark, text in (
-        ("{{style}}", read("page.css")),
-        ("{{script}}", "\n".join(read(f"{name}.js") for name in _SCRIPTS)),
-    ):
-        page = page.replace(mark, text)
+    page = page_around(POLICY, DATA, script=_read("from_page.js"))
     before, rest = page.split("{{head}}")
     between, after = rest.split("{{arrays}}")
     return before, between, after
+
+
+#: Where a page carries its data.
+DATA = """<script type="application/json" id="head">{{head}}</script>
+<script type="text/plain" id="arrays">{{arrays}}</script>"""
+
+
+def page_around(
+    policy: str, data: str, *, script: str, style: str = "", panel: str = "", keys: str = ""
+) -> str:
+    """Return the viewer's page, without a model, with more around it.
+
+    Args:
+        policy: what it may load, as a Content-Security-Policy.
+        data: elements with the page's data.
+        script: what gets the model, and starts; it shares the names of the page's own scripts.
+        style: rules that come after the page's own.
+        panel: elements beside the panes.
+        keys: rows of the help.
+    """
+    page = _read("page.html")
+    for mark, text in (
+        ("{{policy}}", policy),
+        ("{{style}}", _read("page.css") + style),
+        ("{{panel}}", panel),
+        ("{{keys}}", keys),
+        ("{{data}}", data),
+        ("{{script}}", "\n".join([*(_read(f"{name}.js") for name in _SCRIPTS), script])),
+    ):
+        page = page.replace(mark, text)
+    return page
+
+
+def _read(name: str) -> str:
+    return (files(__package__) / name).read_text(encoding="utf-8")

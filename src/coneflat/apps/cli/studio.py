@@ -1,0 +1,35 @@
+"""`coneflat studio`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command(short_help="Flatten by hand and eye, live in the browser.")
+@click.argument("file", type=click.Path(path_type=Path), metavar="[MESH|PROJECT]", required=False)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    show_default="a free one",
+    help="Port of this machine at which the page is.",
+)
+@click.option("--no-open", is_flag=True, help="Print the page's address, and open no browser.")
+def studio(file: Path | None, port: int, no_open: bool) -> None:
+    """Move cones and draw seams on a mesh, and see at once what comes of it.
+
+    The page is at an address of this machine that nobody else can use; it is printed first. What is chosen is kept in
+    the current folder, in MESH's name with _studio, as .json, from which the studio goes on, and `coneflat flatten
+    --project` makes the same layout. A mesh can also be dropped on the page. Ctrl-C ends it.
+
+    \b
+    Examples:
+      coneflat studio hand.obj
+      coneflat studio hand_studio.json
+      coneflat studio --port 8000 --no-open
+    """
+    from ..studio.serve import run_studio
+
+    run_studio(file, port, opens=not no_open, say=click.echo)

@@ -1,0 +1,168 @@
+"""A process that flattens: `python -m coneflat.apps.studio.child` reads jobs and writes layouts.
+
+A flattening is given up as soon as a newer one is wanted. The mesh stays in memory between them.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from ...errors import ConeflatError, NonManifoldError, NonOrientableError, StudioError
+from .frames import Head, read_frame, write_frame
+
+if TYPE_CHECKING:
+    from ...input.join import Joined
+    from ...result.flattening import Flattening
+
+#: Failures that a repair would mend.
+REPAIRABLE = (NonManifoldError, NonOrientableError)
+
+
+class Superseded(Exception):
+    """A newer flattening is wanted."""
+
+
+class Jobs:
+    """What is to be done, in order; of flattenings only the newest."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._stream = stream
+        self._waiting: deque[Head] = deque()
+        self._changed = threading.Condition()
+        self._newest = -1
+        self._over = False
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        while (frame := read_frame(self._stream)) is not None:
+            job = frame[0]
+            with self._changed:
+                if job["do"] == "flatten":
+                    self._newest = job["job"]
+                    self._waiting = deque(each for each in self._waiting if each["do"] != "flatten")
+                self._waiting.append(job)
+                self._changed.notify()
+        with self._changed:
+            self._over = True
+            self._changed.notify()
+
+    def next(self) -> Head | None:
+        """Return the next job; None when there will be no more."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting or self._over)
+            return None if self._over else self._waiting.popleft()
+
+    def is_stale(self, job: int) -> bool:
+        """Whether a flattening is no longer wanted."""
+        return self._over or job != self._newest
+
+
+class Flattener:
+    """Flattens a mesh again and again.
+
+    Attributes:
+        result: of the last flattening; None where it has failed.
+    """
+
+    def __init__(self) -> None:
+        self.result: Flattening | None = None
+        self._source: Joined | None = None
+        self._read: tuple[str, str] | None = None
+
+    def flatten(self, job: Head, told: Callable[[str, float], None]) -> tuple[Head, bytes]:
+        """Return a layout as the page takes it: numbers and texts, and arrays."""
+        from ...pipeline import flatten
+        from ...view.page.content import content_of
+        from ...view.page.payload import head_and_block
+        from ...view.page.webpage import MOST_TRIANGLES
+
+        self.result = None
+        source = self._open(job["mesh"], job["sha256"], told)
+        result = flatten(source.mesh, progress=told, **arguments(source, job["choices"]))
+        result = replace(result, notes=source.notes_of(result.notes))
+        told("picture", 1.0)
+        content = content_of(result, MOST_TRIANGLES)
+        head, block = head_and_block(result, content, None, Path(job["mesh"]).name, "y", "checker")
+        self.result = result
+        cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
+        return {"head": head, "found": cones.tolist(), "seconds": result.seconds}, block
+
+    def export(self, ending: str) -> bytes:
+        """Return the result as a file.
+
+        Raises:
+            StudioError: there is no result.
+        """
+        from ...files.write import write_stream
+        from .outlines import layout_svg
+
+        if self.result is None:
+            raise StudioError("there is nothing to save: the last change could not be flattened")
+        if ending == ".svg":
+            return layout_svg(self.result).encode("utf-8")
+        stream = BytesIO()
+        write_stream(self.result, stream, ending)
+        return stream.getvalue()
+
+    def _open(self, mesh: str, sha256: str, told: Callable[[str, float], None]) -> Joined:
+        from ...files.read import read_joined
+
+        if self._source is None or self._read != (mesh, sha256):
+            told("read", 0.0)
+            self._source, self._read = read_joined(Path(mesh)), (mesh, sha256)
+        return self._source
+
+
+def arguments(source: Joined, choices: dict[str, Any]) -> dict[str, Any]:
+    """Return what `coneflat.flatten` is given for a mesh that was read and choices that JSON holds."""
+    from .choices import Choices
+
+    return source.renamed(Choices.from_plain(choices).keywords())
+
+
+def serve(jobs: Jobs, answers: IO[bytes]) -> None:
+    """Do jobs until there are no more."""
+    flattener = Flattener()
+    while (job := jobs.next()) is not None:
+        number = job["job"]
+
+        def told(stage: str, fraction: float, number: int = number) -> None:
+            if jobs.is_stale(number):
+                raise Superseded
+            write_frame(answers, {"job": number, "stage": stage, "fraction": fraction})
+
+        try:
+            if job["do"] == "flatten":
+                head, body = flattener.flatten(job, told)
+            else:
+                head, body = {}, flattener.export(job["ending"])
+            write_frame(answers, {"job": number, "done": head}, body)
+        except Superseded:
+            write_frame(answers, {"job": number, "given_up": True})
+        except ConeflatError as error:
+            failed = {"error": str(error), "repair": isinstance(error, REPAIRABLE)}
+            write_frame(answers, {"job": number, **failed})
+        except MemoryError:
+            write_frame(answers, {"job": number, "error": "not enough memory for this mesh", "repair": False})
+        except Exception as error:
+            said = f"internal error, please report it: {type(error).__name__}: {error}"
+            write_frame(answers, {"job": number, "error": said, "repair": False})
+
+
+def main() -> None:
+    """Serve over standard input and output, which libraries that print of themselves do not get at."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    serve(Jobs(sys.stdin.buffer), answers)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,34 @@
+"""The studio's page: the viewer's, made live by more scripts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from importlib.resources import files
+
+from ....view.page.webpage import page_around
+
+#: What the page may do: draw, and talk to the server that it came from.
+POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'"
+)
+# In the order in which they must run: names are shared.
+_SCRIPTS = ("server", "graph", "tools", "overlay", "panel", "studio")
+
+
+@cache
+def studio_page(formats: Sequence[str]) -> str:
+    """Return the page as text; formats: the endings of meshes that can be dropped on it."""
+    return page_around(
+        POLICY,
+        "",
+        script="\n".join(_read(f"{name}.js") for name in _SCRIPTS),
+        style=_read("studio.css"),
+        panel=_read("panel.html").replace("{{formats}}", ",".join((*formats, ".json"))),
+        keys=_read("keys.html"),
+    )
+
+
+def _read(name: str) -> str:
+    return (files(__package__) / name).read_text(encoding="utf-8")

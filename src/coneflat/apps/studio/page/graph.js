@@ -1,0 +1,101 @@
+// Shortest paths along the edges of a surface.
+
+class EdgeGraph {
+  constructor(model) {
+    this.model = model;
+    const count = model.arrays.places.length / 3, corners = model.arrays.faces.length;
+    const start = new Uint32Array(count + 1);
+    for (let c = 0; c < corners; c++) start[model.vertexAt(c) + 1] += 2;
+    for (let v = 0; v < count; v++) start[v + 1] += start[v];
+    const next = start.slice(), ends = new Uint32Array(2 * corners);
+    // Inner edges are there twice, from both of their triangles, which does no harm.
+    for (let c = 0; c < corners; c++) {
+      const one = model.vertexAt(c), two = model.vertexAt(c - (c % 3) + ((c + 1) % 3));
+      ends[next[one]++] = two;
+      ends[next[two]++] = one;
+    }
+    [this.start, this.ends] = [start, ends];
+    this.from = -1;
+  }
+
+  length(one, two) {
+    const p = this.model.arrays.places;
+    return Math.hypot(p[3 * one] - p[3 * two], p[3 * one + 1] - p[3 * two + 1], p[3 * one + 2] - p[3 * two + 2]);
+  }
+
+  /** The vertices of the shortest path from one to another, both included; empty where none leads there. */
+  path(from, to) {
+    if (from !== this.from) this.spread(from);
+    if (!Number.isFinite(this.far[to])) return [];
+    const path = [to];
+    while (path[path.length - 1] !== from) path.push(this.before[path[path.length - 1]]);
+    return path.reverse();
+  }
+
+  /** Find how far all vertices are from one, and by which way (Dijkstra). */
+  spread(from) {
+    const count = this.start.length - 1;
+    this.from = from;
+    this.far = new Float64Array(count).fill(Infinity);
+    this.before = new Int32Array(count).fill(-1);
+    this.far[from] = 0;
+    const heap = new Heap();
+    heap.push(0, from);
+    while (heap.size) {
+      const [far, vertex] = heap.pop();
+      if (far > this.far[vertex]) continue;
+      for (let k = this.start[vertex]; k < this.start[vertex + 1]; k++) {
+        const other = this.ends[k], sum = far + this.length(vertex, other);
+        if (sum >= this.far[other]) continue;
+        this.far[other] = sum;
+        this.before[other] = vertex;
+        heap.push(sum, other);
+      }
+    }
+  }
+}
+
+/** A binary heap, the least key first. */
+class Heap {
+  constructor() {
+    this.keys = [];
+    this.values = [];
+  }
+
+  get size() {
+    return this.keys.length;
+  }
+
+  push(key, value) {
+    let at = this.keys.length;
+    while (at > 0) {
+      const above = (at - 1) >> 1;
+      if (this.keys[above] <= key) break;
+      this.place(at, this.keys[above], this.values[above]);
+      at = above;
+    }
+    this.place(at, key, value);
+  }
+
+  pop() {
+    const top = [this.keys[0], this.values[0]];
+    const key = this.keys.pop(), value = this.values.pop(), size = this.keys.length;
+    if (!size) return top;
+    let at = 0;
+    for (;;) {
+      let below = 2 * at + 1;
+      if (below >= size) break;
+      if (below + 1 < size && this.keys[below + 1] < this.keys[below]) below++;
+      if (this.keys[below] >= key) break;
+      this.place(at, this.keys[below], this.values[below]);
+      at = below;
+    }
+    this.place(at, key, value);
+    return top;
+  }
+
+  place(at, key, value) {
+    this.keys[at] = key;
+    this.values[at] = value;
+  }
+}

@@ -1,0 +1,78 @@
+// What is chosen, drawn over both views: paths, cones that are locked, dragged or on their way.
+
+const PATH_COLOURS = {cut: "#d6006c", keep: "#0a7d5c"};
+
+class Overlay {
+  constructor(studio) {
+    this.studio = studio;
+  }
+
+  draw(pen, pane) {
+    const {tools, choices} = this.studio;
+    pen.lineJoin = pen.lineCap = "round";
+    if (tools.draws) {
+      for (const path of choices.cuts) this.path(pen, pane, this.studio.verticesOf(path), PATH_COLOURS.cut, [1, 6]);
+      for (const path of choices.kept) this.path(pen, pane, this.studio.verticesOf(path), PATH_COLOURS.keep, [1, 6]);
+      this.path(pen, pane, tools.preview, PATH_COLOURS[tools.mode], []);
+      if (tools.from !== null) this.ring(pen, pane, tools.from, PATH_COLOURS[tools.mode], 6);
+    }
+    for (const cone of choices.cones) {
+      const [vertex] = this.studio.verticesOf([cone.vertex]);
+      if (vertex === undefined) continue;
+      if (cone.locked) this.box(pen, pane, vertex);
+      if (!this.studio.isShown(vertex)) this.ring(pen, pane, vertex, this.studio.viewer.accent, 8);
+    }
+    if (tools.dragged) this.ring(pen, pane, tools.dragged.at, this.studio.viewer.accent, 10);
+  }
+
+  /** Where a vertex is on the screen; in the layout perhaps at several places. */
+  places(pane, vertex) {
+    const {model} = this.studio.viewer;
+    const found = pane.inPlane ? this.studio.pointsOf(vertex).map((point) => model.flatPlace(point)) : [model.place(vertex)];
+    return found.map((place) => pane.camera.project(place));
+  }
+
+  stroke(pen, path, colour, width) {
+    for (const [style, extra] of [["#ffffff", 2.5], [colour, 0]]) {
+      pen.strokeStyle = style;
+      pen.lineWidth = width + extra;
+      pen.stroke(path);
+    }
+    pen.setLineDash([]);
+  }
+
+  ring(pen, pane, vertex, colour, radius) {
+    for (const [x, y] of this.places(pane, vertex)) {
+      const path = new Path2D();
+      path.arc(x, y, radius, 0, 2 * Math.PI);
+      this.stroke(pen, path, colour, 2.5);
+    }
+  }
+
+  box(pen, pane, vertex) {
+    for (const [x, y] of this.places(pane, vertex)) {
+      const path = new Path2D();
+      path.rect(x - 10, y - 10, 20, 20);
+      this.stroke(pen, path, "#20262c", 1.6);
+    }
+  }
+
+  /** A path on the model; in the layout, where it may be torn, its points. */
+  path(pen, pane, vertices, colour, dash) {
+    if (vertices.length < 2) return;
+    const path = new Path2D();
+    if (pane.inPlane) {
+      for (const vertex of vertices) {
+        for (const [x, y] of this.places(pane, vertex)) path.rect(x - 0.5, y - 0.5, 1, 1);
+      }
+    } else {
+      vertices.forEach((vertex, i) => {
+        const [[x, y]] = this.places(pane, vertex);
+        if (i) path.lineTo(x, y);
+        else path.moveTo(x, y);
+      });
+      pen.setLineDash(dash);
+    }
+    this.stroke(pen, path, colour, 2.5);
+  }
+}

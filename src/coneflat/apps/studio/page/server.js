@@ -1,0 +1,52 @@
+// What the page asks of the server, always with the token of its address.
+
+class Server {
+  constructor() {
+    this.token = new URLSearchParams(location.search).get("token") ?? "";
+    this.queue = Promise.resolve();
+  }
+
+  /** Return an answer; a refusal is an error with the server's words. */
+  async ask(path, options = {}) {
+    const answer = await fetch(path, {...options, headers: {"x-coneflat-token": this.token}, cache: "no-store"});
+    if (!answer.ok) throw new Refusal(await answer.text());
+    return answer;
+  }
+
+  /** Return what there is to know, once it is newer than a version. */
+  async state(after) {
+    return (await this.ask(`/state?after=${after}`)).json();
+  }
+
+  /** Return the layout that is shown now. */
+  async layout() {
+    const block = await (await this.ask("/layout")).arrayBuffer();
+    const size = new DataView(block).getUint32(0, true);
+    const head = JSON.parse(new TextDecoder().decode(new Uint8Array(block, 4, size)));
+    return modelOf(head, block, 4 + size);
+  }
+
+  /** Do something, after what was asked for before. */
+  act(action) {
+    const sent = this.queue.then(() => this.ask("/act", {method: "POST", body: JSON.stringify(action)}));
+    this.queue = sent.catch(() => {});
+    return sent;
+  }
+
+  /** Hand the result to the browser as a file. */
+  async save(ending, name) {
+    await this.queue;
+    const content = await (await this.ask(`/export/${ending}`, {method: "POST"})).blob();
+    const link = Object.assign(document.createElement("a"), {href: URL.createObjectURL(content), download: name});
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+  }
+
+  /** Send a mesh or a project, to work on it. */
+  open(file) {
+    return this.ask(`/mesh?name=${encodeURIComponent(file.name)}`, {method: "POST", body: file});
+  }
+}
+
+/** The server does not do what it is asked for, and says why. */
+class Refusal extends Error {}

@@ -1,0 +1,287 @@
+// The studio at work: hears from the server what is so, and shows it.
+
+const DISTORTION = 0.2; // where none is chosen, as in `coneflat.flatten`
+const RETRY = 1500; // milliseconds before the server is asked again that did not answer
+const NOTHING = {options: {}, by_hand: false, cones: [], cuts: [], kept: []};
+
+class Studio {
+  constructor() {
+    this.server = new Server();
+    this.viewer = this.news = this.refused = null;
+    this.layout = 0;
+    this.pending = 0;
+    this.took = 0; // milliseconds from the last change to its picture
+    this.selected = null; // the vertex of the cone that is picked, whatever number it has
+    this.tools = new Tools(this);
+    this.overlay = new Overlay(this);
+    this.panel = new Panel(this);
+    document.addEventListener("keydown", (event) => this.key(event), {capture: true});
+    window.addEventListener("drop", (event) => this.drop(event), {capture: true});
+    window.addEventListener("dragover", (event) => event.preventDefault());
+  }
+
+  // What the server tells.
+
+  /** Follow what happens, as long as the page is open. */
+  async follow() {
+    for (let version = ""; ; ) {
+      try {
+        this.news = await this.server.state(version);
+        version = this.news.version;
+        trouble("");
+        await this.hear();
+      } catch (error) {
+        if (error instanceof Refusal) {
+          trouble(error.message);
+          return;
+        }
+        if (!(error instanceof TypeError)) throw error; // fetch throws that where nobody answers.
+        const again = this.news?.project ? `; start it again with: coneflat studio ${this.news.project}` : "";
+        trouble(`the studio does not answer. Everything that was chosen is kept${again}`);
+        await new Promise((done) => setTimeout(done, RETRY));
+      }
+    }
+  }
+
+  async hear() {
+    document.body.classList.toggle("empty", !this.news.mesh);
+    if (this.news.layout && this.news.layout !== this.layout) {
+      this.take(await this.server.layout());
+      this.layout = this.news.layout;
+    }
+    this.panel.show();
+    this.viewer?.remark();
+    if (!this.news.busy) document.documentElement.dataset.ready ??= String(Math.round(performance.now()));
+    document.documentElement.dataset.settled = String(!this.news.busy);
+  }
+
+  /** Show a layout. */
+  take(model) {
+    const isSame = this.viewer && model.hasSurfaceOf(this.viewer.model);
+    if (!isSame) this.edges = this.byNumber = null;
+    this.points = null;
+    this.repicking = true; // A pick that ends because things have other numbers now is no letting go.
+    if (this.viewer) this.viewer.takeModel(model);
+    else {
+      this.viewer = window.coneflat = new Viewer(model, null);
+      this.viewer.tool = this.tools;
+      this.viewer.marks.overlay = (pen, pane) => this.overlay.draw(pen, pane);
+      this.viewer.state.listen((names) => names.has("picked") && this.notePick());
+    }
+    if (!isSame) this.selected = null;
+    this.repicking = false;
+    this.pickSelected();
+    requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime()));
+  }
+
+  noteTime() {
+    if (!this.asked) return;
+    this.took = performance.now() - this.asked;
+    this.asked = 0;
+    this.panel.showWork();
+  }
+
+  // What the user does.
+
+  async act(action) {
+    this.asked = performance.now();
+    this.refused = null;
+    this.pending++;
+    try {
+      await this.server.act(action);
+    } catch (error) {
+      this.refuse(error);
+    } finally {
+      this.pending--;
+    }
+  }
+
+  refuse(error) {
+    this.refused = {text: error instanceof Refusal ? error.message : "the studio does not answer"};
+    this.panel.show();
+  }
+
+  isBusy() {
+    return this.pending > 0 || Boolean(this.news?.busy);
+  }
+
+  async save(ending) {
+    const stem = this.news.mesh.replace(/\.[^.]*$/, "");
+    await this.server.save(ending, `${stem}_uv.${ending}`).catch((error) => this.refuse(error));
+  }
+
+  async open(file) {
+    this.refused = null;
+    await this.server.open(file).catch((error) => this.refuse(error));
+  }
+
+  drop(event) {
+    const [file] = event.dataTransfer?.files ?? [];
+    if (!file || file.type.startsWith("image/")) return; // The viewer lays pictures on the model.
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    this.open(file);
+  }
+
+  setTool(mode) {
+    if (["cut", "keep"].includes(mode) && this.viewer?.model.head.left_out) {
+      this.refuse(new Refusal("on a mesh that is thinned for display there are no edges to draw along"));
+      return;
+    }
+    this.tools.set(mode);
+    this.panel.show();
+    this.viewer?.remark();
+  }
+
+  setAngle(vertex, degrees) {
+    this.act({do: "angle", vertex, degrees});
+  }
+
+  key(event) {
+    if (event.target.closest?.("input, select, dialog")) return;
+    const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    const control = event.ctrlKey || event.metaKey;
+    if (event.altKey || (control && !["z", "y"].includes(name))) return;
+    if (control) return this.obey(event, () => this.act({do: name === "z" && !event.shiftKey ? "undo" : "redo"}));
+    const tool = TOOLS.find(([, , letter]) => letter === name);
+    const vertex = this.selectedNumber(), row = this.coneRows().find((one) => one.vertex === vertex);
+    const turn = (step) => () => row && this.setAngle(vertex, Math.max(this.panel.step(), this.panel.snapped(row.degrees + step)));
+    const keys = {
+      u: () => this.act({do: "undo"}), y: () => this.act({do: "redo"}), n: () => this.pickNext(),
+      m: () => this.moveToMiddle(), l: () => row && this.act({do: "lock", vertex, locked: !row.locked}),
+      g: () => this.panel.angleField(vertex)?.select(), ",": turn(-this.panel.step()), ".": turn(this.panel.step()),
+      Delete: () => this.remove(vertex), Backspace: () => this.remove(vertex),
+    };
+    if (name === "Escape") this.tools.endLine();
+    const does = tool ? () => this.setTool(tool[0]) : keys[name];
+    if (does) this.obey(event, does);
+  }
+
+  obey(event, does) {
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    does();
+  }
+
+  remove(vertex) {
+    const picked = this.viewer?.state.get("picked");
+    if (vertex !== null) this.act({do: "remove", vertex});
+    else if (picked?.kind === "seam") {
+      const corners = this.viewer.model.outlineCorners(2 * picked.index);
+      this.act({do: "erase", edge: corners.map((corner) => this.numberOf(this.viewer.model.vertexAt(corner)))});
+    }
+  }
+
+  pickNext() {
+    const rows = this.coneRows();
+    if (!rows.length) return;
+    const at = rows.findIndex((row) => row.vertex === this.selectedNumber());
+    this.find(rows[(at + 1) % rows.length].vertex);
+  }
+
+  moveToMiddle() {
+    const pane = this.viewer?.used, vertex = this.selectedNumber();
+    const to = pane ? this.tools.vertexAt(pane, pane.width / 2, pane.height / 2) : null;
+    if (vertex === null || to === null || this.isCone(to)) return;
+    this.select(to);
+    this.act({do: "move", vertex, to: this.numberOf(to)});
+  }
+
+  // The cone that is picked.
+
+  select(vertex) {
+    this.selected = vertex;
+  }
+
+  notePick() {
+    const picked = this.viewer.state.get("picked");
+    if (picked || !this.repicking) this.selected = picked?.kind === "cone" ? this.viewer.model.arrays.cones[picked.index] : null;
+    this.panel.showCones();
+  }
+
+  pickSelected() {
+    const index = this.selected === null ? -1 : this.viewer.model.arrays.cones.indexOf(this.selected);
+    if (index >= 0) this.viewer.state.set({picked: {kind: "cone", index}});
+  }
+
+  selectedNumber() {
+    return this.selected === null || !this.viewer ? null : this.numberOf(this.selected);
+  }
+
+  /** Pick a cone, and bring it into sight. */
+  find(number) {
+    const [vertex] = this.verticesOf([number]);
+    const index = this.viewer.model.arrays.cones.indexOf(vertex);
+    if (index >= 0) this.viewer.find({kind: "cone", index});
+  }
+
+  // What there is.
+
+  get choices() {
+    return this.news?.choices ?? NOTHING;
+  }
+
+  hasBoundary() {
+    const model = this.viewer?.model;
+    return Boolean(model) && model.arrays.outline.length > 2 * model.seamCount;
+  }
+
+  /** The cones that are chosen or found: {vertex, degrees, chosen, locked}, by the numbers of the user's vertices. */
+  coneRows() {
+    const model = this.viewer?.model, shown = new Map();
+    if (model) model.arrays.cones.forEach((vertex, i) => shown.set(this.numberOf(vertex), 360 - (model.head.cone_curvatures[i] * 180) / Math.PI));
+    const own = new Map(this.choices.cones.map((cone) => [cone.vertex, cone]));
+    const vertices = this.choices.by_hand ? [...own.keys()] : [...new Set([...own.keys(), ...shown.keys()])];
+    return vertices.sort((a, b) => a - b).map((vertex) => {
+      const cone = own.get(vertex), angle = cone?.angle ?? null;
+      const degrees = angle === null ? shown.get(vertex) ?? null : (angle * 180) / Math.PI;
+      return {vertex, degrees, chosen: angle !== null, locked: Boolean(cone?.locked)};
+    });
+  }
+
+  isShown(vertex) {
+    return this.viewer.model.arrays.cones.includes(vertex);
+  }
+
+  /** Whether there is a cone at a vertex, other than one. */
+  isCone(vertex, other = null) {
+    if (vertex === other) return false;
+    const number = this.numberOf(vertex);
+    return this.coneRows().some((row) => row.vertex === number);
+  }
+
+  /** The user's number of a vertex of the page. */
+  numberOf(vertex) {
+    return this.viewer.model.vertexNumber(vertex);
+  }
+
+  /** The page's vertices of the user's numbers; what is not shown is left out. */
+  verticesOf(numbers) {
+    if (!this.byNumber) {
+      this.byNumber = new Map();
+      const count = this.viewer.model.arrays.places.length / 3;
+      for (let v = count - 1; v >= 0; v--) this.byNumber.set(this.numberOf(v), v);
+    }
+    return numbers.map((number) => this.byNumber.get(number)).filter((vertex) => vertex !== undefined);
+  }
+
+  /** The points of the layout that a vertex has. */
+  pointsOf(vertex) {
+    if (!this.points) {
+      this.points = new Map();
+      this.viewer.model.arrays.point_vertex.forEach((one, point) => {
+        if (this.points.has(one)) this.points.get(one).push(point);
+        else this.points.set(one, [point]);
+      });
+    }
+    return this.points.get(vertex) ?? [];
+  }
+
+  graph() {
+    return (this.edges ??= new EdgeGraph(this.viewer.model));
+  }
+}
+
+window.studio = new Studio();
+window.studio.panel.show();
+window.studio.follow();

@@ -1,0 +1,204 @@
+"""The studio's server: a session, for the page that has the token."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import secrets
+import socket
+import struct
+from collections.abc import AsyncIterator
+from contextlib import suppress
+from pathlib import Path
+
+import uvicorn
+from anyio.to_thread import run_sync
+from starlette.applications import Starlette
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp
+
+from ...errors import ConeflatError, StudioError
+from ...files import INPUT_FORMATS
+from .guard import MOST_ASKED, Guard
+from .page import studio_page
+from .session import Session
+
+MOST_UPLOADED = 512 * 1024 * 1024  # bytes of a mesh
+LONG_POLL = 20.0  # seconds that a question for news waits for some
+TYPES = {".svg": "image/svg+xml", ".obj": "text/plain"}
+
+
+class StudioServer(uvicorn.Server):
+    """Serves a session until it is interrupted; then nobody waits for news any more."""
+
+    def __init__(self, session: Session, token: str, port: int) -> None:
+        super().__init__(
+            uvicorn.Config(
+                studio_app(session, token, port),
+                log_level="error",
+                access_log=False,  # It would hold the token.
+                server_header=False,
+                ws="none",
+                timeout_graceful_shutdown=1,
+            )
+        )
+        self._session = session
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End."""
+        self._session.close()
+        await super().shutdown(sockets)
+
+
+class TooLarge(Exception):
+    """More was sent than is taken."""
+
+
+class Bell:
+    """Wakes coroutines when something has happened in a session, whose threads ring it."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[asyncio.Event, asyncio.AbstractEventLoop] = {}
+
+    def ring(self) -> None:
+        """Wake all."""
+        for event, loop in list(self._waiting.items()):
+            with suppress(RuntimeError):  # The server has just ended.
+                loop.call_soon_threadsafe(event.set)
+
+    async def wait_beyond(self, session: Session, version: int, seconds: float) -> None:
+        """Wait until a session has come further than a version, or for some time."""
+        event = asyncio.Event()
+        self._waiting[event] = asyncio.get_running_loop()
+        try:
+            if session.version <= version:
+                with suppress(asyncio.TimeoutError):
+                    await asyncio.wait_for(event.wait(), seconds)
+        finally:
+            del self._waiting[event]
+
+
+def studio_app(session: Session, token: str, port: int, most_uploaded: int = MOST_UPLOADED) -> ASGIApp:
+    """Return the server's application.
+
+    Args:
+        session: what it shows and changes.
+        token: that every request must have.
+        port: at which it is served: the only one that requests may name.
+        most_uploaded: bytes of a mesh that may be dropped on the page.
+    """
+    bell = Bell()
+    session.listen(bell.ring)
+
+    async def page(request: Request) -> Response:
+        return HTMLResponse(studio_page(INPUT_FORMATS))
+
+    async def state(request: Request) -> Response:
+        after = request.query_params.get("after", "")
+        if after.isdecimal() and len(after) < 16:
+            await bell.wait_beyond(session, int(after), LONG_POLL)
+        return JSONResponse(await run_sync(session.state))
+
+    async def layout(request: Request) -> Response:
+        shown = session.picture()
+        if shown is None:
+            raise StudioError("there is no layout yet")
+        head = json.dumps(shown[0]).encode("ascii")
+        head += b" " * (-len(head) % 4)
+        content = struct.pack("<I", len(head)) + head + shown[1]
+        return Response(content, media_type="application/octet-stream")
+
+    async def act(request: Request) -> Response:
+        action = json.loads(await _body(request, MOST_ASKED))
+        if not isinstance(action, dict):
+            raise StudioError("an action has names and values")
+        await run_sync(session.act, action)
+        return JSONResponse({"version": session.version})
+
+    async def export(request: Request) -> Response:
+        ending = f".{request.path_params['ending']}"
+        content = await run_sync(session.export, ending)
+        return Response(content, media_type=TYPES.get(ending, "application/octet-stream"))
+
+    async def upload(request: Request) -> Response:
+        path = session.file_named(request.query_params.get("name", ""))
+        if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
+            raise StudioError(f"{path.name} is no mesh that can be read: {', '.join(INPUT_FORMATS)}")
+        stored = await _store(request, path, most_uploaded)
+        await run_sync(session.open_named, stored.name)
+        return JSONResponse({"version": session.version})
+
+    app = Starlette(
+        routes=[
+            Route("/", page),
+            Route("/state", state),
+            Route("/layout", layout),
+            Route("/act", act, methods=["POST"]),
+            Route("/export/{ending}", export, methods=["POST"]),
+            Route("/mesh", upload, methods=["POST"]),
+        ],
+        exception_handlers={
+            ConeflatError: _said,
+            ValueError: _garbled,
+            TooLarge: _too_large,
+            ClientDisconnect: _garbled,
+        },
+    )
+    return Guard(app, token, port)
+
+
+async def _said(request: Request, error: Exception) -> Response:
+    return PlainTextResponse(str(error), 400)
+
+
+async def _garbled(request: Request, error: Exception) -> Response:
+    return PlainTextResponse("this cannot be read", 400)
+
+
+async def _too_large(request: Request, error: Exception) -> Response:
+    return PlainTextResponse(str(error), 413)
+
+
+async def _parts(request: Request, most: int) -> AsyncIterator[bytes]:
+    """Yield what is sent, up to so many bytes.
+
+    Raises:
+        TooLarge: it is more.
+    """
+    size = 0
+    async for part in request.stream():
+        size += len(part)
+        if size > most:
+            raise TooLarge(f"more than {most:,} bytes are not taken")
+        yield part
+
+
+async def _body(request: Request, most: int) -> bytes:
+    return b"".join([part async for part in _parts(request, most)])
+
+
+async def _store(request: Request, path: Path, most: int) -> Path:
+    """Return the file that what is sent is kept in: of this name, or, where another file has it, of one like it."""
+    temporary = path.with_name(f".{secrets.token_hex(8)}.upload")
+    try:
+        with temporary.open("xb") as stream:
+            async for part in _parts(request, most):
+                stream.write(part)
+        return await run_sync(_settle, temporary, path)
+    except OSError as error:
+        raise StudioError(f"{path.name} cannot be kept: {error.strerror or error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _settle(temporary: Path, path: Path) -> Path:
+    """Give a file a name; that of a file with the same content, or a new one."""
+    content, count, target = temporary.read_bytes(), 1, path
+    while target.exists() and not (target.is_file() and target.read_bytes() == content):
+        count += 1
+        target = path.with_name(f"{path.stem}-{count}{path.suffix}")
+    if not target.exists():
+        temporary.rename(target)
+    return target

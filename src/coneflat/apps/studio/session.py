@@ -1,0 +1,318 @@
+"""A session: a mesh, what is chosen for it, and the layout that follows; there is no web in it."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ...errors import MeshFileError, ProjectError, StudioError
+from ...options.kinds import as_number, as_whole
+from ...text import shown
+from .choices import Choices
+from .frames import Head
+from .history import History
+from .project import Project, hash_of, read_project
+from .replay import command_line, python_lines
+from .worker import Worker
+
+#: What a result can be saved as.
+EXPORTS = (".obj", ".ply", ".glb", ".npz", ".svg")
+PATIENCE = 600.0  # seconds that saving waits for the flattening before it
+
+
+class Session:
+    """What the user works on. All of it may be called from any thread.
+
+    Attributes:
+        folder: where projects are, and whatever the page names.
+        version: counts what has happened; who has seen a version need not look again.
+        layout: the number of the layout that is shown; 0 for none.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """folder: of projects."""
+        self.folder = folder.resolve()
+        self.version = 0
+        self.layout = 0
+        self.project_file: Path | None = None
+        self._mesh: Path | None = None
+        self._sha256 = ""
+        self._history = History(Choices())
+        self._job = 0
+        self._busy: dict[str, Any] | None = None
+        self._trouble: dict[str, Any] | None = None
+        self._found: list[int] = []
+        self._seconds: dict[str, float] = {}
+        self._shown: tuple[Head, bytes] | None = None
+        self._answers: dict[int, tuple[Head, bytes]] = {}
+        self._changed = threading.Condition(threading.RLock())
+        self._listeners: list[Callable[[], None]] = []
+        self._worker = Worker(self._hear, self._mourn)
+
+    # Meshes and projects.
+
+    def open(self, path: Path) -> None:
+        """Work on a mesh, with what was chosen for it before in this folder; or on a project.
+
+        Raises:
+            MeshFileError: the mesh cannot be read.
+            ProjectError: the project cannot, or its mesh is another.
+        """
+        if path.suffix.lower() == ".json":
+            self._open_project(path, anywhere=True)
+            return
+        sha256 = hash_of(path)
+        project = self.folder / f"{path.stem}_studio.json"
+        chosen = Choices()
+        if project.exists():
+            before = read_project(project)
+            if before.sha256 != sha256:
+                raise ProjectError(
+                    f"{project} is a project of another mesh: its SHA-256 begins with {before.sha256[:12]}, that of "
+                    f"{path} with {sha256[:12]}; move it away, or work in another folder"
+                )
+            chosen = before.choices
+        self._begin(path, sha256, project, chosen)
+
+    def open_named(self, name: str) -> None:
+        """Work on a mesh or a project in the session's folder.
+
+        Raises:
+            StudioError: it is no file of the folder.
+            MeshFileError, ProjectError: as of `open`.
+        """
+        path = self.file_named(name)
+        if path.suffix.lower() == ".json":
+            self._open_project(path, anywhere=False)
+        else:
+            self.open(path)
+
+    def file_named(self, name: str) -> Path:
+        """Return the file of the session's folder that has a name.
+
+        Raises:
+            StudioError: it lies elsewhere, or has no proper name.
+        """
+        if not name or name != Path(name).name or name.startswith(".") or "\\" in name or "\0" in name:
+            raise StudioError(f"{shown(name)} is no name of a file in the session's folder")
+        path = self.folder / name
+        if not path.resolve().is_relative_to(self.folder):
+            raise StudioError(f"{shown(name)} leads out of the session's folder")
+        return path
+
+    def _open_project(self, path: Path, anywhere: bool) -> None:
+        project = read_project(path)
+        if not anywhere and not project.mesh.resolve().is_relative_to(self.folder):
+            raise ProjectError(f"the mesh of {path.name} lies outside the session's folder")
+        project.check_mesh()
+        self._begin(project.mesh, project.sha256, path, project.choices)
+
+    def _begin(self, mesh: Path, sha256: str, project: Path, chosen: Choices) -> None:
+        with self._changed:
+            self._mesh, self._sha256, self.project_file = mesh.resolve(), sha256, project
+            self._history = History(chosen)
+            self._found, self._shown, self.layout = [], None, 0
+            self._flatten()
+
+    # What the user does.
+
+    def act(self, action: Mapping[str, Any]) -> None:
+        """Do what the user asks for.
+
+        Args:
+            action: what to `do`: "set" an option (`name`, `value`), take the cones by "hand", "add", "move", "remove",
+                "angle" or "lock" a cone (`vertex`; `to`, `degrees`, `locked`), "cut" or "keep" a `path`, "erase" an
+                `edge`, "undo", "redo", or "again". Steps of the same `stroke` are undone together.
+
+        Raises:
+            StudioError: it makes no sense, or cannot be done.
+            OptionError: options make no sense, or do not go together.
+        """
+        with self._changed:
+            if self._mesh is None:
+                raise StudioError("there is no mesh yet: drop one on the page")
+            kind, history = action.get("do"), self._history
+            if kind == "again":
+                self._flatten()
+            elif kind in ("undo", "redo"):
+                if history.undo() if kind == "undo" else history.redo():
+                    self._flatten()
+            else:
+                try:
+                    chosen = _STEPS[str(kind)](history.now, action, self._found)
+                except (KeyError, TypeError) as error:
+                    raise StudioError(f"the studio does nothing by {shown(dict(action))}") from error
+                chosen.keywords()
+                if history.change(chosen, action.get("stroke")):
+                    self._flatten()
+
+    def _flatten(self) -> None:
+        assert self._mesh is not None
+        self._save()
+        self._job += 1
+        self._busy = {"stage": "", "fraction": 0.0}
+        self._tell()
+        self._worker.send(
+            {
+                "do": "flatten",
+                "job": self._job,
+                "mesh": str(self._mesh),
+                "sha256": self._sha256,
+                "choices": self._history.now.as_plain(),
+            }
+        )
+
+    def _save(self) -> None:
+        """Keep what is chosen, so that nothing is lost whatever happens next."""
+        assert self._mesh is not None
+        assert self.project_file is not None
+        self._trouble = None
+        try:
+            Project(self._mesh, self._sha256, self._history.now).save(self.project_file)
+        except MeshFileError as error:
+            self._trouble = {"text": f"the project is not saved: {error}", "repair": False}
+
+    # What comes of it.
+
+    def state(self) -> dict[str, Any]:
+        """Return all that there is to know, as plain values."""
+        with self._changed:
+            chosen = self._history.now
+            undo, redo = self._history.depth
+            name = None if self._mesh is None else self._mesh.name
+            project = "" if self.project_file is None else self.project_file.name
+            return {
+                "version": self.version,
+                "mesh": name,
+                "project": project,
+                "choices": chosen.as_plain(),
+                "undo": undo,
+                "redo": redo,
+                "busy": self._busy,
+                "trouble": self._trouble,
+                "layout": self.layout,
+                "found": self._found,
+                "seconds": sum(self._seconds.values()),
+                "command": "" if name is None else command_line(name, project, chosen),
+                "python": "" if name is None else python_lines(name, chosen),
+            }
+
+    def picture(self) -> tuple[Head, bytes] | None:
+        """Return the layout that is shown: numbers and texts, and arrays; None where there is none yet."""
+        with self._changed:
+            return self._shown
+
+    def export(self, ending: str) -> bytes:
+        """Return the result of what is chosen, as a file.
+
+        Raises:
+            StudioError: there is none, or no such format.
+        """
+        if ending not in EXPORTS:
+            raise StudioError(f"{shown(ending)} is no format that results are saved as: {', '.join(EXPORTS)}")
+        with self._changed:
+            if self._mesh is None:
+                raise StudioError("there is no mesh yet")
+            if not self._worker.is_alive:  # What it had is gone.
+                self._flatten()
+            # A number of its own, which no flattening has.
+            job = -1 - len(self._answers)
+            self._answers[job] = ({}, b"")
+            self._worker.send({"do": "export", "job": job, "ending": ending})
+            self._changed.wait_for(lambda: self._answers[job][0], PATIENCE)
+            head, body = self._answers[job]
+            del self._answers[job]
+        if "done" not in head:
+            raise StudioError(head.get("error", "saving took too long"))
+        return body
+
+    def listen(self, listener: Callable[[], None]) -> None:
+        """Call a function, from any thread, whenever something has happened."""
+        self._listeners.append(listener)
+
+    def wait_until_idle(self, seconds: float = PATIENCE) -> bool:
+        """Return whether what is chosen was flattened, or has failed, within some time."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self._busy is None, seconds)
+
+    def close(self) -> None:
+        """End the process that flattens, and every wait for news."""
+        self._worker.end()
+        with self._changed:
+            self._tell()
+
+    @property
+    def worker_process(self) -> int | None:
+        """The number of the process that flattens."""
+        return self._worker.process_id
+
+    # What the worker tells.
+
+    def _hear(self, head: Head, body: bytes) -> None:
+        with self._changed:
+            if head["job"] in self._answers and "stage" not in head:
+                self._answers[head["job"]] = (head, body)
+                self._changed.notify_all()
+                return
+            if head["job"] != self._job:
+                return
+            if "stage" in head:
+                self._busy = {"stage": head["stage"], "fraction": head["fraction"]}
+            elif "error" in head:
+                self._busy = None
+                self._trouble = {"text": head["error"], "repair": head["repair"] and not self._repairs()}
+            elif "done" in head:
+                self._busy = None
+                self.layout += 1
+                self._found, self._seconds = head["done"]["found"], head["done"]["seconds"]
+                self._shown = head["done"]["head"], body
+            self._tell()
+
+    def _mourn(self, how: str) -> None:
+        with self._changed:
+            said = f"the process that flattens {how}; nothing is lost: try again, or undo the last change"
+            for job in self._answers:
+                self._answers[job] = ({"error": said}, b"")
+            self._busy = None
+            self._trouble = {"text": said, "repair": False}
+            self._tell()
+
+    def _repairs(self) -> bool:
+        return bool(self._history.now.options.get("repair"))
+
+    def _tell(self) -> None:
+        self.version += 1
+        self._changed.notify_all()
+        for listener in self._listeners:
+            listener()
+
+
+def _step(change: Callable[..., Choices]) -> Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]:
+    """Return a step that makes the cones that were found the user's before it changes them."""
+    return lambda chosen, action, found: change(chosen.placed(found), action)
+
+
+def _angle(action: Mapping[str, Any]) -> float | None:
+    degrees = action.get("degrees")
+    return None if degrees is None else math.radians(as_number("an angle", degrees))
+
+
+def _vertex(action: Mapping[str, Any], name: str = "vertex") -> int:
+    return as_whole("a vertex", action[name])
+
+
+_STEPS: dict[str, Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]] = {
+    "set": lambda chosen, action, found: chosen.with_option(action["name"], action["value"]),
+    "hand": _step(lambda chosen, action: chosen),
+    "add": _step(lambda chosen, action: chosen.added(_vertex(action), _angle(action))),
+    "move": _step(lambda chosen, action: chosen.moved(_vertex(action), _vertex(action, "to"))),
+    "remove": _step(lambda chosen, action: chosen.removed(_vertex(action))),
+    "angle": _step(lambda chosen, action: chosen.angled(_vertex(action), _angle(action))),
+    "lock": lambda chosen, action, found: chosen.locked(_vertex(action), action["locked"] is True),
+    "cut": lambda chosen, action, found: chosen.cut(tuple(action["path"])),
+    "keep": lambda chosen, action, found: chosen.keep_whole(tuple(action["path"])),
+    "erase": lambda chosen, action, found: chosen.erased(*(as_whole("a vertex", v) for v in action["edge"])),
+}

@@ -1,0 +1,20 @@
+// The start of a page that carries its data.
+
+/** Start with the data that the page itself carries. */
+async function startFromPage() {
+  try {
+    if (typeof DecompressionStream === "undefined") throw new Error("this browser is too old for the page");
+    const head = JSON.parse(document.getElementById("head").textContent);
+    const arrays = document.getElementById("arrays");
+    const model = await unpackModel(head, arrays.textContent.trim());
+    arrays.remove();
+    const picture = head.picture ? await pictureOf(new Blob([model.arrays.picture], {type: head.picture})) : null;
+    window.coneflat = new Viewer(model, picture);
+    document.documentElement.dataset.ready = String(Math.round(performance.now()));
+  } catch (error) {
+    trouble(error.message);
+    throw error;
+  }
+}
+
+startFromPage();
