@@ -65,6 +65,8 @@ class Fans:
 
 def find_fans(corners: FloatArray) -> Fans | None:
     """Return the fans of many triangles (m, 3, 2), counterclockwise, coordinates up to 1; None if there is none."""
+    if len(corners) < MANY:
+        return None
     points = (corners.reshape(-1, 2) + 0.0) @ np.array([1, 1j])  # a zero has one sign
     hashed = _hashed(points)
     suspected = np.flatnonzero((np.bincount(hashed, minlength=1 << HASHED) >= MANY)[hashed])
