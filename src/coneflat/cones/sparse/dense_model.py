@@ -143,10 +143,11 @@ class DenseModel:
 
 @lru_cache
 def taken_out(count: int, tries: int, seed: int) -> IntArray:
-    """Return (t, 3) which two or three of so many cones are taken away at each try, -1 for the third of two."""
+    """Return (t, 3) which two or three of so many cones are taken away at each try, sorted; -1 fills up two."""
     random = np.random.default_rng(seed)
     out = np.full((tries, 3), -1)
     for i in range(tries):
         size = min(2 + i % 2, count)
         out[i, :size] = random.choice(count, size, replace=False)
+    out.sort(axis=1)
     return out

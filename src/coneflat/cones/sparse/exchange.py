@@ -235,10 +235,13 @@ def shake(
 ) -> tuple[float, bool]:
     """Take members away and refill, over and over; keep what is better, in place; return E^2, and whether it fell.
 
-    out: (t, p) which of those that are not required go at each try, -1 for fewer.
+    out: (t, p) which of those that are not required go at each try, -1 for fewer. What was tried since a set was
+    found is not tried again.
     """
-    size, found = len(members), False
+    size, found, since = len(members), False, 0
     for i in range(len(out)):
+        if is_among(out[i], out[since:i]):
+            continue
         usable, gone = choice.usable.copy(), np.zeros(size, np.bool_)
         for place in out[i]:
             if place >= 0:
@@ -255,6 +258,18 @@ def shake(
             continue
         reached = exchange(energies, tried, choice)
         if reached < energy * (1 - GAIN):
-            energy, found = reached, True
+            energy, found, since = reached, True, i + 1
             members[:] = tried
     return energy, found
+
+
+@compiled
+def is_among(row: IntArray, rows: IntArray) -> bool:
+    """Return whether a row is one of some."""
+    for i in range(len(rows)):
+        same = True
+        for j in range(len(row)):
+            same = same and rows[i, j] == row[j]
+        if same:
+            return True
+    return False
