@@ -3,6 +3,7 @@
 First a single `coneflat flatten` of a model of 13,000 triangles from the command to its end, beside the work in it that
 is left once everything is loaded. Then `coneflat batch` of small meshes with one process and with two, beside the same
 meshes one after the other in one process that has loaded everything; and again with a fifth of them, for the memory.
+Then single meshes of many components with 80 triangles each, or 4, and what each of them takes.
 Seconds of the processor are those of all threads, and tell more where other work is going on beside.
 """
 
@@ -32,11 +33,24 @@ for job in jobs:
 print(json.dumps([time.perf_counter() - start, time.process_time() - used]))
 """
 
+MANY = """
+import sys, time
+import numpy as np
+import coneflat
+meshes = np.load(sys.argv[1])
+some = meshes["some"]
+coneflat.flatten(meshes["vertices"][: some.max() + 1], some)
+start = time.process_time()
+coneflat.flatten(meshes["vertices"], meshes["faces"])
+print(time.process_time() - start)
+"""
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=5, help="of the single command; medians count")
     parser.add_argument("--meshes", type=int, default=250)
+    parser.add_argument("--components", type=int, default=1000)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         print("| command | wall, s | processor, s | peak, MB |\n| --- | --- | --- | --- |")
@@ -49,6 +63,7 @@ def main() -> None:
             print(f"| {words[0]} | {wall:.2f} | {used:.2f} | {memory:.0f} |")
         meshes = [write(Path(folder) / f"{i}.obj", small_mesh(i)) for i in range(arguments.meshes)]
         print_batches(meshes, Path(folder))
+        print_components(arguments.components, Path(folder) / "joined.npz")
 
 
 def print_batches(meshes: list[Path], folder: Path) -> None:
@@ -66,6 +81,41 @@ def print_batches(meshes: list[Path], folder: Path) -> None:
         taken, all_used, memory = costs([*COMMAND, *words, "--jobs", str(processes), "--quiet"])
         gain = wall * count / len(meshes) / taken
         print(f"| {count} | batch, {processes} | {taken:.1f} | {all_used:.1f} | {gain:.2f} | {memory:.0f} |")
+
+
+def print_components(count: int, file: Path) -> None:
+    """Print what a component takes in meshes of many small ones."""
+    print("\n| components | triangles of each | processor, ms each |\n| --- | --- | --- |")
+    for kind in PIECES:
+        pieces = [piece(kind, seed) for seed in range(count)]
+        starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
+        faces = [own + start for (_, own), start in zip(pieces, starts, strict=False)]
+        vertices = np.concatenate([np.add(own, (4.0 * i, 0, 0)) for i, (own, _) in enumerate(pieces)])
+        np.savez(file, vertices=vertices, faces=np.concatenate(faces), some=np.concatenate(faces[:5]))
+        found = subprocess.run(
+            [sys.executable, "-c", MANY, str(file)], check=True, stdout=subprocess.PIPE, text=True
+        )
+        each = 1000 * float(found.stdout) / count
+        print(f"| {count:,} {kind} | {len(faces[0])} | {each:.1f} |")
+
+
+PIECES = "sheets", "spheres", "tori", "tetrahedra"
+
+
+def piece(kind: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return a sheet with a hill, a bumpy sphere or torus of 80 triangles, or a tetrahedron; no two of them alike."""
+    random = np.random.default_rng(seed)
+    if kind == "sheets":
+        (a, b), c = random.uniform(0.3, 0.7, 2), random.uniform(0.4, 0.8)
+        vertices, faces = shapes.grid(8, 5, lambda x, y: c * np.exp(-12 * ((x - a) ** 2 + (y - b) ** 2)))
+    elif kind == "spheres":
+        vertices, faces = shapes.sphere(1, seed=seed)
+    elif kind == "tori":
+        vertices, faces = shapes.torus(8, 5, random.uniform(0.3, 0.5))
+    else:
+        vertices, faces = shapes.tetrahedron()
+        vertices = vertices + random.uniform(-0.4, 0.4, vertices.shape)
+    return vertices * (1 + random.random(3)), faces
 
 
 def costs(command: list[str]) -> tuple[float, float, float]:

@@ -12,7 +12,7 @@ from coneflat.geometry.planar import sides_between, signed_double_areas
 from coneflat.geometry.straight import flat_triangles
 from coneflat.layout.relax import Lines, PointConstraints, StretchEnergy
 from coneflat.layout.relax.constraints import check_constraints
-from coneflat.layout.relax.elements import Elements
+from coneflat.layout.relax.elements import Elements, number_pairs
 from coneflat.layout.relax.motions import find_motions
 from coneflat.layout.relax.relax import rest_sides
 from coneflat.layout.unfold import unfold
@@ -323,3 +323,19 @@ def test_ties_that_make_no_sense(tied, translations, message):
     mesh, points, corners, _ = laid_out(shapes.hill(), cones="none")
     with pytest.raises(errors.OptionError, match=message):
         relax(mesh, points, corners, constraints=PointConstraints(tied=tied, translations=translations))
+
+
+def test_pairs_are_numbered_by_column_and_row():
+    random = np.random.default_rng(0)
+    for k, count in ((0, 4), (1, 3), (7, 60), (40, 300)):
+        rows, columns = random.integers(0, k + 2, (2, count), dtype=np.int32)
+        indptr, indices = np.zeros(k + 1, dtype=np.int32), np.empty(count, dtype=np.int32)
+        slots = np.empty(count, dtype=np.int64)
+        number = number_pairs(rows, columns, indptr, indices, slots)
+        inside = (rows < k) & (columns < k)
+        keys, expected = np.unique(columns[inside] * 100 + rows[inside], return_inverse=True)
+        assert number == len(keys) == indptr[k]
+        assert (slots[~inside] == -1).all()
+        np.testing.assert_array_equal(slots[inside], expected)
+        np.testing.assert_array_equal(indices[:number], keys % 100)
+        np.testing.assert_array_equal(indptr, np.searchsorted(keys // 100, np.arange(k + 1)))

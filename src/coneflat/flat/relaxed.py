@@ -64,6 +64,8 @@ def relaxed(laid_out: LaidOut, part: Component, options: Options, tell: Callable
         is_free &= _around(surface.mesh, before > BENT) & ~surface.mesh.is_boundary_vertex
 
     def relaxed_by(layout: LaidOut, sharpness: float, is_free: BoolArray) -> LaidOut:
+        if not is_free.any():
+            return layout
         found: Relaxed = relax(
             surface.mesh,
             layout.points,

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
-from scipy.sparse import csc_matrix, diags
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix
 
 from .._arrays import BoolArray, FloatArray, IntArray, unit_exponent
+from ..compiled import compiled
 from ..errors import OptionError
-from ..mesh import NEXT, PREVIOUS
 from .triangles import double_areas
 
 # Of the largest: weights below count as this. Without any, the norm would not tell apart what only lies there.
 LEAST_WEIGHT = 1e-6
 # Numbers up to this, and down to its inverse, can be multiplied and summed up without a thought.
 LARGE = 1e100
+
+Int32Array: TypeAlias = NDArray[np.int32]
 
 
 def vertex_areas(faces: IntArray, lengths: FloatArray, vertex_count: int) -> FloatArray:
@@ -67,12 +72,74 @@ def cotangent_laplacian(faces: IntArray, cots: FloatArray, vertex_count: int) ->
 
     (L x)_i = sum_j w_ij (x_i - x_j); its kernel are the constants on each component.
     """
-    i = faces[:, NEXT].ravel().astype(np.int32)
-    j = faces[:, PREVIOUS].ravel().astype(np.int32)
-    w = cots.ravel() / 2
+    starts = np.zeros(vertex_count + 1, dtype=np.int32)
+    rows = np.empty(6 * len(faces) + vertex_count, dtype=np.int32)
+    values = np.empty(len(rows))
+    given = np.ascontiguousarray(faces, dtype=np.int64), np.ascontiguousarray(cots)
+    count = fill_laplacian(*given, starts, rows, values)
     shape = vertex_count, vertex_count
-    # Half of the entries, and their mirror image: sorting all of them at once takes three times as long.
-    half = csc_matrix((w, (i, j)), shape=shape)
-    weights = half + half.T.tocsc()
-    diagonal = np.bincount(i, w, vertex_count) + np.bincount(j, w, vertex_count)
-    return csc_matrix(diags(diagonal, format="csc") - weights)
+    return csc_matrix((values[:count].copy(), rows[:count].copy(), starts), shape=shape)
+
+
+@compiled
+def fill_laplacian(
+    faces: IntArray, cots: FloatArray, starts: Int32Array, rows: Int32Array, values: FloatArray
+) -> int:
+    """Write the Laplacian by columns of sorted rows, without entries that are zero; return how many are left.
+
+    starts: (n + 1,) zeros on entry. rows, values: room for n + 6m entries.
+    """
+    n = len(starts) - 1
+    leaving, entering = np.zeros(n), np.zeros(n)
+    for f in range(len(faces)):
+        for c in range(3):
+            i, j, w = faces[f, (c + 1) % 3], faces[f, (c + 2) % 3], cots[f, c] / 2
+            starts[i + 1] += 1
+            starts[j + 1] += 1
+            leaving[i] += w
+            entering[j] += w
+    for v in range(n):
+        starts[v + 1] += starts[v] + 1
+    # Behind the start of each column first the diagonal, then two entries for each side there.
+    place = starts[:-1].copy()
+    for v in range(n):
+        rows[place[v]], values[place[v]] = v, leaving[v] + entering[v]
+        place[v] += 1
+    for f in range(len(faces)):
+        for c in range(3):
+            i, j, w = faces[f, (c + 1) % 3], faces[f, (c + 2) % 3], cots[f, c] / 2
+            rows[place[i]], values[place[i]] = j, -w
+            place[i] += (
+                1  # before the next: an edge of an intrinsic triangulation may lead back to its vertex
+            )
+            rows[place[j]], values[place[j]] = i, -w
+            place[j] += 1
+    # Its own transpose, made column after column, has sorted rows.
+    of_column, of_value = rows.copy(), values.copy()
+    place[:] = starts[:-1]
+    for v in range(n):
+        for at in range(starts[v], starts[v + 1]):
+            row = of_column[at]
+            rows[place[row]], values[place[row]] = v, of_value[at]
+            place[row] += 1
+    return sum_repeated(starts, rows, values)
+
+
+@compiled
+def sum_repeated(starts: Int32Array, rows: Int32Array, values: FloatArray) -> int:
+    """Sum up entries of equal row, which follow one another, in place, leave out zeros; return how many are left."""
+    kept, begin = 0, 0
+    for v in range(len(starts) - 1):
+        at, end = begin, starts[v + 1]
+        starts[v] = kept
+        while at < end:
+            row, value = rows[at], 0.0
+            while at < end and rows[at] == row:
+                value += values[at]
+                at += 1
+            if value != 0.0:
+                rows[kept], values[kept] = row, value
+                kept += 1
+        begin = end
+    starts[-1] = kept
+    return kept

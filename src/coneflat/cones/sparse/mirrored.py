@@ -15,7 +15,7 @@ import numpy as np
 
 from ..._arrays import BoolArray, FloatArray, IntArray
 from .best_sets import ConeSet
-from .dense_model import DenseModel, Fit, first_least
+from .dense_model import DenseModel, first_least
 from .exact_model import CAUTIONS, ROUNDS, WORTHWHILE
 from .search import COARSE_DOUBT, ConeSearch, SparseCones
 
@@ -44,18 +44,9 @@ class PairModel(DenseModel):
         assert self.is_pair is not None
         return self.usable & (self.is_pair == pairs)
 
-    def best_swaps(self, members: IntArray, fitted: Fit) -> tuple[FloatArray, IntArray]:
-        change, which = np.full(len(members), np.inf), np.full(len(members), -1)
-        usable = self.usable
-        for pairs in (False, True):
-            own = self.mask(pairs)
-            if own[members].any():
-                self.usable = own
-                found = super().best_swaps(members, fitted)
-                self.usable = usable
-                mine = own[members]
-                change[mine], which[mine] = found[0][mine], found[1][mine]
-        return change, which
+    def _kind(self) -> BoolArray:
+        assert self.is_pair is not None
+        return self.is_pair
 
     def count(self, members: IntArray) -> int:
         """Return how many cones there are in a set."""

@@ -119,53 +119,47 @@ def addition_scores(
 
 
 @compiled
-def swap_table(
-    rows: FloatArray,
-    kept: FloatArray,
-    curvatures: FloatArray,
+def best_swap(
+    row: FloatArray,
+    kept: float,
+    k: float,
     gradient: FloatArray,
     remain: FloatArray,
-    floor: FloatArray,
+    diagonal: FloatArray,
     is_open: BoolArray,
     least: FloatArray,
     most: FloatArray,
     tie: float,
-) -> tuple[FloatArray, IntArray]:
-    """Return (p,) the change of E^2 by the best replacement of each member, and which candidate that is.
+) -> tuple[float, int]:
+    """Return the change of E^2 by the best replacement of a member, and which candidate that is, -1 if none.
 
     Args:
-        rows: (p, m) coefficients of the projection of candidates on members.
-        kept: (p,) diagonal of the inverse of the members' gram matrix, with the sum kept.
-        curvatures: (p,) of the members.
+        row: (m,) coefficients of the projection of candidates on the member.
+        kept: its entry on the diagonal of the inverse of the members' gram matrix, with the sum kept.
+        k: its curvature.
         gradient: (m,) half the derivative of E^2 by the curvature of a candidate.
         remain: (m,) what the projection leaves of the candidates' gram entries.
-        floor: (m,) what must be left of them once a member is gone.
+        diagonal: (m,) of the gram matrix.
         is_open: (m,) the candidates that may come in.
         least, most: (m,) bounds of the candidates' curvatures.
         tie: changes that differ by less, relatively, are equal; the first candidate counts.
     """
-    size, count = rows.shape
-    change = np.full(size, np.inf)
-    which = np.full(size, -1)
-    values = np.empty(count)
-    for i in range(size):
-        k, share = curvatures[i], 1.0 / kept[i]
-        lost = k * k * share
-        lowest = np.inf
-        for t in range(count):
-            values[t] = np.inf
-            if is_open[t]:
-                w = rows[i, t]
-                h = remain[t] + w * w * share
-                if h > floor[t]:
-                    g = gradient[t] - w * k * share
-                    x = min(max(-g / h, least[t]), most[t])
-                    values[t] = lost + (2.0 * g + h * x) * x
-                    lowest = min(lowest, values[t])
-        if lowest < np.inf:
-            limit = lowest + tie * abs(lowest)
-            for t in range(count):
-                if values[t] <= limit:
-                    change[i], which[i] = values[t], t
-                    break
-    return change, which
+    share = 1.0 / kept
+    lost = k * k * share
+    values, lowest = np.empty(len(diagonal)), np.inf
+    for t in range(len(diagonal)):
+        values[t] = np.inf
+        if is_open[t]:
+            w = row[t]
+            h = remain[t] + w * w * share
+            if h > INDEPENDENT * diagonal[t]:
+                g = gradient[t] - w * k * share
+                x = min(max(-g / h, least[t]), most[t])
+                values[t] = lost + (2.0 * g + h * x) * x
+                lowest = min(lowest, values[t])
+    if lowest < np.inf:
+        limit = lowest + tie * abs(lowest)
+        for t in range(len(diagonal)):
+            if values[t] <= limit:
+                return values[t], t
+    return np.inf, -1

@@ -25,6 +25,8 @@ GOAL = 1e-13
 LARGEST_STEP = 5.0
 # A step is solved for to the accuracy of the residual, but to this at least: more is lost to the next.
 COARSEST = 0.05
+# Below so many vertices a factorization takes less time than the calls that conjugate gradients are made of.
+SMALL = 200
 # Log scales that differ by less than this have nearly the same Hessian.
 NEARLY = 0.05
 # Halvings of a step after which it is taken for rounding: the change is then below 1e-9 of the first trial.
@@ -151,7 +153,7 @@ class ConformalProblem:
             self.preconditioner = None
         if self._pattern is None:
             self._pattern = HessianPattern(self.triangulation)
-        if self.preconditioner is not None:
+        if self.preconditioner is not None and len(here.place) >= SMALL:
             accuracy = min(max(state.largest, GOAL / state.largest / 4), COARSEST)
             hessian = self._pattern.matrix(state.cots, self.fixed)
             inverse = self._corrected(self.preconditioner, hessian, state.place)

@@ -8,9 +8,11 @@ and so in the unknowns that move these.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix
 
 from ..._arrays import ComplexArray, FloatArray, IntArray, has_any
 from ...compiled import compiled
@@ -23,6 +25,8 @@ from .motions import Motions
 SHORT_OF_FLAT = 0.9
 # Part of each diagonal entry that is added to it: what nothing holds may turn and shift as a whole.
 RIDGE = 1e-11
+
+Int32Array: TypeAlias = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,16 +98,12 @@ class Elements:
         squares = np.concatenate([[0], np.cumsum(sizes**2)])
         rows, columns = np.empty((2, squares[-1]), dtype=np.int32)
         fill_pairs(self._start, self._unknown, squares, rows, columns)
-        inside = (rows < k) & (columns < k)
-        pattern = coo_matrix(
-            (np.ones(np.count_nonzero(inside), dtype=np.int8), (rows[inside], columns[inside])), shape=(k, k)
-        ).tocsc()
-        pattern.sum_duplicates()
-        # One matrix for all steps: its pattern is analysed once.
-        self._matrix = csc_matrix(pattern, dtype=np.float64)
-        self._indices, self._indptr = self._matrix.indices, self._matrix.indptr
         self._slots = np.empty(len(rows), dtype=np.int64)
-        find_slots(rows, columns, self._indptr, self._indices, self._slots)
+        indptr, indices = np.zeros(k + 1, dtype=np.int32), np.empty(len(rows), dtype=np.int32)
+        count = number_pairs(rows, columns, indptr, indices, self._slots)
+        # One matrix for all steps: its pattern is analysed once.
+        self._matrix = csc_matrix((np.zeros(count), indices[:count].copy(), indptr), shape=(k, k))
+        self._indices, self._indptr = self._matrix.indices, self._matrix.indptr
         self._squares = squares
         self._diagonal = np.flatnonzero(self._indices == np.arange(k).repeat(np.diff(self._indptr)))
         self.parts, self.unknown_part = label_components(
@@ -212,22 +212,49 @@ def fill_pairs(
 
 
 @compiled
-def find_slots(
-    rows: IntArray, columns: IntArray, indptr: IntArray, indices: IntArray, slots: IntArray
-) -> None:
-    """Fill where each entry stands in a matrix of sorted columns; -1 in the column beyond the last."""
+def number_pairs(
+    rows: Int32Array, columns: Int32Array, indptr: Int32Array, indices: Int32Array, slots: IntArray
+) -> int:
+    """Number pairs by column and row, equal ones alike, as entries of a sparse matrix; return how many there are.
+
+    Args:
+        rows, columns: (p,) the pairs; those with an index of k or more are left out.
+        indptr: (k + 1,) zeros on entry; filled with where each column begins.
+        indices: (p,) filled with the rows of the entries.
+        slots: (p,) filled with the number of each pair, -1 if it is left out.
+    """
+    k = len(indptr) - 1
+    begin = np.zeros(k + 1, np.int64)
     for p in range(len(rows)):
-        if columns[p] >= len(indptr) - 1 or rows[p] >= len(indptr) - 1:
-            slots[p] = -1
-            continue
-        low, high = indptr[columns[p]], indptr[columns[p] + 1]
-        while high - low > 1:
-            middle = (low + high) // 2
-            if indices[middle] <= rows[p]:
-                low = middle
-            else:
-                high = middle
-        slots[p] = low
+        if rows[p] < k and columns[p] < k:
+            begin[rows[p] + 1] += 1
+            indptr[columns[p] + 1] += 1
+    for i in range(k):
+        begin[i + 1] += begin[i]
+        indptr[i + 1] += indptr[i]
+    # By row, and then, with the order kept, by column.
+    by_row, by_column = np.empty(begin[k], np.int64), np.empty(begin[k], np.int64)
+    for p in range(len(rows)):
+        slots[p] = -1
+        if rows[p] < k and columns[p] < k:
+            by_row[begin[rows[p]]] = p
+            begin[rows[p]] += 1
+    begin[:] = indptr
+    for p in by_row:
+        by_column[begin[columns[p]]] = p
+        begin[columns[p]] += 1
+    count = 0
+    for column in range(k):
+        first, start = count, indptr[column] if column == 0 else begin[column - 1]
+        for at in range(start, begin[column]):
+            p = by_column[at]
+            if count == first or indices[count - 1] != rows[p]:
+                indices[count] = rows[p]
+                count += 1
+            slots[p] = count - 1
+        indptr[column] = first
+    indptr[k] = count
+    return count
 
 
 @compiled
