@@ -44,8 +44,8 @@ def fitted_cones(
     operator = GreenOperator(laplacian, areas, is_boundary, np.arange(len(areas)))
     responses = operator.responses(np.searchsorted(operator.vertices, cones))
     log_scale = -operator.solve(curvature[operator.vertices])
-    gram = operator.products(responses, responses)
-    slope = operator.products(responses, log_scale[None])[:, 0]
+    gram = _covariances(responses, responses, operator.areas)
+    slope = _covariances(responses, log_scale[None], operator.areas)[:, 0]
     held = curvatures[~is_free]
     total = 2 * np.pi * euler_characteristic - held.sum() if is_closed else np.nan
     count = int(is_free.sum())
@@ -59,3 +59,9 @@ def fitted_cones(
     filled = curvatures.copy()
     filled[is_free] = found
     return cones_with_curvature(laplacian, curvature, is_boundary, euler_characteristic, cones, filled)
+
+
+def _covariances(one: FloatArray, other: FloatArray, areas: FloatArray) -> FloatArray:
+    """Return (k, l) the covariances by area of functions (k, f) and (l, f)."""
+    products: FloatArray = (one * areas) @ other.T - np.outer(one @ areas, other @ areas)
+    return products

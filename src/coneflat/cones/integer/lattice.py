@@ -17,7 +17,7 @@ EXCHANGE_GAIN = 1e-6
 # Pairs of opposite cones that are looked at closely before one is left out.
 PAIRS = 8
 # Exchanges tried at a time: for more than a hundred cones, what comes later gains little.
-EXCHANGES = 200
+EXCHANGES = 100
 
 
 @dataclass(frozen=True, eq=False)

@@ -136,9 +136,7 @@ def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None
     most = min(most + 1, search.most_cones)
     model.climb(goal / COARSE_DOUBT, most)
     for found in model.best:
-        start = lattice.rounded(found.members)
-        if start is not None:
-            best.offer(lattice.exchanged(start))
+        _offer(lattice, lattice.rounded(found.members))
     if not best.sizes:
         start = lattice.any_of(fewest)
         if start is None:
@@ -159,7 +157,7 @@ def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None
         _offer(lattice, lattice.shrunk_by_pair(best[size]), most)
 
 
-def _offer(lattice: Lattice, cones: IndexedCones | None, most: int) -> None:
+def _offer(lattice: Lattice, cones: IndexedCones | None, most: float = math.inf) -> None:
     """Keep cones after exchanges, if these are worth the time."""
     if (
         cones is not None
