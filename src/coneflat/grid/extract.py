@@ -19,6 +19,8 @@ from .trace import LOST, join_ports
 
 # Squares by which the area of a closed grid may be off the number of quads: rounding of a sum over all triangles.
 AREA = 1e-3
+# Squares at most: with about a kilobyte for each at the height of the work, what many machines have room for.
+MOST = 20_000_000
 
 
 def extract_quads(grid: GridMap) -> QuadMesh:
@@ -32,8 +34,13 @@ def extract_quads(grid: GridMap) -> QuadMesh:
     point alone have a vertex each there.
 
     Raises:
-        GridError: the map is no integer-grid map, or so coarse that quads have a vertex twice.
+        GridError: the map is no integer-grid map, so coarse that quads have a vertex twice, or of too many squares.
     """
+    area = float(signed_double_areas(grid.corner_grid).sum()) / 2
+    if area > MOST:
+        raise GridError(
+            f"a grid of {area:,.0f} squares is too fine for quads, of which {MOST:,} are made at most"
+        )
     exact = exact_grid(grid)
     found = find_points(exact)
     ports = find_ports(exact, found)

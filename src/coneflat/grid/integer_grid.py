@@ -94,10 +94,11 @@ def integer_grid(
             raise OptionError(
                 "sharp edges need to be told how large quads are: leave out coarsest, or sharp_angle"
             )
-        given = {**OPTIONS, **options, "sharp_angle": sharp_angle}
+        given = {**options, "sharp_angle": sharp_angle}
         given.pop("progress", None)
         with stages("grid"):
-            found = _sharp(mesh, faces, None if size is not None else quads or QUADS, size, given, energy)
+            wanted = None if size is not None else quads or QUADS
+            found = _sharp(mesh, faces, wanted, size, given, energy, progress)
         return replace(found, seconds=stages.seconds)
     else:
         with stages("flatten"):
@@ -151,14 +152,15 @@ def _of_layout(
 def _sharp(
     mesh: Any,
     faces: ArrayLike | None,
-    quads: float | None,
+    quads: int | None,
     size: float | None,
     given: dict[str, Any],
     energy: StretchEnergy,
+    progress: Progress | None,
 ) -> IntegerGrid:
     """Return a grid with as many sharp edges on grid lines as can be."""
     why = "none is long enough for quads of this size"
-    for found in sharp_layouts(mesh, faces, quads, size, given):
+    for found in sharp_layouts(mesh, faces, quads, size, given, OPTIONS, progress):
         with one_blas_thread():
             grid, why = attempt(found.layout, energy)
         if grid is not None:
@@ -167,7 +169,8 @@ def _sharp(
         mesh,
         faces,
         size=size,
-        quads=None if quads is None else int(np.ceil(quads)),
+        quads=quads,
+        progress=progress,
         stretch=energy.stretch,
         **{name: value for name, value in given.items() if name != "sharp_angle"},
     )

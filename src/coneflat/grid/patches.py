@@ -93,13 +93,7 @@ def _cones(
             allowed=inside,
             room=room.astype(np.float64),
         )
-        found = quantise_cones(
-            search,
-            QUARTER,
-            distortion=distortion,
-            count=options.cone_count,
-            most=options.max_cones,
-        ).solution
+        found = quantise_cones(search, QUARTER, distortion=distortion).solution
     except CurvatureError as error:
         raise CurvatureError(
             f"a patch of {len(mesh.faces):,} triangles with corners of {corners.sum() / np.pi:.3g} pi in all: {error}"

@@ -7,6 +7,7 @@ sides together point by point, as quarter turns of each other, without turning a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,8 +59,12 @@ class CoarseError(PatchError):
     """A patch cannot be flattened as some of its triangles, `faces`, are too coarse."""
 
 
-def flatten_patches(opened: Opened, lengths: FloatArray, options: Options) -> Loose:
+def flatten_patches(
+    opened: Opened, lengths: FloatArray, options: Options, tell: Callable[[int, int], None]
+) -> Loose:
     """Return all patches of an opened mesh, flattened at their own areas; lengths are (m, 3), of its sides.
+
+    tell: called before each patch with its number and how many there are.
 
     Raises:
         CoarseError: triangles are too coarse.
@@ -69,7 +74,8 @@ def flatten_patches(opened: Opened, lengths: FloatArray, options: Options) -> Lo
     points, cones, turned, count = [], [], [], 0
     parts = opened.cut.mesh.split_components()
     areas = double_areas(lengths)
-    for part, vertices, faces in parts:
+    for number, (part, vertices, faces) in enumerate(parts):
+        tell(number, len(parts))
         # What all have in common is the mean of squares by area, to which small ones add little.
         share = float(areas[faces].sum() / areas.mean() / len(areas))
         distortion = options.distortion * min(max(1.0, 1 / np.sqrt(len(parts) * share)), UNEVEN)
@@ -141,7 +147,9 @@ def all_sides(opened: Opened, corners: IntArray, points: ComplexArray, chains: S
     )
 
 
-def sharp_layout(opened: Opened, lengths: FloatArray, size: float, options: Options) -> Layout:
+def sharp_layout(
+    opened: Opened, lengths: FloatArray, size: float, options: Options, tell: Callable[[int, int], None]
+) -> Layout:
     """Return a seamless layout of a mesh with sharp edges along the axes, in units of a grid.
 
     Args:
@@ -149,8 +157,14 @@ def sharp_layout(opened: Opened, lengths: FloatArray, size: float, options: Opti
         lengths: (m, 3) side lengths of its triangles.
         size: of a square of the grid.
         options: what is asked of the cones inside patches.
+        tell: called before each patch is flattened with its number and how many there are.
+
+    Raises:
+        CoarseError: triangles are too coarse.
+        PatchError: a patch has no flat metric with angles of quarter turns.
+        ConvergenceError: patches cannot be brought together, as far as is known.
     """
-    loose = glued(opened, lengths, flatten_patches(opened, lengths, options))
+    loose = glued(opened, lengths, flatten_patches(opened, lengths, options, tell))
     mesh, corners = opened.mesh, loose.corners
     whole = np.concatenate([loose.cones, opened.nodes])
     chains = find_chains(mesh, corners, loose.points, whole)

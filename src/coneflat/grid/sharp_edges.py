@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from ..geometry import double_areas, edge_lengths, mollify
 from ..input.components import prepare
 from ..mesh import TriangleMesh
 from ..options import Options, read_options
+from ..progress import Progress
 from ..solver import solving
 from ..text import list_some, plural
 from ..threads import one_blas_thread
@@ -23,11 +24,11 @@ from .bisect import split_faces, split_for_features
 from .features import border_of, dangling, opened, patches_of, sharp_edges, without_stubs
 from .sharp import CoarseError, PatchError, sharp_layout
 
-# What may be asked of the cones inside patches, and of the input.
+# What may be asked of the cones inside patches, and of the input; the rest is as grids of whole surfaces want it.
 TAKEN = frozenset(
     (
-        *("sharp_angle", "boundary", "quantise", "quantize", "correct_handles", "charts"),
-        *("min_cone_angle", "max_cone_angle", "distortion", "creases", "repair", "strict", "solver"),
+        *("sharp_angle", "boundary", "min_cone_angle", "max_cone_angle", "distortion"),
+        *("creases", "repair", "strict", "solver"),
     )
 )
 # Edges across the whole surface, about, that each has at least for the layout to bend along.
@@ -59,6 +60,8 @@ def sharp_layouts(
     quads: float | None,
     size: float | None,
     given: Mapping[str, Any],
+    usual: Mapping[str, Any],
+    progress: Progress | None = None,
 ) -> Iterator[SharpLayout]:
     """Yield layouts of a surface, each with fewer sharp edges along the axes than those before.
 
@@ -67,12 +70,15 @@ def sharp_layouts(
         quads: unit squares that cover the surface.
         size: of a square in model units, instead.
         given: options, `sharp_angle` among them.
+        usual: what they are where nothing is said of them, if that is not what `coneflat.flatten` has.
+        progress: called before each patch is flattened.
 
     Raises:
-        OptionError, MeshError: as `coneflat.flatten`.
+        OptionError: an option makes no sense, or has no effect beside `sharp_angle`.
+        MeshError: as `coneflat.flatten`.
     """
-    _check_taken(given)
-    options: Options = read_options(given)
+    options: Options = read_options({**usual, **given})
+    _check_taken(given, options, read_options(usual))
     angle = options.sharp_angle
     assert angle is not None
     if options.boundary_kind not in ("free", "straight"):
@@ -86,7 +92,12 @@ def sharp_layouts(
     else:
         square = float(np.ldexp(size, exponent))
     given_edges = sharp_edges(checked, angle)
-    search = _Search(checked, given_edges, square, area, options)
+
+    def tell(tries: int, patch: int, count: int) -> None:
+        if progress is not None:
+            progress(f"patch {patch + 1:,} of {count:,} between sharp edges", (tries + patch / count) / TRIES)
+
+    search = _Search(checked, given_edges, square, area, options, tell)
     with one_blas_thread(), solving(options.solver):
         for layout, features in search.layouts():
             yield SharpLayout(
@@ -94,13 +105,20 @@ def sharp_layouts(
             )
 
 
-def _check_taken(given: Mapping[str, Any]) -> None:
-    others = sorted(set(given) - TAKEN)
+def _check_taken(given: Iterable[str], options: Options, usual: Options) -> None:
+    """Raise OptionError if options that have no effect are given, and differ from the usual ones."""
+    others = sorted(name for name in given if name not in TAKEN and _differ(options, usual, name))
     if others:
         raise OptionError(
             f"with sharp edges on grid lines, cones are found for each patch between them: {list_some(others)} cannot "
             "be given beside sharp_angle"
         )
+
+
+def _differ(one: Options, other: Options, name: str) -> bool:
+    """Return whether options are not the same in one that may be an array."""
+    first, second = getattr(one, name), getattr(other, name)
+    return first is not second and not (type(first) is type(second) and np.array_equal(first, second))
 
 
 def _at_scale(layout: Layout, exponent: int, square: float) -> Layout:
@@ -118,9 +136,15 @@ class _Search:
     """Sharp edges that lie on grid lines, fewer each time that there is no grid with them."""
 
     def __init__(
-        self, mesh: TriangleMesh, sharp: IntArray, square: float, area: float, options: Options
+        self,
+        mesh: TriangleMesh,
+        sharp: IntArray,
+        square: float,
+        area: float,
+        options: Options,
+        tell: Callable[[int, int, int], None],
     ) -> None:
-        self.square, self.options = square, options
+        self.square, self.options, self._tell = square, options, tell
         self.lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges[sharp]], axis=1)[:, 0], axis=1)
         kept = without_stubs(mesh, sharp, LASTING * square)
         finer = split_for_features(mesh.vertices, mesh.faces, mesh.edges[sharp[kept]], np.sqrt(area) / ACROSS)
@@ -149,7 +173,7 @@ class _Search:
             if not len(self.edges) and not self.mesh.is_boundary_edge.any():
                 return
             try:
-                layout = self._layout()
+                layout = self._layout(attempt)
             except PatchError as error:
                 self.why = str(error)
                 _, patch = patches_of(self.mesh, self.edges)
@@ -162,13 +186,15 @@ class _Search:
                 self.why = "there was no grid with them"
                 self._drop_some(attempt)
 
-    def _layout(self) -> Layout:
+    def _layout(self, attempt: int) -> Layout:
+        def tell(patch: int, count: int) -> None:
+            self._tell(attempt, patch, count)
+
         for _ in range(SPLITS):
             lengths = self._side_lengths()
             try:
-                return sharp_layout(
-                    opened(self.mesh, self.edges, lengths), lengths, self.square, self.options
-                )
+                cut_open = opened(self.mesh, self.edges, lengths)
+                return sharp_layout(cut_open, lengths, self.square, self.options, tell)
             except CoarseError as error:
                 finer = split_faces(self.mesh, self.edges, self.origin, error.faces)
                 coarse = error
