@@ -25,6 +25,7 @@ from coneflat.apps.studio.frames import read_frame, write_frame
 from coneflat.apps.studio.history import History
 from coneflat.apps.studio.project import Project, hash_of, read_project
 from coneflat.apps.studio.replay import command_line, python_lines
+from coneflat.apps.studio.serve import Teller
 from coneflat.apps.studio.session import Session
 from coneflat.errors import MeshFileError, OptionError, ProjectError, StudioError
 
@@ -338,6 +339,17 @@ class TestSession:
         with pytest.raises((StudioError, OptionError)):
             session.act(action)
         assert session.state()["choices"] == before
+
+    def test_what_happens_is_told_where_one_wants_to_know(self, session):
+        found, lines = settled(session)["found"], []
+        session.listen(Teller(session, lines.append))
+        session.act({"do": "set", "name": "stretch", "value": 0.5})
+        settled(session)
+        for vertex in found:
+            session.act({"do": "angle", "vertex": vertex, "degrees": 350})
+        settled(session)
+        assert any(line.startswith("layout 2 in ") and "1,280 triangles" in line for line in lines)
+        assert "must sum to 2 pi chi" in lines[-1]
 
     def test_a_repair_is_offered(self, tmp_path):
         vertices, faces = shapes.join(shapes.sphere(2), shapes.sphere(2))
