@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from .shared import QUIET, VERBOSE, verbosity_options
+
 
 @click.command(short_help="Flatten by hand and eye, live in the browser.")
 @click.argument("file", type=click.Path(path_type=Path), metavar="[MESH|PROJECT]", required=False)
@@ -17,7 +19,8 @@ import click
     help="Port of this machine at which the page is.",
 )
 @click.option("--no-open", is_flag=True, help="Print the page's address, and open no browser.")
-def studio(file: Path | None, port: int, no_open: bool) -> None:
+@verbosity_options
+def studio(file: Path | None, port: int, no_open: bool, verbosity: str | None) -> None:
     """Move cones and draw seams on a mesh, and see at once what comes of it.
 
     The page is at an address of this machine that nobody else can use; it is printed first. What is chosen is kept in
@@ -32,4 +35,9 @@ def studio(file: Path | None, port: int, no_open: bool) -> None:
     """
     from ..studio.serve import run_studio
 
-    run_studio(file, port, opens=not no_open, say=click.echo)
+    def say(line: str) -> None:
+        # Without a browser nobody would find the page.
+        if verbosity != QUIET or no_open:
+            click.echo(line)
+
+    run_studio(file, port, opens=not no_open, say=say, tell=click.echo if verbosity == VERBOSE else None)

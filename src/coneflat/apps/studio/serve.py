@@ -6,14 +6,24 @@ import secrets
 import socket
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ...errors import OptionError, StudioError
 from ...view.page.webpage import open_address
 
+if TYPE_CHECKING:
+    from .session import Session
+
 HOST = "127.0.0.1"
 
 
-def run_studio(file: Path | None, port: int, opens: bool, say: Callable[[str], None]) -> None:
+def run_studio(
+    file: Path | None,
+    port: int,
+    opens: bool,
+    say: Callable[[str], None],
+    tell: Callable[[str], None] | None = None,
+) -> None:
     """Serve a session until it is interrupted.
 
     Args:
@@ -21,6 +31,7 @@ def run_studio(file: Path | None, port: int, opens: bool, say: Callable[[str], N
         port: of this machine; 0 for a free one.
         opens: show the page in the browser.
         say: is told the page's address first.
+        tell: is told of every layout and every failure, if anybody wants to know.
 
     Raises:
         OptionError: the extra `studio` is not installed.
@@ -45,11 +56,32 @@ def run_studio(file: Path | None, port: int, opens: bool, say: Callable[[str], N
             if file is not None:
                 session.open(file)
             say(address)
+            if tell is not None:
+                session.listen(Teller(session, tell))
             if opens:
                 open_address(address)
             StudioServer(session, token, port).run(sockets=[listener])
         finally:
             session.close()
+
+
+class Teller:
+    """Hears of what happens in a session, and tells a line of each layout and each failure."""
+
+    def __init__(self, session: Session, tell: Callable[[str], None]) -> None:
+        self._session, self._tell = session, tell
+        self._told: tuple[int, str] = (0, "")
+
+    def __call__(self) -> None:
+        """Tell what is new."""
+        state, shown = self._session.state(), self._session.picture()
+        trouble = "" if state["trouble"] is None else str(state["trouble"]["text"])
+        layout, before = self._told
+        self._told = (state["layout"], trouble)
+        if state["layout"] != layout and shown is not None:
+            self._tell(f"layout {state['layout']} in {state['seconds']:.2f} s: {shown[0]['title']}")
+        if trouble and trouble != before:
+            self._tell(trouble)
 
 
 def listening(port: int) -> socket.socket:
