@@ -25,7 +25,7 @@ from coneflat.cones.sparse import search as cone_search
 from coneflat.input.components import prepare
 from coneflat.options import Options
 from coneflat.progress import Stages
-from coneflat.threads import one_blas_thread
+from coneflat.threads import using_threads
 
 DISTORTIONS = (0.1, 0.2, 0.3)
 
@@ -126,7 +126,7 @@ def main() -> None:
     for case, given in cases():
         if any(word in case for word in skipped):
             continue
-        with one_blas_thread():
+        with using_threads():
             mesh, faces = given if len(given) == 2 else (given[0], None)
             part = max(prepare(mesh, faces, options).components, key=lambda e: len(e.faces))
             if not arguments.smallest <= len(part.mesh.faces) <= arguments.largest:

@@ -27,7 +27,7 @@ from .progress import Stages
 from .result.assemble import assemble
 from .result.flattening import Flattening
 from .solver import solving
-from .threads import one_blas_thread
+from .threads import using_threads
 
 
 @takes(Options)
@@ -56,7 +56,7 @@ def flatten_as(mesh: Any, faces: ArrayLike | None, options: Options) -> Flatteni
     with stages("check"):
         prepared = prepare(mesh, faces, options)
         check_symmetry(prepared.components, options)
-    with one_blas_thread(), solving(options.solver) as solvers:
+    with using_threads(options.threads), solving(options.solver) as solvers:
         flat = list(_flat_components(prepared, options, stages))
     return replace(assemble(prepared, flat, options, stages), solvers=tuple(solvers.used))
 
