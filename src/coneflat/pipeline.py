@@ -26,7 +26,7 @@ from .options import UNFOLDED, Options, read_options, takes
 from .progress import Stages
 from .result.assemble import assemble
 from .result.flattening import Flattening
-from .solver import solving
+from .solver import fitting_solver, solving
 from .threads import using_threads
 
 
@@ -46,6 +46,7 @@ def flatten(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatte
         OptionError: an option makes no sense.
         SeamError: every set of seams needs forbidden edges.
         MetricError: the computation found no finite result.
+        TooLargeError: it does not fit into the memory that is free.
     """
     return flatten_as(mesh, faces, read_options(options))
 
@@ -56,7 +57,8 @@ def flatten_as(mesh: Any, faces: ArrayLike | None, options: Options) -> Flatteni
     with stages("check"):
         prepared = prepare(mesh, faces, options)
         check_symmetry(prepared.components, options)
-    with using_threads(options.threads), solving(options.solver) as solvers:
+    solver = fitting_solver(len(prepared.checked.mesh.faces), options.solver)
+    with using_threads(options.threads), solving(solver) as solvers:
         flat = list(_flat_components(prepared, options, stages))
     return replace(assemble(prepared, flat, options, stages), solvers=tuple(solvers.used))
 

@@ -6,5 +6,14 @@ The ladder, best first: MKL PARDISO (pypardiso) for large systems, CHOLMOD witho
 
 from .back_ends import HermitianFactor, available, factorize, solving
 from .factors import Factor, NotPositiveDefinite
+from .memory import fitting_solver
 
-__all__ = ["Factor", "HermitianFactor", "NotPositiveDefinite", "available", "factorize", "solving"]
+__all__ = [
+    "Factor",
+    "HermitianFactor",
+    "NotPositiveDefinite",
+    "available",
+    "factorize",
+    "fitting_solver",
+    "solving",
+]
