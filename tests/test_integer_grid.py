@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+
 import numpy as np
 import pytest
 import shapes
@@ -10,6 +12,8 @@ from coneflat import errors, flatten, integer_grid, sample_path
 from coneflat import quads as find_quads
 from coneflat.mesh import TriangleMesh
 
+# The function of its name is what the package has under it.
+integer_grid_module = importlib.import_module("coneflat.grid.integer_grid")
 TURNS = np.array([1, 1j, -1, -1j])
 QUARTER = {"quantise": np.pi / 2, "charts": "one", "min_cone_angle": 1.5 * np.pi, "max_cone_angle": 3 * np.pi}
 
@@ -211,6 +215,59 @@ def test_straight_sides_of_a_face(shared, quads):
     grid = integer_grid(shared("face.obj"), quads=quads, boundary="straight")
     check_laws(grid)
     check_sides(grid)
+
+
+def askew():
+    """A bumpy sheet with two square holes, neither of which is parallel to it or to the other."""
+    vertices, faces = shapes.hill(30, 24)
+    places = vertices[faces].mean(axis=1)[:, :2] @ [1, 1j] / np.ptp(vertices[:, 0])
+    kept = np.ones(len(faces), dtype=bool)
+    for centre, half, angle in ((0.3 + 0.3j, 0.1, 0.5), (0.7 + 0.4j, 0.09, 0.2)):
+        turned = (places - centre) * np.exp(-1j * angle)
+        kept &= np.maximum(np.abs(turned.real), np.abs(turned.imag)) > half
+    used, faces = np.unique(faces[kept], return_inverse=True)
+    return vertices[used], faces.reshape(-1, 3)
+
+
+@pytest.mark.parametrize("quads", [300, 2000])
+def test_loops_that_are_askew_come_to_lie_on_grid_lines(quads):
+    grid = integer_grid(*askew(), quads=quads, repair=True)
+    check_laws(grid)
+    check_sides(grid)
+    assert TriangleMesh(grid.vertices, grid.faces).euler_characteristic == -1
+
+
+def test_loops_around_the_holes_of_a_scan(shared):
+    """Its sides have to turn by up to 45 degrees, without any of them folding over."""
+    grid = integer_grid(shared("stanford-bunny.obj"), quads=1000)
+    check_laws(grid)
+    check_sides(grid)
+
+
+def test_a_boundary_lies_on_grid_lines_unless_told_otherwise():
+    usual, straight, free = (
+        integer_grid(*shapes.hill(), quads=100, **options)
+        for options in ({}, {"boundary": "straight"}, {"boundary": "free"})
+    )
+    np.testing.assert_array_equal(usual.corner_grid, straight.corner_grid)
+    assert len(free.corners) == 0
+    assert not free.notes
+
+
+def test_where_no_boundary_on_grid_lines_is_found_it_is_free(monkeypatch):
+    search = integer_grid_module._Search
+    usual = search.with_boundary
+
+    def none_is_straight(self, boundary, whole_sides=False):
+        if boundary == "straight":
+            raise errors.GridError("too few quads")
+        return usual(self, boundary, whole_sides)
+
+    monkeypatch.setattr(search, "with_boundary", none_is_straight)
+    grid = integer_grid(*shapes.hill(), quads=100)
+    assert any("none was found with it on grid lines: too few quads." in note for note in grid.notes)
+    with pytest.raises(errors.GridError):
+        integer_grid(*shapes.hill(), quads=100, boundary="straight")
 
 
 def test_a_flat_rectangle_keeps_its_shape():

@@ -288,6 +288,12 @@ def test_gaps_by_hand():
     assert measures.to_surface == pytest.approx(0.15 / np.hypot(0.5, 0.3) * 1.0)
 
 
+def test_vertices_without_a_face_are_no_part_of_the_surface():
+    grid = on_squares(*polycube(L_SHAPE), 3, inside=7, along=2, seed=3)
+    far = broken(grid, vertices=np.concatenate([grid.vertices, [[1e3, 0, 0]]]))
+    assert measure_quads(extract_quads(far)).hausdorff == measure_quads(extract_quads(grid)).hausdorff
+
+
 def test_distances_are_the_least_of_all_triangles():
     rng = np.random.default_rng(0)
     vertices, faces = rng.normal(size=(40, 3)), rng.integers(0, 40, (23, 3))

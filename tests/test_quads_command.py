@@ -80,7 +80,7 @@ def test_a_grid_may_be_given():
 def test_a_boundary_across_the_grid_is_told():
     vertices, faces = sphere(3, bumps=0.2)
     kept = vertices[faces].mean(axis=1)[:, 2] < 0.4
-    mesh = coneflat.quads(vertices, faces[kept], quads=500)
+    mesh = coneflat.quads(vertices, faces[kept], quads=500, boundary="free")
     assert mesh.left_out > 0
     assert mesh.euler_characteristic == mesh.surface_euler == 1
     assert any(note.startswith(f"Left out {mesh.left_out} squares") for note in mesh.notes)
@@ -162,7 +162,7 @@ def test_squares_left_out_are_told_of_files_that_are_joined(tmp_path):
     half = vertices[faces].mean(axis=1)[:, 0] < 0
     both = np.concatenate([faces[half], faces[~half] + len(vertices)])
     path = write_obj(tmp_path / "cap.obj", np.concatenate([vertices, vertices]), both)
-    done = run(path, "-o", tmp_path / "q.npz", "--quads", 500)
+    done = run(path, "-o", tmp_path / "q.npz", "--quads", 500, "--boundary", "free")
     assert "note: Closed" in done.output
     assert f"note: Left out {QuadMesh.load(tmp_path / 'q.npz').left_out} squares" in done.output
 

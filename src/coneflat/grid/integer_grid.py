@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import GridError, OptionError
+from ..errors import CurvatureError, GridError, MetricError, OptionError
 from ..geometry.planar import signed_double_areas
+from ..input.arrays import as_input
+from ..input.validation import check_mesh
 from ..layout.relax import StretchEnergy
 from ..mesh import NEXT
 from ..pipeline import flatten
@@ -24,7 +26,7 @@ from .attempt import area_of, attempt, scaled
 from .coarsest import TRIES, coarsest_grid
 from .given_cones import require_quarters
 from .integer_map import IntegerGrid
-from .sharp_edges import sharp_layouts
+from .sharp_edges import not_taken, sharp_layouts
 from .split import between_whole, split_edges
 
 # What the grid wants of a flattening: three, five or six quads at a cone, and rotations that are quarter turns.
@@ -68,7 +70,8 @@ def integer_grid(
         sharp_angle: radians: edges at which the surface bends by more come to lie on grid lines, and the boundary with
             them; None for none.
         options: of `coneflat.flatten`; by default cones have three, five or six quads. Cones that are given have
-            curvatures, multiples of pi/2; on surfaces with handles, or several boundaries, few have a grid.
+            curvatures, multiples of pi/2; on surfaces with handles, or several boundaries, few have a grid. boundary
+            may be "auto", too, and is by default: "straight" where that has a grid and cones are not given, or "free".
 
     Raises:
         GridError: no grid of this size was found that turns no triangle over.
@@ -82,41 +85,40 @@ def integer_grid(
         before.
     """
     check_extent(quads, size, coarsest)
-    progress, energy = options.get("progress"), StretchEnergy(stretch)
-    stages = Stages(progress)
-    told: tuple[str, ...] = ()
+    given = {name: value for name, value in options.items() if name != "progress"}
+    search = _Search(
+        mesh, faces, quads, size, coarsest, StretchEnergy(stretch), given, options.get("progress")
+    )
     if isinstance(mesh, Flattening):
-        if faces is not None or options.keys() - {"progress"} or sharp_angle is not None:
+        if faces is not None or given or sharp_angle is not None:
             raise OptionError("a flattening has its faces and options: none can be given beside it")
-        result = mesh
-    elif sharp_angle is not None:
+        return search.of_result(mesh)
+    boundary = given.pop("boundary", "auto")
+    if sharp_angle is not None:
         if coarsest:
             raise OptionError(
                 "sharp edges need to be told how large quads are: leave out coarsest, or sharp_angle"
             )
-        given = {**options, "sharp_angle": sharp_angle}
-        given.pop("progress", None)
-        with stages("grid"):
-            wanted = None if size is not None else quads or QUADS
-            found = _sharp(mesh, faces, wanted, size, given, energy, progress)
-        return replace(found, seconds=stages.seconds)
-    else:
-        with stages("flatten"):
-            result = flatten(mesh, faces, **{**_defaults(options), **options})
-        # What a map does not keep of its promises is not what the grid does not keep.
-        told = tuple(note for note in result.notes if note not in broken_promises(result))
-    stages.done = 1.0
-    with stages("grid"), using_threads(result.settings.get("threads", THREADS)):
-        layout = aligned(result, QUADS if quads is None else quads, size)
-        found = _of_layout(layout, energy, coarsest, progress)
-    loose = _loose_border(layout) if result.settings.get("boundary") == "straight" else 0
-    notes = []
-    if loose:
-        notes.append(
-            f"{plural(loose, 'edge')} of the boundary {'is' if loose == 1 else 'are'} on no grid line: straight sides "
-            "of different loops do not point in the same directions, up to quarter turns."
-        )
-    return replace(found, notes=(*told, *found.notes, *notes), seconds=stages.seconds)
+        return search.with_lines(sharp_angle, boundary)
+    if boundary != "auto":
+        return search.with_boundary(boundary)
+    may_be_straight = isinstance(given.get("cones", "auto"), str)
+    if may_be_straight and _has_boundary(mesh, faces, bool(given.get("repair", False))):
+        try:
+            return search.with_boundary("straight", whole_sides=True)
+        except (CurvatureError, MetricError) as error:
+            why = f"The boundary cuts squares, as none was found with it on grid lines: {error}."
+        return _noted(search.with_boundary("free"), why)
+    return search.with_boundary("free")
+
+
+def _has_boundary(mesh: Any, faces: ArrayLike | None, repair: bool) -> bool:
+    given = as_input(mesh, faces)
+    return bool(check_mesh(given.vertices, given.faces, repair=repair).mesh.is_boundary_edge.any())
+
+
+def _noted(found: IntegerGrid, *notes: str) -> IntegerGrid:
+    return replace(found, notes=(*found.notes, *notes))
 
 
 def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -126,6 +128,89 @@ def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
         return OPTIONS if options.get("boundary") != "straight" else {**OPTIONS, **STRAIGHT}
     require_quarters(given)
     return {"charts": "one"}
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What is asked of a grid; attributes are the arguments of `integer_grid`."""
+
+    mesh: Any
+    faces: ArrayLike | None
+    quads: int | None
+    size: float | None
+    coarsest: bool
+    energy: StretchEnergy
+    options: dict[str, Any]
+    progress: Progress | None
+
+    def with_boundary(self, boundary: Any, whole_sides: bool = False) -> IntegerGrid:
+        """Return the grid of a flattening with a boundary; with straight sides, all on grid lines if that is wanted.
+
+        Raises:
+            GridError: there is none, or straight sides are on no grid lines where they are wanted there.
+        """
+        stages, options = Stages(self.progress), {**self.options, "boundary": boundary}
+        with stages("flatten"):
+            result = flatten(
+                self.mesh, self.faces, progress=self.progress, **{**_defaults(options), **options}
+            )
+        # What a map does not keep of its promises is not what the grid does not keep.
+        told = tuple(note for note in result.notes if note not in broken_promises(result))
+        stages.done = 1.0
+        with stages("grid"):
+            found = self._of_result(result, options, whole_sides)
+        return replace(found, notes=(*told, *found.notes), seconds=stages.seconds)
+
+    def of_result(self, result: Flattening) -> IntegerGrid:
+        """Return the grid of a flattening."""
+        stages = Stages(self.progress)
+        stages.done = 1.0
+        with stages("grid"):
+            found = self._of_result(result, None, whole_sides=False)
+        return replace(found, seconds=stages.seconds)
+
+    def with_lines(self, sharp_angle: float | str, boundary: Any) -> IntegerGrid:
+        """Return a grid with as many sharp edges on grid lines as can be, and the boundary with them."""
+        stages = Stages(self.progress)
+        boundary = "free" if boundary == "auto" else boundary
+        with stages("grid"):
+            found, why = self._along_axes({**self.options, "sharp_angle": sharp_angle, "boundary": boundary})
+        if found is not None:
+            return replace(found, seconds=stages.seconds)
+        return _noted(self.with_boundary(boundary), f"No sharp edge is on a grid line: {why}.")
+
+    def _of_result(
+        self, result: Flattening, options: dict[str, Any] | None, whole_sides: bool
+    ) -> IntegerGrid:
+        """Return the grid of a flattening with some options; None for one that was given."""
+        with using_threads(result.settings.get("threads", THREADS)):
+            layout = aligned(result, QUADS if self.quads is None else self.quads, self.size)
+            loose = _loose_border(layout) if result.settings.get("boundary") == "straight" else 0
+            if not loose:
+                return _of_layout(layout, self.energy, self.coarsest, self.progress)
+            if not self.coarsest and options is not None and not not_taken(options, OPTIONS):
+                # Relaxation turns them, which is not conformal.
+                turned, _ = self._along_axes(options)
+                if turned is not None:
+                    return turned
+            why = (
+                f"{plural(loose, 'edge')} of the boundary {'is' if loose == 1 else 'are'} on no grid line: straight "
+                "sides of different loops do not point in the same directions, up to quarter turns"
+            )
+            if whole_sides:
+                raise GridError(why)
+            return _noted(_of_layout(layout, self.energy, self.coarsest, self.progress), f"{why}.")
+
+    def _along_axes(self, options: dict[str, Any]) -> tuple[IntegerGrid | None, str]:
+        """Return a grid with the boundary on grid lines, and as many sharp edges as can be; or none, and why."""
+        why = "none is long enough for quads of this size"
+        wanted = None if self.size is not None else self.quads or QUADS
+        for found in sharp_layouts(self.mesh, self.faces, wanted, self.size, options, OPTIONS, self.progress):
+            with using_threads(options.get("threads", THREADS)):
+                grid, why = attempt(found.layout, self.energy)
+            if grid is not None:
+                return replace(grid, features=found.features, notes=(*grid.notes, *found.notes)), ""
+        return None, why
 
 
 def _of_layout(
@@ -147,34 +232,6 @@ def _of_layout(
 
     found = coarsest_grid(layout, energy, tell) if coarsest else _whole(layout, energy)
     return replace(found, notes=(*found.notes, *notes))
-
-
-def _sharp(
-    mesh: Any,
-    faces: ArrayLike | None,
-    quads: int | None,
-    size: float | None,
-    given: dict[str, Any],
-    energy: StretchEnergy,
-    progress: Progress | None,
-) -> IntegerGrid:
-    """Return a grid with as many sharp edges on grid lines as can be."""
-    why = "none is long enough for quads of this size"
-    for found in sharp_layouts(mesh, faces, quads, size, given, OPTIONS, progress):
-        with using_threads(given.get("threads", THREADS)):
-            grid, why = attempt(found.layout, energy)
-        if grid is not None:
-            return replace(grid, features=found.features, notes=(*grid.notes, *found.notes))
-    plain = integer_grid(
-        mesh,
-        faces,
-        size=size,
-        quads=quads,
-        progress=progress,
-        stretch=energy.stretch,
-        **{name: value for name, value in given.items() if name != "sharp_angle"},
-    )
-    return replace(plain, notes=(*plain.notes, f"No sharp edge is on a grid line: {why}."))
 
 
 def check_extent(quads: float | None, size: float | None, coarsest: bool) -> None:

@@ -161,8 +161,8 @@ def surface_gaps(quads: QuadMesh) -> tuple[float, float]:
 
 
 def _samples(mesh: TriangleMesh, apart: float) -> FloatArray:
-    """Return (s, 3) points of triangles, those of each in rows so far apart at most, and the vertices."""
-    parts = [mesh.vertices]
+    """Return (s, 3) points of triangles, those of each in rows so far apart at most, and their vertices."""
+    parts = [mesh.vertices[np.unique(mesh.faces)]]
     longest = edge_lengths(mesh.vertices, mesh.faces).max(axis=1)
     rows = np.minimum(np.ceil(longest / apart), MOST_ROWS).astype(np.int64)
     for count in np.unique(rows):

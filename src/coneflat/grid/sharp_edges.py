@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,7 +28,7 @@ from .sharp import CoarseError, PatchError, sharp_layout
 TAKEN = frozenset(
     (
         *("sharp_angle", "boundary", "min_cone_angle", "max_cone_angle", "distortion"),
-        *("creases", "repair", "strict", "solver"),
+        *("creases", "repair", "strict", "solver", "threads"),
     )
 )
 # Edges across the whole surface, about, that each has at least for the layout to bend along.
@@ -69,7 +69,7 @@ def sharp_layouts(
         mesh, faces: as `coneflat.flatten` takes them.
         quads: unit squares that cover the surface.
         size: of a square in model units, instead.
-        given: options, `sharp_angle` among them.
+        given: options; without `sharp_angle` the boundary alone comes to lie along the axes.
         usual: what they are where nothing is said of them, if that is not what `coneflat.flatten` has.
         progress: called before each patch is flattened.
 
@@ -78,9 +78,12 @@ def sharp_layouts(
         MeshError: as `coneflat.flatten`.
     """
     options: Options = read_options({**usual, **given})
-    _check_taken(given, options, read_options(usual))
-    angle = options.sharp_angle
-    assert angle is not None
+    others = not_taken(given, usual)
+    if others:
+        raise OptionError(
+            f"with sharp edges on grid lines, cones are found for each patch between them: {list_some(others)} cannot "
+            "be given beside sharp_angle"
+        )
     if options.boundary_kind not in ("free", "straight"):
         raise OptionError(f"sharp edges on grid lines need a straight boundary, not {options.boundary!r}")
     prepared = prepare(mesh, faces, replace(options, sharp_angle=None))
@@ -91,7 +94,8 @@ def sharp_layouts(
         square = float(np.sqrt(area / quads))
     else:
         square = float(np.ldexp(size, exponent))
-    given_edges = sharp_edges(checked, angle)
+    angle = options.sharp_angle
+    given_edges = np.empty(0, dtype=np.int64) if angle is None else sharp_edges(checked, angle)
 
     def tell(tries: int, patch: int, count: int) -> None:
         if progress is not None:
@@ -105,14 +109,11 @@ def sharp_layouts(
             )
 
 
-def _check_taken(given: Iterable[str], options: Options, usual: Options) -> None:
-    """Raise OptionError if options that have no effect are given, and differ from the usual ones."""
-    others = sorted(name for name in given if name not in TAKEN and _differ(options, usual, name))
-    if others:
-        raise OptionError(
-            f"with sharp edges on grid lines, cones are found for each patch between them: {list_some(others)} cannot "
-            "be given beside sharp_angle"
-        )
+def not_taken(given: Mapping[str, Any], usual: Mapping[str, Any]) -> list[str]:
+    """Return the names of options that have no effect here, and differ from the usual ones."""
+    options: Options = read_options({**usual, **given})
+    before: Options = read_options(usual)
+    return sorted(name for name in given if name not in TAKEN and _differ(options, before, name))
 
 
 def _differ(one: Options, other: Options, name: str) -> bool:
@@ -169,9 +170,11 @@ class _Search:
 
     def layouts(self) -> Iterator[tuple[Layout, IntArray]]:
         """Yield layouts and their features."""
+        with_edges = True
         for attempt in range(TRIES):
-            if not len(self.edges) and not self.mesh.is_boundary_edge.any():
+            if not len(self.edges) and not (with_edges and self.mesh.is_boundary_edge.any()):
                 return
+            with_edges = len(self.edges) > 0
             try:
                 layout = self._layout(attempt)
             except PatchError as error:

@@ -42,10 +42,11 @@ class QuadOptions(RunOptions, ConeBounds, ConeNumber):
         one_mesh=True,
     )
     boundary: str = option(
-        "free",
-        Choice(("free", "straight")),
-        "free: it runs across squares, and those that it cuts are left out. straight: it lies on grid lines, between "
-        "corners that the search finds like cones, and no square is lost.",
+        "auto",
+        Choice(("auto", "straight", "free")),
+        "straight: it lies on grid lines, between corners that the search finds like cones, and no square is lost. "
+        "free: it runs across squares, and those that it cuts are left out. auto: straight where such a grid is found, "
+        "unless cones are given.",
     )
     min_cone_angle: float = option(
         1.5 * math.pi,

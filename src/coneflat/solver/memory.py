@@ -11,7 +11,7 @@ from .back_ends import available
 LARGE = 1_000_000
 # Bytes at the peak of a flattening for each triangle, by what solves: measured on five and ten million. With cones of
 # which many are tried it is more; less is refused than does not fit.
-FACTORIZING, ITERATING = 1400, 1100
+FACTORIZING, ITERATING = 1400, 1000
 CGROUP = Path("/sys/fs/cgroup")
 
 

@@ -21,6 +21,8 @@ ROUNDING = 1e-14
 # What is left of the way to where the constraints hold counts as none below this, and as out of reach after a step that
 # goes less than this part of it.
 ARRIVED, STUCK = 1e-12, 1e-3
+# Part of the way that a step goes at most where seams and sides have to turn: on a longer one, sides fold over.
+TURNING_STRIDE = 0.1
 # Steps on the way there at most: what is reached takes ten or twenty.
 ON_THE_WAY = 60
 
@@ -51,6 +53,7 @@ def descend(
     tolerance: float,
     steps: int,
     tell: Callable[[int, float], bool | None] | None = None,
+    stride: float = 1.0,
 ) -> Descent:
     """Return points of less energy, as far as Newton's method comes.
 
@@ -65,6 +68,7 @@ def descend(
         tolerance: part of its energy above the least that a step must promise to gain for a part to go on.
         steps: at most.
         tell: called with the number of steps and the energy; True ends it.
+        stride: part of the way to where constraints hold that a step goes at most.
 
     Raises:
         MetricError: the Hessian is singular in double precision.
@@ -100,7 +104,8 @@ def descend(
         change = elements.change(step)
         length = np.full(parts, np.inf)
         np.minimum.at(length, part, maps.largest_steps(change))
-        length = np.minimum(1.0, SHORT_OF_FLAT * length)
+        longest = min(1.0, stride / remaining) if remaining else 1.0
+        length = np.minimum(longest, SHORT_OF_FLAT * length)
         taken += 1
         for _ in range(HALVINGS):
             trial = maps.plus(length[part], change)

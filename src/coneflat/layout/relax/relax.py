@@ -20,7 +20,7 @@ from .constraints import PointConstraints, check_constraints
 from .elements import Elements
 from .energies import Energy, StretchEnergy
 from .motions import find_motions
-from .newton import descend
+from .newton import TURNING_STRIDE, descend
 
 # Part of the energy above the least that a step must promise to gain to be taken, and steps at most.
 TOLERANCE, STEPS = 1e-3, 100
@@ -122,7 +122,8 @@ def relax(
     elements = Elements(motions, corner, unit * rest, share)
     if not elements.count and not motions.has_offset:
         return Relaxed(places, 0.0, 0.0, 0, is_free)
-    found = descend(z, motions, elements, energy, tolerance, steps, progress)
+    stride = TURNING_STRIDE if checked.quarter_turns else 1.0
+    found = descend(z, motions, elements, energy, tolerance, steps, progress, stride)
     if found.remaining:
         raise ConvergenceError(
             f"constraints cannot be met without turning triangles over: {1 - found.remaining:.1%} of the way to them "
