@@ -16,7 +16,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "coneflat"
 #: Rooms, from the ground up; a room is a folder, or a file beside them.
 FLOORS: tuple[tuple[str, ...], ...] = (
     ("", "errors", "text"),
-    ("_arrays", "compiled", "threads", "progress"),
+    ("_arrays", "compiled", "threads", "progress", "kept"),
     ("mesh", "options"),
     ("geometry", "solver"),
     ("quality", "seams"),
@@ -40,6 +40,7 @@ HOLDS = {
     "compiled": "the decorator of kernels",
     "threads": "cores, two stages at once",
     "progress": "stages timed and told",
+    "kept": "what was computed last",
     "mesh": "half-edges, borders, components, genus",
     "options": "every option, declared once",
     "geometry": "lengths, angles, flips, predicates, overlap",
