@@ -55,7 +55,10 @@ class LinearModel:
 
     def weighing(self, share: FloatArray) -> LinearModel:
         """Return the model of the same mesh whose vertices (n,) count otherwise; the factorization serves both."""
-        return LinearModel(self.laplacian, self.curvature, self.is_boundary, self.operator.weighing(share))
+        operator = self.operator.weighing(share)
+        if operator is self.operator:
+            return self
+        return LinearModel(self.laplacian, self.curvature, self.is_boundary, operator)
 
     @property
     def inner(self) -> FloatArray:
