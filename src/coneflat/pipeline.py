@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeAlias
@@ -20,8 +21,7 @@ from .flat.methods import find_metric, turning_meter
 from .flat.more_cones import with_quality
 from .flat.relaxed import relaxed, relaxes
 from .geometry.operators import weighted_areas
-from .input.arrays import as_input
-from .input.components import Component, Prepared, Source, prepare
+from .input.components import Component, Prepared, prepare
 from .input.symmetry import SymmetryUse, are_mirrored, check_symmetry, find_symmetry, symmetry_notes
 from .layout.disk import cutting
 from .mesh import TriangleMesh
@@ -30,8 +30,10 @@ from .progress import Stages
 from .result.assemble import assemble
 from .result.flattening import Flattening
 from .solver import solving
-from .threads import one_blas_thread
+from .threads import using_threads
 
+#: Takes the first layout that there is.
+Early: TypeAlias = Callable[[Flattening], object]
 #: Returns a connected mesh with what follows from its (m, 3) lengths, on flips of edges if a metric may make them.
 SurfaceOf: TypeAlias = Callable[[TriangleMesh, FloatArray, bool], Surface]
 
@@ -62,65 +64,46 @@ def flatten_as(mesh: Any, faces: ArrayLike | None, options: Options) -> Flatteni
     with stages("check"):
         prepared = prepare(mesh, faces, options)
         check_symmetry(prepared.components, options)
-    return _flatten(prepared, Surface.of, options, stages)
+    return flatten_prepared(prepared, Surface.of, options, stages)
 
 
-class Flattener:
-    """Flattens one mesh again and again: what depends on it alone is found once, and kept.
-
-    That is the checked mesh, its intrinsic Delaunay triangulation, its Laplacian, factorized, and the Green's functions
-    of the cones used last. Results are those of `coneflat.flatten`, to the last bit.
-
-        flattener = Flattener(vertices, faces)
-        for curvature in (1.0, 1.5, 2.0):
-            flattener.flatten(cones={7: curvature, 12: None, 80: None})
+def flatten_prepared(
+    prepared: Prepared, surface_of: SurfaceOf, options: Options, stages: Stages, early: Early | None = None
+) -> Flattening:
+    """Flatten a checked mesh.
 
     Args:
-        mesh, faces: as of `coneflat.flatten`; arrays must not change afterwards.
-
-    Raises:
-        MeshError: it is no mesh, or its file cannot be read.
+        prepared: the mesh.
+        surface_of: returns what the choice of cones needs of a component.
+        options: that have been read.
+        stages: the stopwatch.
+        early: called with the first layout, one chart for each component, before triangles are relaxed and overlaps
+            parted.
     """
-
-    def __init__(self, mesh: Any, faces: ArrayLike | None = None) -> None:
-        self._source = Source(as_input(mesh, faces))
-        self._surfaces: dict[tuple[int, bool], Surface] = {}
-
-    def flatten(self, **options: Any) -> Flattening:
-        """Return the flattening by the options, and with the errors, of `coneflat.flatten`."""
-        return self.flatten_as(read_options(options))
-
-    def flatten_as(self, options: Options) -> Flattening:
-        """Return the flattening by options that have been read."""
-        stages = Stages(options.progress)
-        with stages("check"):
-            prepared = self._source.prepared(options)
-            check_symmetry(prepared.components, options)
-        meshes = {id(part.mesh) for part in prepared.components}
-        self._surfaces = {key: surface for key, surface in self._surfaces.items() if key[0] in meshes}
-        try:
-            return _flatten(prepared, self._surface, options, stages)
-        finally:
-            for surface in self._surfaces.values():
-                surface.search = None  # It remembers what it was asked before.
-
-    def _surface(self, mesh: TriangleMesh, lengths: FloatArray, flips: bool) -> Surface:
-        key = id(mesh), flips
-        if key not in self._surfaces:
-            self._surfaces[key] = Surface.of(mesh, lengths, flips)
-            self._surfaces[key].is_kept = True
-        return self._surfaces[key]
-
-
-def _flatten(prepared: Prepared, surface_of: SurfaceOf, options: Options, stages: Stages) -> Flattening:
-    """Flatten a checked mesh; `surface_of` returns what the choice of cones needs of a component."""
-    with one_blas_thread(), solving(options.solver) as solvers:
-        flat = list(_flat_components(prepared, surface_of, options, stages))
+    with using_threads(options.threads), solving(options.solver) as solvers:
+        runs = [flatten_component(part, surface_of, options, stages) for part in prepared.components]
+        if early is not None:
+            first = []
+            for i, run in enumerate(runs):
+                with _at_component(prepared, i, stages):
+                    first.append(next(run))
+            early(assemble(prepared, first, replace(options, charts="one"), Stages()))
+        flat = []
+        for i, run in enumerate(runs):
+            with _at_component(prepared, i, stages):
+                *_, last = run
+            flat.append(last)
+            stages.end_part()
     return replace(assemble(prepared, flat, options, stages), solvers=tuple(solvers.used))
 
 
-def flatten_component(part: Component, surface_of: SurfaceOf, options: Options, stages: Stages) -> LaidOut:
-    """Flatten a connected mesh: find cones, scale the metric, cut, lay out, and part what overlaps."""
+def flatten_component(
+    part: Component, surface_of: SurfaceOf, options: Options, stages: Stages
+) -> Iterator[LaidOut]:
+    """Flatten a connected mesh: find cones, scale the metric, cut, lay out, and part what overlaps.
+
+    The layout comes twice: as soon as there is one, and when it is what was asked for.
+    """
     mesh = part.mesh
     with stages("cones", 0.1):
         surface = surface_of(mesh, part.lengths, options.method in UNFOLDED and not options.refine)
@@ -142,16 +125,23 @@ def flatten_component(part: Component, surface_of: SurfaceOf, options: Options, 
             use = None if symmetry is None else SymmetryUse(symmetry, is_mirrored, disk.is_symmetric)
             return replace(laid_out, symmetry=use)
 
-    def flatten_by(options: Options) -> LaidOut:
+    def flatten_held(options: Options) -> LaidOut:
         once = partial(flatten_once, options=options)
         may_lack_room = pursues(mesh, options) and options.method in UNFOLDED
-        layout = with_held_cones(once, part) if may_lack_room else once(part)
-        if not relaxes(options):
+        return with_held_cones(once, part) if may_lack_room else once(part)
+
+    first = flatten_held(options)
+    yield first
+
+    def flatten_by(asked: Options) -> LaidOut:
+        layout = first if asked is options else flatten_held(asked)
+        if not relaxes(asked):
             return layout
         with stages("relax", 0.96):
-            return relaxed(layout, part, options, stages.tell)
+            return relaxed(layout, part, asked, stages.tell)
 
     layout = with_quality(flatten_by, part, options)
+    surface.search = None  # It remembers what it was asked for, and takes much memory.
     if options.charts == "atlas":
         with stages("atlas", 1.0):
             part_charts = overlaid if options.mirrored == "overlap" else without_overlaps
@@ -160,21 +150,19 @@ def flatten_component(part: Component, surface_of: SurfaceOf, options: Options, 
     notes = cone_notes(mesh, len(layout.cones), reached, options) + symmetry_notes(layout.symmetry)
     if options.method in UNFOLDED:
         notes += unheld_notes(layout, part.constraints.names) + split_notes(layout, part.constraints.names)
-    return replace(layout, notes=layout.notes + notes)
+    yield replace(layout, notes=layout.notes + notes)
 
 
-def _flat_components(
-    prepared: Prepared, surface_of: SurfaceOf, options: Options, stages: Stages
-) -> Iterator[LaidOut]:
-    """Yield the flattened components; errors say which one cannot be flattened, if there are several."""
-    for part in prepared.components:
-        stages.share = len(part.faces) / len(prepared.checked.mesh.faces)
-        try:
-            yield flatten_component(part, surface_of, options, stages)
-        except (CurvatureError, MetricError, SeamError) as error:
-            if len(prepared.components) == 1:
-                raise
-            first = part.constraints.names[0]
-            where = f"in the component of vertex {first} ({len(part.faces):,} triangles)"
-            raise type(error)(f"{where}: {error}") from error
-        stages.end_part()
+@contextmanager
+def _at_component(prepared: Prepared, number: int, stages: Stages) -> Iterator[None]:
+    """Work on a component inside; errors say which one cannot be flattened, if there are several."""
+    part = prepared.components[number]
+    stages.share = len(part.faces) / len(prepared.checked.mesh.faces)
+    try:
+        yield
+    except (CurvatureError, MetricError, SeamError) as error:
+        if len(prepared.components) == 1:
+            raise
+        first = part.constraints.names[0]
+        where = f"in the component of vertex {first} ({len(part.faces):,} triangles)"
+        raise type(error)(f"{where}: {error}") from error

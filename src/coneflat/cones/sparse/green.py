@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
 from ..._arrays import BoolArray, FloatArray, IntArray
-from ...solver import Factor, factorize
+from ...solver import Factor, factorize, used_again
 
 # Right-hand sides solved at once: more gain nothing and cost memory, of which they take so many numbers at most.
 BATCH, NUMBERS = 32, 50_000_000
@@ -48,13 +48,17 @@ class GreenOperator:
         """Return the operator with other weights (n,); the factorization is the same."""
         if np.array_equal(areas, self._share):
             return self
-        _ = self._factor
+        _ = self._factorized  # which the copy has, too
         other = copy(self)
         other.areas, other._share, other._known = areas[self.vertices], areas, {}
         return other
 
-    @cached_property
+    @property
     def _factor(self) -> Factor:
+        return used_again(self._factorized)
+
+    @cached_property
+    def _factorized(self) -> Factor:
         inner = self.laplacian[1:][:, 1:] if self.is_closed else self.laplacian
         return factorize(csc_matrix(inner))
 
