@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ...flattener import Flattener
     from ...input.join import Joined
     from ...result.flattening import Flattening
+    from ...view.page.content import Model
 
 #: Polygons from which on the first layout is shown, too: of smaller meshes the last is there as soon.
 EARLY = 20_000
@@ -86,6 +87,7 @@ class Bench:
         self._early_from = early_from
         self._source: Joined | None = None
         self._flattener: Flattener | None = None
+        self._model: Model | None = None
         self._read: tuple[str, str] | None = None
 
     def flatten(
@@ -109,14 +111,14 @@ class Bench:
 
         def show_first(first: Flattening) -> None:
             told_on("first view", furthest)
-            show(*_picture(first, name, is_first=True))
+            show(*self._picture(first, name, is_first=True))
 
         chosen = arguments(source, job["choices"])
         is_large = len(source.mesh.offsets) - 1 >= self._early_from
         result = flattener.flatten(early=show_first if is_large else None, progress=told_on, **chosen)
         result = replace(result, notes=source.notes_of(result.notes))
         told("picture", 1.0)
-        picture = _picture(result, name)
+        picture = self._picture(result, name)
         self.result = result
         return picture
 
@@ -137,34 +139,35 @@ class Bench:
         write_stream(self.result, stream, ending)
         return stream.getvalue()
 
+    def _picture(self, result: Flattening, name: str, is_first: bool = False) -> tuple[Head, bytes]:
+        """Return what the page shows of a result; of the first layout no numbers, which will be others."""
+        from ...result.from_uv import shown_rows
+        from ...view.page.content import Model, content_of
+        from ...view.page.payload import Told, head_and_block
+        from ...view.page.webpage import MOST_TRIANGLES
+
+        told = None
+        if is_first:
+            rows = [(measure, TO_COME, meaning) for measure, _, meaning in shown_rows(result)]
+            told = Told(FIRST, rows)
+            result = replace(result, notes=())
+        if self._model is None or not self._model.is_of(result):
+            self._model = Model.of(result)
+        content = content_of(result, MOST_TRIANGLES, self._model)
+        head, block = head_and_block(result, content, None, name, "y", "checker", told)
+        cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
+        return {"head": head, "found": cones.tolist(), "seconds": result.seconds}, block
+
     def _open(self, mesh: str, sha256: str, told: Callable[[str, float], None]) -> tuple[Joined, Flattener]:
         from ...files.read import read_joined
         from ...flattener import Flattener
 
         if self._source is None or self._flattener is None or self._read != (mesh, sha256):
             told("read", 0.0)
-            self._source = self._flattener = None  # There may not be memory for both.
+            self._source = self._flattener = self._model = None  # There may not be memory for both.
             source = read_joined(Path(mesh))
             self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
         return self._source, self._flattener
-
-
-def _picture(result: Flattening, name: str, is_first: bool = False) -> tuple[Head, bytes]:
-    """Return what the page shows of a result; of the first layout no numbers, which will be others."""
-    from ...result.from_uv import shown_rows
-    from ...view.page.content import content_of
-    from ...view.page.payload import Told, head_and_block
-    from ...view.page.webpage import MOST_TRIANGLES
-
-    told = None
-    if is_first:
-        rows = [(measure, TO_COME, meaning) for measure, _, meaning in shown_rows(result)]
-        told = Told(FIRST, rows)
-        result = replace(result, notes=())
-    content = content_of(result, MOST_TRIANGLES)
-    head, block = head_and_block(result, content, None, name, "y", "checker", told)
-    cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
-    return {"head": head, "found": cones.tolist(), "seconds": result.seconds}, block
 
 
 def arguments(source: Joined, choices: dict[str, Any]) -> dict[str, Any]:
