@@ -9,8 +9,10 @@ import shapes
 import coneflat
 from coneflat.apps.studio.child import TO_COME, Bench
 from coneflat.apps.studio.choices import Choices
+from coneflat.apps.studio.known import MOST, Known, with_prints
 from coneflat.apps.studio.serve import Teller
 from coneflat.apps.studio.session import Session
+from coneflat.view.page.payload import pack
 
 
 class Mute:
@@ -40,7 +42,7 @@ class TestFirstViews:
 
     @staticmethod
     def answer(session, kind, job, name):
-        told = {"head": {"title": name}, "found": [job], "seconds": {"metric": 1.0}}
+        told = {"head": {"title": name, "arrays": []}, "found": [job], "seconds": {"metric": 1.0}}
         session._hear({"job": job, kind: told}, name.encode())
 
     def shown(self, session):
@@ -135,3 +137,63 @@ def test_another_mesh_takes_the_place_of_what_was_kept(tmp_path):
         job = {"mesh": str(path), "sha256": name, "choices": Choices().as_plain()}
         bench.flatten(job, lambda *_: None, lambda *_: None)
         np.testing.assert_array_equal(bench.result.uv, coneflat.flatten(path).uv)
+
+
+class TestKnownArrays:
+    """Arrays that the page has already."""
+
+    @staticmethod
+    def picture(**arrays):
+        listed, block = pack({name: np.array(values) for name, values in arrays.items()})
+        return with_prints({"arrays": listed}, block), block
+
+    @staticmethod
+    def arrays_of(picture, others=None):
+        """What a page makes of a picture, with those of another one."""
+        head, block = picture
+        found = {}
+        for each in head["arrays"]:
+            kind = np.dtype(each["type"])
+            begin = each["offset"]
+            found[each["name"]] = (
+                others[each["name"]]
+                if begin is None
+                else np.frombuffer(block, kind, each["count"], begin).tolist()
+            )
+        return found
+
+    def test_only_those_that_changed_are_told(self):
+        known = Known()
+        first = known.numbered(self.picture(places=[1.0, 2.0], tints=np.uint8([1, 2, 3]), uv=[0.5]))
+        second = known.numbered(self.picture(places=[1.0, 2.0], tints=np.uint8([1, 2, 4]), uv=[0.5]))
+        whole = known.without(0, second)
+        less = known.without(first[0]["number"], second)
+        assert [each["offset"] is None for each in less[0]["arrays"]] == [True, False, True]
+        assert len(less[1]) < len(whole[1])
+        assert self.arrays_of(less, self.arrays_of(first)) == self.arrays_of(whole)
+        assert self.arrays_of(whole) == {"places": [1.0, 2.0], "tints": [1, 2, 4], "uv": [0.5]}
+
+    def test_of_others_of_the_same_length_and_of_pictures_forgotten_all_is_told(self):
+        known = Known()
+        first = known.numbered(self.picture(places=[1.0, 2.0]))
+        for value in range(MOST):
+            last = known.numbered(self.picture(places=[1.0, 3.0 + value]))
+            assert known.without(first[0]["number"], last)[0]["arrays"][0]["offset"] == 0
+        again = known.numbered(self.picture(places=[1.0, 2.0]))
+        assert known.without(first[0]["number"], again)[0]["arrays"][0]["offset"] == 0
+
+    def test_a_move_of_a_cone_sends_no_model_again(self, tmp_path):
+        session = Session(tmp_path)
+        try:
+            session.open(shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3)))
+            assert session.wait_until_idle(120)
+            first = session.picture()
+            session.act({"do": "angle", "vertex": session.state()["found"][0], "degrees": 200})
+            assert session.wait_until_idle(120)
+            whole, less = session.picture(), session.picture(first[0]["number"])
+        finally:
+            session.close()
+        left_out = {each["name"] for each in less[0]["arrays"] if each["offset"] is None}
+        assert left_out >= {"places", "curvature", "sequential", "diverging", "tints"}
+        assert "uv" not in left_out
+        assert self.arrays_of(less, self.arrays_of(first)) == self.arrays_of(whole)

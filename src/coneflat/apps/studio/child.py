@@ -19,6 +19,7 @@ from typing import IO, TYPE_CHECKING, Any
 from ...errors import ConeflatError, NonManifoldError, NonOrientableError, StudioError
 from ...progress import asking
 from .frames import Head, read_frame, write_frame
+from .known import with_prints
 
 if TYPE_CHECKING:
     from ...flattener import Flattener
@@ -156,7 +157,8 @@ class Bench:
         content = content_of(result, MOST_TRIANGLES, self._model)
         head, block = head_and_block(result, content, None, name, "y", "checker", told)
         cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
-        return {"head": head, "found": cones.tolist(), "seconds": result.seconds}, block
+        told_of = {"head": with_prints(head, block), "found": cones.tolist(), "seconds": result.seconds}
+        return told_of, block
 
     def _open(self, mesh: str, sha256: str, told: Callable[[str, float], None]) -> tuple[Joined, Flattener]:
         from ...files.read import read_joined

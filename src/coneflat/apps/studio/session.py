@@ -14,6 +14,7 @@ from ...text import shown
 from .choices import Choices
 from .frames import Head
 from .history import History
+from .known import Known
 from .project import Project, hash_of, read_project
 from .replay import command_line, python_lines
 from .worker import Worker
@@ -57,6 +58,7 @@ class Session:
         self._found: list[int] = []
         self._seconds: dict[str, float] = {}
         self._shown: tuple[Head, bytes] | None = None
+        self._known = Known()
         self._last: _Layout | None = None  # of an earlier change, while one on the way is shown
         self._answers: dict[int, tuple[Head, bytes]] = {}
         self._changed = threading.Condition(threading.RLock())
@@ -218,10 +220,13 @@ class Session:
                 "python": "" if name is None else python_lines(name, chosen),
             }
 
-    def picture(self) -> tuple[Head, bytes] | None:
-        """Return the layout that is shown: numbers and texts, and arrays; None where there is none yet."""
+    def picture(self, known: int = 0) -> tuple[Head, bytes] | None:
+        """Return the layout that is shown: numbers and texts, and arrays; None where there is none yet.
+
+        known: the number of a picture whose arrays need not be told again.
+        """
         with self._changed:
-            return self._shown
+            return None if self._shown is None else self._known.without(known, self._shown)
 
     def export(self, ending: str) -> bytes:
         """Return the result of what is chosen, as a file.
@@ -295,7 +300,7 @@ class Session:
     def _show(self, told: Head, body: bytes) -> None:
         self.layout += 1
         self._found, self._seconds = told["found"], told["seconds"]
-        self._shown = told["head"], body
+        self._shown = self._known.numbered((told["head"], body))
 
     def _go_back(self) -> None:
         """Work no more, and show the last layout that was finished instead of one on the way."""

@@ -9,11 +9,11 @@ async function unpackModel(head, text) {
   return modelOf(head, await new Response(stream).arrayBuffer(), 0);
 }
 
-/** Return the model whose arrays lie in a block of bytes from some place on, a multiple of four. */
-function modelOf(head, block, begin) {
+/** Return the model whose arrays lie in a block of bytes from some place on, a multiple of four, or are another's. */
+function modelOf(head, block, begin, other) {
   const arrays = {};
   for (const {name, type, offset, count} of head.arrays) {
-    arrays[name] = new ARRAY_TYPES[type](block, begin + offset, count);
+    arrays[name] = offset === null ? other.arrays[name] : new ARRAY_TYPES[type](block, begin + offset, count);
   }
   return new Model(head, arrays);
 }
@@ -118,7 +118,8 @@ class Model {
   hasSurfaceOf(other) {
     const mine = this.arrays, its = other.arrays;
     if (mine.faces.length !== its.faces.length || mine.places.length !== its.places.length) return false;
-    for (let i = 0; i < mine.places.length; i++) if (mine.places[i] !== its.places[i]) return false;
+    const areSame = mine.places === its.places;
+    for (let i = 0; i < mine.places.length && !areSame; i++) if (mine.places[i] !== its.places[i]) return false;
     for (let c = 0; c < mine.faces.length; c++) {
       if (mine.point_vertex[mine.faces[c]] !== its.point_vertex[its.faces[c]]) return false;
     }
