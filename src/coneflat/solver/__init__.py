@@ -4,7 +4,7 @@ The ladder, best first: MKL PARDISO (pypardiso) for large systems, CHOLMOD witho
 (SciPy), and conjugate gradients with multigrid (pyamg) for what fits no factorization.
 """
 
-from .back_ends import HermitianFactor, available, factorize, solving
+from .back_ends import HermitianFactor, available, factorize, solving, used_again
 from .factors import Factor, NotPositiveDefinite
 from .memory import fitting_solver
 
@@ -16,4 +16,5 @@ __all__ = [
     "factorize",
     "fitting_solver",
     "solving",
+    "used_again",
 ]

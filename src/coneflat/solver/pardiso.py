@@ -50,6 +50,7 @@ class PardisoFactor:
     same, bit for bit, from one run to the next, and differ in the last digits between numbers of threads.
     """
 
+    name = "pardiso"
     break_even = 30
 
     def __init__(self, matrix: csc_matrix, kind: int = POSITIVE_DEFINITE) -> None:

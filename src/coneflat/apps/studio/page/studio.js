@@ -10,7 +10,7 @@ class Studio {
     this.viewer = this.news = this.refused = null;
     this.layout = 0;
     this.pending = 0;
-    this.took = 0; // milliseconds from the last change to its picture
+    this.took = this.sight = 0; // milliseconds from the last change to its picture, and to the first view of it
     this.selected = null; // the vertex of the cone that is picked, whatever number it has
     this.tools = new Tools(this);
     this.overlay = new Overlay(this);
@@ -46,7 +46,7 @@ class Studio {
   async hear() {
     document.body.classList.toggle("empty", !this.news.mesh);
     if (this.news.layout && this.news.layout !== this.layout) {
-      this.take(await this.server.layout());
+      this.take(await this.server.layout(this.viewer?.model));
       this.layout = this.news.layout;
     }
     this.panel.show();
@@ -71,12 +71,16 @@ class Studio {
     if (!isSame) this.selected = null;
     this.repicking = false;
     this.pickSelected();
-    requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime()));
+    const {asked, news} = this;
+    requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime(asked, news.early)));
   }
 
-  noteTime() {
-    if (!this.asked) return;
-    this.took = performance.now() - this.asked;
+  /** Note that what was asked for at some time is drawn, or a first view of it. */
+  noteTime(asked, isEarly) {
+    if (!asked || asked !== this.asked) return;
+    this.sight ||= performance.now() - asked;
+    if (isEarly) return;
+    this.took = performance.now() - asked;
     this.asked = 0;
     this.panel.showWork();
   }
@@ -85,6 +89,7 @@ class Studio {
 
   async act(action) {
     this.asked = performance.now();
+    this.sight = 0;
     this.refused = null;
     this.pending++;
     try {
