@@ -9,7 +9,7 @@ import pytest
 import shapes
 
 pytest.importorskip("starlette", reason="the extra studio is not installed")
-pytest.importorskip("httpx")
+pytest.importorskip("httpx2")
 from starlette.testclient import TestClient
 
 from coneflat.apps.studio.choices import Choices

@@ -264,7 +264,7 @@ def test_frames_come_whole_or_not_at_all():
 
 def test_the_command_prints_its_address_first_and_lives_on_this_machine(tmp_path, mesh):
     pytest.importorskip("uvicorn")
-    httpx = pytest.importorskip("httpx")
+    httpx = pytest.importorskip("httpx2")
     command = [sys.executable, "-m", "coneflat", "studio", "ball.obj", "--no-open"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
         try:
