@@ -19,7 +19,7 @@ from ..seams import CutMesh, edge_costs, open_along
 from ..text import list_some, plural
 from .arrays import InputMesh, as_input
 from .constraints import Constraints, locate_constraints
-from .marked_edges import effective_marks, marked_edges, named_edges
+from .marked_edges import edges_within, effective_marks, marked_edges, named_edges, out_of_reach
 from .numbering import at_unit_size, lengths_of_input, turn_corners
 from .validation import CheckedMesh, check_mesh
 
@@ -90,6 +90,7 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
     forbidden = np.zeros(len(checked.mesh.edges), dtype=bool)
     if options.forbidden_seams is not None:
         forbidden[named_edges(checked, np.asarray(options.forbidden_seams))] = True
+    forbidden |= edges_within(checked, options.seamless, len(np.asarray(given.vertices)))
     marked = np.empty(0, dtype=np.int64)
     opened = CutMesh(checked.mesh, np.arange(len(checked.mesh.vertices)))
     if options.marks_seams:
@@ -107,15 +108,17 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
     def components() -> Iterator[Component]:
         for part, vertices, part_faces in opened.mesh.split_components():
             origin = opened.origin[vertices]
+            is_forbidden = forbidden[checked.mesh.halfedge_edges].reshape(-1, 3)[part_faces]
+            own = constraints.within(origin)
             yield Component(
                 part,
                 origin,
                 part_faces,
                 lengths[part_faces],
                 is_diagonal[part_faces],
-                forbidden[checked.mesh.halfedge_edges].reshape(-1, 3)[part_faces],
+                is_forbidden,
                 None if seen is None else seen[origin],
-                constraints.within(origin),
+                own.without(out_of_reach(part, is_forbidden)) if is_forbidden.any() else own,
             )
 
     return Prepared(given, checked, tuple(notes), tuple(components()), checked.mesh.edges[marked], own)

@@ -14,6 +14,7 @@ from ...text import shown
 from .choices import Choices
 from .frames import Head
 from .history import History
+from .paint import Region
 from .project import Project, hash_of, read_project
 from .replay import command_line, python_lines
 from .worker import Worker
@@ -48,6 +49,7 @@ class Session:
         self._seconds: dict[str, float] = {}
         self._shown: tuple[Head, bytes] | None = None
         self._answers: dict[int, tuple[Head, bytes]] = {}
+        self._written: tuple[Choices | None, dict[str, str]] = None, {}
         self._changed = threading.Condition(threading.RLock())
         self._listeners: list[Callable[[], None]] = []
         self._worker = Worker(self._hear, self._mourn)
@@ -125,7 +127,8 @@ class Session:
         Args:
             action: what to `do`: "set" an option (`name`, `value`), take the cones by "hand", "add", "move", "remove",
                 "angle" or "lock" a cone (`vertex`; `to`, `degrees`, `locked`), "cut" or "keep" a `path`, "erase" an
-                `edge`, "undo", "redo", or "again". Steps of the same `stroke` are undone together.
+                `edge`, "paint" a `layer` (`where`; `weight`), take or leave a "corner" (`vertex`), show lengths in
+                "units" (`of_file`, `shown`), "undo", "redo", or "again". Steps of one `stroke` are undone together.
 
         Raises:
             StudioError: it makes no sense, or cannot be done.
@@ -138,16 +141,32 @@ class Session:
             if kind == "again":
                 self._flatten()
             elif kind in ("undo", "redo"):
+                before = history.now
                 if history.undo() if kind == "undo" else history.redo():
-                    self._flatten()
+                    self._follow(before)
             else:
                 try:
                     chosen = _STEPS[str(kind)](history.now, action, self._found)
                 except (KeyError, TypeError) as error:
                     raise StudioError(f"the studio does nothing by {shown(dict(action))}") from error
-                chosen.keywords()
-                if history.change(chosen, action.get("stroke")):
-                    self._flatten()
+                self._take(chosen, action.get("stroke"))
+
+    def _take(self, chosen: Choices, stroke: object) -> None:
+        """Take a step, if it is one."""
+        chosen.keywords()
+        before = self._history.now
+        if self._history.change(chosen, stroke):
+            self._follow(before)
+
+    def _follow(self, before: Choices) -> None:
+        """Do what follows from a step: a layout, or no more than that what is chosen is kept and told."""
+        if not self._history.now.flattens_like(before):
+            self._flatten()
+            return
+        trouble = self._trouble
+        self._save()
+        self._trouble = self._trouble or trouble
+        self._tell()
 
     def _flatten(self) -> None:
         assert self._mesh is not None
@@ -196,9 +215,18 @@ class Session:
                 "layout": self.layout,
                 "found": self._found,
                 "seconds": sum(self._seconds.values()),
-                "command": "" if name is None else command_line(name, project, chosen),
-                "python": "" if name is None else python_lines(name, chosen),
+                **self._replayed(),
             }
+
+    def _replayed(self) -> dict[str, str]:
+        """Return what makes the same layout without the studio; it is written once for each change."""
+        chosen, mesh = self._history.now, self._mesh
+        if mesh is None or self.project_file is None:
+            return {"command": "", "python": ""}
+        if self._written[0] is not chosen:
+            command = command_line(mesh.name, self.project_file.name, chosen)
+            self._written = chosen, {"command": command, "python": python_lines(mesh.name, chosen)}
+        return self._written[1]
 
     def picture(self) -> tuple[Head, bytes] | None:
         """Return the layout that is shown: numbers and texts, and arrays; None where there is none yet."""
@@ -315,4 +343,9 @@ _STEPS: dict[str, Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]
     "cut": lambda chosen, action, found: chosen.cut(tuple(action["path"])),
     "keep": lambda chosen, action, found: chosen.keep_whole(tuple(action["path"])),
     "erase": lambda chosen, action, found: chosen.erased(*(as_whole("a vertex", v) for v in action["edge"])),
+    "paint": lambda chosen, action, found: chosen.painted(
+        action["layer"], Region.of_text(action["where"]), action.get("weight")
+    ),
+    "corner": lambda chosen, action, found: chosen.cornered(_vertex(action)),
+    "units": lambda chosen, action, found: chosen.measured_in(action["of_file"], action["shown"]),
 }

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...files.texture import Texture
+from ...geometry import double_areas, edge_lengths
 from ...geometry.normals import CREASE_COSINE
+from ...mesh import end_corners
 from ...quality.checker import CELLS
 from ...result.from_uv import shown_rows
 from ..colours import DIVERGING, SEQUENTIAL, as_plain, color_table
@@ -102,6 +104,8 @@ def head_and_block(
         "uv_low": low.tolist(),
         "uv_high": high.tolist(),
         "uv_side": content.uv_side,
+        "radius": content.radius,
+        "sizes": _sizes(result, content),
         "squares": told.squares,
         "crease_cosine": CREASE_COSINE,
         "scales": {key: as_plain(key, scale) for key, scale in content.scales.items()},
@@ -110,6 +114,22 @@ def head_and_block(
         "arrays": listed,
     }
     return head, block
+
+
+def _sizes(result: Flattening, content: Content) -> dict[str, float]:
+    """Return the area of a model and the lengths of its seams and its boundary, in radii of the ball it is shown in."""
+    area = (
+        double_areas(edge_lengths((result.vertices - content.centre) / content.radius, result.faces)).sum()
+        / 2
+    )
+    ends = [content.point_vertex[content.faces.reshape(-1)[end]] for end in end_corners(content.outline)]
+    lengths = np.linalg.norm(content.places[ends[1]] - content.places[ends[0]], axis=1)
+    seams = slice(0, 2 * content.seams, 2)  # each has two sides
+    return {
+        "area": float(area),
+        "seams": float(lengths[seams].sum()),
+        "boundary": float(lengths[2 * content.seams :].sum()),
+    }
 
 
 def _arrays(content: Content) -> dict[str, NDArray[Any]]:

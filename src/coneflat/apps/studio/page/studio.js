@@ -1,8 +1,10 @@
 // The studio at work: hears from the server what is so, and shows it.
 
 const DISTORTION = 0.2; // where none is chosen, as in `coneflat.flatten`
+const FAINT = 0.45; // how strongly paint is shown while nobody paints
 const RETRY = 1500; // milliseconds before the server is asked again that did not answer
-const NOTHING = {options: {}, by_hand: false, cones: [], cuts: [], kept: []};
+const NOTHING = {options: {}, by_hand: false, cones: [], cuts: [], kept: []}; // and perhaps paint, corners, units
+const STEP = 1.25; // by which a key makes the brush larger
 
 class Studio {
   constructor() {
@@ -13,6 +15,9 @@ class Studio {
     this.took = 0; // milliseconds from the last change to its picture
     this.selected = null; // the vertex of the cone that is picked, whatever number it has
     this.tools = new Tools(this);
+    this.paint = new Paint(this);
+    this.brush = new Brush(this);
+    this.follows = true; // Paths follow sharp edges.
     this.overlay = new Overlay(this);
     this.panel = new Panel(this);
     document.addEventListener("keydown", (event) => this.key(event), {capture: true});
@@ -49,6 +54,7 @@ class Studio {
       this.take(await this.server.layout());
       this.layout = this.news.layout;
     }
+    this.paint.hear();
     this.panel.show();
     this.viewer?.remark();
     if (!this.news.busy) document.documentElement.dataset.ready ??= String(Math.round(performance.now()));
@@ -58,13 +64,14 @@ class Studio {
   /** Show a layout. */
   take(model) {
     const isSame = this.viewer && model.hasSurfaceOf(this.viewer.model);
-    if (!isSame) this.edges = this.byNumber = null;
+    if (!isSame) this.edges = this.byNumber = this.boundary = null;
     this.points = null;
     this.repicking = true; // A pick that ends because things have other numbers now is no letting go.
     if (this.viewer) this.viewer.takeModel(model);
     else {
       this.viewer = window.coneflat = new Viewer(model, null);
       this.viewer.tool = this.tools;
+      this.viewer.state.set({marked: FAINT});
       this.viewer.marks.overlay = (pen, pane) => this.overlay.draw(pen, pane);
       this.viewer.state.listen((names) => names.has("picked") && this.notePick());
     }
@@ -98,6 +105,7 @@ class Studio {
 
   refuse(error) {
     this.refused = {text: error instanceof Refusal ? error.message : "the studio does not answer"};
+    this.paint.forget();
     this.panel.show();
   }
 
@@ -124,11 +132,12 @@ class Studio {
   }
 
   setTool(mode) {
-    if (["cut", "keep"].includes(mode) && this.viewer?.model.head.left_out) {
-      this.refuse(new Refusal("on a mesh that is thinned for display there are no edges to draw along"));
+    if (!["look", "cone"].includes(mode) && this.viewer?.model.head.left_out) {
+      this.refuse(new Refusal("a mesh that is thinned for display has too few vertices here to draw or paint on"));
       return;
     }
     this.tools.set(mode);
+    this.viewer?.state.set({marked: this.tools.paints ? 1 : FAINT});
     this.panel.show();
     this.viewer?.remark();
   }
@@ -143,7 +152,7 @@ class Studio {
     const control = event.ctrlKey || event.metaKey;
     if (event.altKey || (control && !["z", "y"].includes(name))) return;
     if (control) return this.obey(event, () => this.act({do: name === "z" && !event.shiftKey ? "undo" : "redo"}));
-    const tool = TOOLS.find(([, , letter]) => letter === name);
+    const tool = [...TOOLS, ...BRUSHES].find(([, , letter]) => letter === name);
     const vertex = this.selectedNumber(), row = this.coneRows().find((one) => one.vertex === vertex);
     const turn = (step) => () => row && this.setAngle(vertex, Math.max(this.panel.step(), this.panel.snapped(row.degrees + step)));
     const keys = {
@@ -152,6 +161,8 @@ class Studio {
       g: () => this.panel.angleField(vertex)?.select(), ",": turn(-this.panel.step()), ".": turn(this.panel.step()),
       Delete: () => this.remove(vertex), Backspace: () => this.remove(vertex),
     };
+    keys.f = () => this.setFollowing(!this.follows);
+    if (this.tools.paints) Object.assign(keys, {",": () => this.growBrush(1 / STEP), ".": () => this.growBrush(STEP)});
     if (name === "Escape") this.tools.endLine();
     const does = tool ? () => this.setTool(tool[0]) : keys[name];
     if (does) this.obey(event, does);
@@ -278,7 +289,39 @@ class Studio {
   }
 
   graph() {
-    return (this.edges ??= new EdgeGraph(this.viewer.model));
+    if (!this.edges) {
+      this.edges = new EdgeGraph(this.viewer.model);
+      this.edges.follow(this.follows);
+    }
+    return this.edges;
+  }
+
+  setFollowing(follows) {
+    this.follows = follows;
+    this.edges?.follow(follows);
+    this.panel.show();
+  }
+
+  growBrush(factor) {
+    this.brush.grow(factor);
+    this.panel.show();
+  }
+
+  /** The vertices on the boundary. */
+  boundaryVertices() {
+    if (!this.boundary) {
+      const {model} = this.viewer, ends = new Set();
+      for (let i = 2 * model.seamCount; i < model.arrays.outline.length; i++) {
+        for (const corner of model.outlineCorners(i)) ends.add(model.vertexAt(corner));
+      }
+      this.boundary = [...ends].filter((vertex) => this.numberOf(vertex) >= 0);
+    }
+    return this.boundary;
+  }
+
+  /** The corners of a rectangle, where they mean something. */
+  cornersShown() {
+    return this.tools.mode === "corner" || this.choices.options.boundary === "rectangle" ? this.choices.corners ?? [] : [];
   }
 }
 
