@@ -25,7 +25,7 @@ from coneflat.cones.sparse import search as cone_search
 from coneflat.input.components import prepare
 from coneflat.options import Options
 from coneflat.progress import Stages
-from coneflat.threads import one_blas_thread
+from coneflat.threads import using_threads
 
 DISTORTIONS = (0.1, 0.2, 0.3)
 
@@ -126,14 +126,13 @@ def main() -> None:
     for case, given in cases():
         if any(word in case for word in skipped):
             continue
-        with one_blas_thread():
-            part = max(
-                prepare(*given, *[None] * (2 - len(given)), options).components, key=lambda e: len(e.faces)
-            )
+        with using_threads():
+            mesh, faces = given if len(given) == 2 else (given[0], None)
+            part = max(prepare(mesh, faces, options).components, key=lambda e: len(e.faces))
             if not arguments.smallest <= len(part.mesh.faces) <= arguments.largest:
                 continue
             surface = choose.Surface.of(part.mesh, part.lengths)
-            if choose.only_choice(surface, part.wishes, options) is not None:
+            if choose.only_choice(surface, part.constraints, options) is not None:
                 continue
             operators: list[Any] = []
             coarse: list[Any] = []
@@ -153,7 +152,7 @@ def main() -> None:
                 (cone_search, "coarse_model", one_model),
             ]
             with patched(shared):
-                choose.search_on(surface, part.wishes, options, Stages(None))
+                choose.search_on(surface, part.constraints, options, Stages(None))
             for name, patches in chosen.items():
                 changes_model = any(name.startswith(word) for word in OPENING)
                 sharing = shared[:1] if changes_model else shared
@@ -162,7 +161,7 @@ def main() -> None:
                     gc.collect()
                     with patched(patches + sharing):
                         start = time.process_time()
-                        search = choose.search_on(surface, part.wishes, options, Stages(None))
+                        search = choose.search_on(surface, part.constraints, options, Stages(None))
                         opened = time.process_time()
                         found = search.fewest(distortion)
                     done = time.process_time()

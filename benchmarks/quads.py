@@ -124,7 +124,8 @@ def be_silent() -> None:
 
 def warm_up(make: Maker) -> None:
     """Have what is needed loaded."""
-    make(*shapes.sphere(3), 200)
+    vertices, faces = shapes.sphere(3)
+    make(vertices, faces, 200)
 
 
 def write(path: Path, mesh: TriangleMesh, count: int, make: Maker) -> float:

@@ -1,8 +1,9 @@
-"""How long the studio takes from a click to the picture: `python benchmarks/studio.py [MODEL:SPLITS...]`.
+"""How long the studio takes from a click to the picture: `python benchmarks/studio.py [MODEL:SPLITS[:MOVES]...]`.
 
 A split makes four triangles of each. The page is in a headless Chromium. After a search each cone is moved by hand to a
-neighbour and back; the seconds are from the request until the new layout is drawn. Those of the flattening are part of
-it, and what the process that does it has in memory at the end is told, too.
+neighbour and back. The seconds, medians, are from the request until the first view, where there is one, and until the
+layout is drawn; until the metric is there, and of the processor, in the process that flattens, whose memory is told,
+too: after the first layout, and after all moves.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import statistics
 import sys
 import tempfile
 import threading
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from common import model
@@ -24,6 +26,7 @@ from coneflat.apps.studio.session import Session
 SIZE = {"width": 1366, "height": 768}
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 MOVES = 8
+FLATTENED = ("check", "cones", "metric")  # stages until the metric is there
 PATIENCE = 300_000  # milliseconds
 SETTLED = "!studio.isBusy() && studio.layout === studio.news.layout && studio.layout > {} && !studio.asked"
 MOVE = """
@@ -36,16 +39,38 @@ MOVE = """
 """
 
 
-def moves(page: object, session: Session) -> tuple[list[float], list[float]]:
-    """Return the seconds of each move until it was drawn, and those of its flattening."""
-    took, flattened = [], []
-    for k in range(MOVES):
+@dataclass
+class Seconds:
+    """Of moves, one after the other: until the first view, until all is drawn, until the metric, of the processor."""
+
+    sight: list[float] = field(default_factory=list)
+    took: list[float] = field(default_factory=list)
+    metric: list[float] = field(default_factory=list)
+    processor: list[float] = field(default_factory=list)
+
+
+def moves(page: object, session: Session, count: int) -> Seconds:
+    """Return how long moves took."""
+    seconds = Seconds()
+    for k in range(count):
+        started = processor(session.worker_process)
         before = page.evaluate("studio.layout")  # type: ignore[attr-defined]
         page.evaluate(MOVE % k)  # type: ignore[attr-defined]
         page.wait_for_function(SETTLED.format(before), timeout=PATIENCE)  # type: ignore[attr-defined]
-        took.append(page.evaluate("studio.took") / 1000)  # type: ignore[attr-defined]
-        flattened.append(session.state()["seconds"])
-    return took, flattened
+        seconds.sight.append(page.evaluate("studio.sight") / 1000)  # type: ignore[attr-defined]
+        seconds.took.append(page.evaluate("studio.took") / 1000)  # type: ignore[attr-defined]
+        seconds.metric.append(sum(session.stages.get(stage, 0.0) for stage in FLATTENED))
+        seconds.processor.append(processor(session.worker_process) - started)
+    return seconds
+
+
+def processor(process: int | None) -> float:
+    """Return the seconds of the processor that a process has had, where the system tells."""
+    path = Path(f"/proc/{process}/stat")
+    if not path.exists():
+        return float("nan")
+    spent = path.read_text().rpartition(")")[2].split()[11:13]
+    return sum(map(int, spent)) / os.sysconf("SC_CLK_TCK")
 
 
 def memory(process: int | None) -> float:
@@ -55,7 +80,7 @@ def memory(process: int | None) -> float:
     return next((int(line.split()[1]) / 1024 for line in lines if line.startswith("VmRSS")), float("nan"))
 
 
-def measure(browser: object, name: str, splits: int, folder: Path) -> str:
+def measure(browser: object, name: str, splits: int, count: int, folder: Path) -> str:
     """Return a row of the table."""
     vertices, faces = model(name, splits)
     path = folder / f"{name}{splits}.off"
@@ -74,28 +99,35 @@ def measure(browser: object, name: str, splits: int, folder: Path) -> str:
         page.goto(f"http://127.0.0.1:{port}/?token=token")
         page.wait_for_selector("html[data-ready]", timeout=PATIENCE)
         page.wait_for_function(SETTLED.format(0), timeout=PATIENCE)
-        took, flattened = moves(page, session)
-        size = memory(session.worker_process)
+        first = memory(session.worker_process)
+        seconds = moves(page, session, count)
+        last = memory(session.worker_process)
         page.close()
         server.should_exit = True
         thread.join()
-    seconds = f"{statistics.median(took):.2f} | {max(took):.2f} | {statistics.median(flattened):.2f}"
-    return f"| {name} | {len(faces):,} | {seconds} | {size:.0f} |"
+    medians = map(statistics.median, (seconds.metric, seconds.sight, seconds.took))
+    numbers = " | ".join(
+        f"{each:.2f}" for each in (*medians, max(seconds.took), statistics.median(seconds.processor))
+    )
+    return f"| {name} | {len(faces):,} | {count} | {numbers} | {first:.0f} | {last:.0f} |"
 
 
 def main(words: list[str]) -> None:
     from playwright.sync_api import sync_playwright
 
     path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
-    print("| model | triangles | click to picture, s | longest, s | of it flattening, s | memory, MB |")
-    print("| --- | --- | --- | --- | --- | --- |")
+    print(
+        "| model | triangles | moves | metric, s | first view, s | picture, s | longest, s | processor, s | memory before, "
+        "MB | after, MB |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     with sync_playwright() as driver, tempfile.TemporaryDirectory() as folder:
         browser = driver.chromium.launch(
             executable_path=path, args=["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
         )
         for word in words or ["fandisk:0", "horse:0", "horse:1"]:
-            name, _, splits = word.partition(":")
-            print(measure(browser, name, int(splits or 0), Path(folder)), flush=True)
+            name, splits, count, *_ = [*word.split(":"), "", ""]
+            print(measure(browser, name, int(splits or 0), int(count or MOVES), Path(folder)), flush=True)
         browser.close()
 
 

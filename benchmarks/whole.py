@@ -14,6 +14,7 @@ import json
 import subprocess
 import sys
 import time
+from functools import partial
 
 import numpy as np
 from common import best_time, cases, model, peak_memory, shapes
@@ -86,7 +87,7 @@ def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
 
 def peers(best: Flattening) -> dict[str, float]:
     """Return the seconds that others take for the same mesh, of those that are installed."""
-    return {name: best_time(lambda name=name: PEERS[name].run(best), 1) for name in installed_peers()}
+    return {name: best_time(partial(PEERS[name].run, best), 1) for name in installed_peers()}
 
 
 def line(row: dict) -> str:

@@ -111,8 +111,7 @@ def blocks(pattern: list[str], size: int = 3):
             p, q = np.eye(3, dtype=int)[[(axis + 1) % 3, (axis + 2) % 3]]
             ring = [base, base + p, base + p + q, base + q]
             quads.append(np.stack(ring if step > 0 else ring[::-1], axis=1))
-    quads = np.concatenate(quads)
-    vertices, index = np.unique(quads.reshape(-1, 3), axis=0, return_inverse=True)
+    vertices, index = np.unique(np.concatenate(quads).reshape(-1, 3), axis=0, return_inverse=True)
     a, b, c, d = index.ravel().reshape(-1, 4).T
     faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     # Rounded a little, so that the curvature is not all in the corners.

@@ -19,6 +19,7 @@ from coneflat import (
     greedy_cones,
 )
 from coneflat.cones.fitted import fitted_cones
+from coneflat.cones.sparse.linear_model import LinearModel
 from coneflat.geometry.operators import vertex_areas
 
 
@@ -114,8 +115,8 @@ def fitted(shape, cones, curvatures, **bounds):
     areas = vertex_areas(shape[1], edge_lengths(*shape), len(curvature))
     areas /= areas.sum()
     bounds = {"min_cone_angle": 0.1, "max_cone_angle": None, **bounds}
-    given = laplacian, curvature, areas, is_boundary, chi, np.array(cones), np.array(curvatures)
-    solution = fitted_cones(*given, **bounds)
+    linear = LinearModel.of(laplacian, curvature, areas, is_boundary, None)
+    solution = fitted_cones(linear, chi, np.array(cones), np.array(curvatures), **bounds)
 
     def energy(curvatures):
         log_scale = cones_with_curvature(

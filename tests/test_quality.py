@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+SCRIPTS = ["mypy", "--config-file", "benchmarks/mypy.ini"]
 
 
-@pytest.mark.parametrize("arguments", [["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"]])
+@pytest.mark.parametrize(
+    "arguments", [["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"], SCRIPTS]
+)
 def test_passes(arguments):
     pytest.importorskip(arguments[0])
-    if arguments == ["mypy"] and np.lib.NumpyVersion(np.__version__) < "2.4.0":
+    if arguments[0] == "mypy" and np.lib.NumpyVersion(np.__version__) < "2.4.0":
         pytest.skip(
             "earlier numpy declares types of arrays by their number of axes, which later ones gave up"
         )

@@ -11,6 +11,7 @@ from coneflat.geometry import cotangent_laplacian, cotangents, edge_lengths
 from coneflat.options.declared import SOLVERS as SOLVER_NAMES
 from coneflat.solver import available, factorize, pardiso, solving
 from coneflat.solver.back_ends import HUGE, LARGE, MODULES, best_for
+from coneflat.threads import TINY, meanwhile, using_threads
 
 SOLVERS = [
     pytest.param(name, marks=pytest.mark.skipif(not available(name), reason=f"{name} is not installed"))
@@ -173,3 +174,41 @@ def test_scattered_parts_and_parts_of_a_whole_are_solved_by_what_is_fastest_for_
             assert factor.solve(right) == pytest.approx(expected, abs=1e-9)
             # No part is so large that nothing but multigrid fits into memory.
             assert list(choice.used)[-1] == best_for(min(max(whole, 1), LARGE))
+
+
+@pytest.mark.skipif(not available("pardiso"), reason="needs pypardiso")
+def test_the_number_of_threads_changes_nothing_but_rounding():
+    vertices, faces = shapes.sphere(5)
+    one, two, again = (flatten(vertices, faces, solver="pardiso", threads=n, max_cones=4) for n in (1, 3, 3))
+    assert one.cones.tolist() == two.cones.tolist()
+    assert one.log_scale == pytest.approx(two.log_scale, abs=1e-9)
+    assert np.array_equal(two.uv, again.uv)
+
+
+@pytest.mark.skipif(not available("pardiso"), reason="needs pypardiso")
+def test_a_factor_stays_on_the_threads_that_it_was_made_on(matrix, monkeypatch):
+    used, call = [], pardiso._pardiso
+    monkeypatch.setattr(
+        pardiso, "_pardiso", lambda kind, count, *rest: used.append(count) or call(kind, count, *rest)
+    )
+    with solving("pardiso"), using_threads(3):
+        factor = factorize(matrix)
+    with using_threads(1):
+        factor = factor.renewed(2 * matrix)
+        factor.solve(np.ones(matrix.shape[0]))
+    assert set(used) == {3}
+    assert len(used) > 3
+
+
+def test_with_one_thread_nothing_is_done_meanwhile():
+    seen = []
+    with using_threads(1), meanwhile(lambda: seen.append("one"), TINY + 1) as doing:
+        seen.append("two")
+    assert seen == ["one", "two"]
+    assert doing.done()
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.5, 257, "many"])
+def test_numbers_of_threads_that_make_no_sense(count):
+    with pytest.raises(errors.OptionError, match="threads must be"):
+        flatten(*shapes.sphere(1), threads=count)

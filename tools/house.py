@@ -16,7 +16,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "coneflat"
 #: Rooms, from the ground up; a room is a folder, or a file beside them.
 FLOORS: tuple[tuple[str, ...], ...] = (
     ("", "errors", "text"),
-    ("_arrays", "compiled", "threads", "progress"),
+    ("_arrays", "compiled", "threads", "progress", "kept"),
     ("mesh", "options"),
     ("geometry", "solver"),
     ("quality", "seams"),
@@ -25,7 +25,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("flat",),
     ("atlas",),
     ("result",),
-    ("pipeline", "curve"),
+    ("pipeline", "curve", "flattener"),
     ("grid",),
     ("files", "view"),
     ("ahead", "apps", "sample"),
@@ -40,6 +40,7 @@ HOLDS = {
     "compiled": "the decorator of kernels",
     "threads": "cores, two stages at once",
     "progress": "stages timed and told",
+    "kept": "what was computed last",
     "mesh": "half-edges, borders, components, genus",
     "options": "every option, declared once",
     "geometry": "lengths, angles, flips, predicates, overlap",
@@ -54,6 +55,7 @@ HOLDS = {
     "result": "measures, notes, report, promises",
     "pipeline": "flatten: the method on one screen",
     "curve": "distortion by number of cones",
+    "flattener": "one mesh again and again",
     "grid": "whole translations, quads",
     "files": "OBJ, PLY, STL, OFF, glTF, NPZ",
     "view": "figures for print, the page",

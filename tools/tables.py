@@ -76,17 +76,21 @@ def quality_table(measured: Measured, body: str) -> str:
     made = dict[str, list[str] | None]()
     for model in README:
         report = measured.report(model)
-        made[model] = report and [
-            model,
-            f"{report['triangles']:,}",
-            f"{report['cones']}",
-            f"{report['charts']}",
-            f"{report['angle_sum_error']:.0e}",
-            f"{report['seam_mismatch_max']:.0e}",
-            f"{report['flipped']}",
-            f"{report['qc_mean']:.4f}",
-            f"{report['seam_length']:.2f}",
-        ]
+        made[model] = (
+            [
+                model,
+                f"{report['triangles']:,}",
+                f"{report['cones']}",
+                f"{report['charts']}",
+                f"{report['angle_sum_error']:.0e}",
+                f"{report['seam_mismatch_max']:.0e}",
+                f"{report['flipped']}",
+                f"{report['qc_mean']:.4f}",
+                f"{report['seam_length']:.2f}",
+            ]
+            if report
+            else None
+        )
     headings = (
         "model | triangles | cones | charts | angle sums | seam mismatch | flipped | QC distortion | "
         "seam length, √area"
@@ -103,15 +107,19 @@ def paper_table(measured: Measured, body: str) -> str:
     made = dict[str, list[str] | None]()
     for model, name in PAPERS.items():
         report, paper = measured.report(model, **PAPER), PUBLISHED[name]
-        made[model] = report and [
-            model,
-            f"{report['triangles']:,}",
-            f"{paper.curvature_error:.1e} π".replace("e-0", "e-"),
-            f"{report['curvature_error']:.2e} π".replace("e-0", "e-"),
-            f"{paper.qc['linear']:.3f}",
-            f"{report['qc_mean']:.4f}",
-            f"{report['cones']}",
-        ]
+        made[model] = (
+            [
+                model,
+                f"{report['triangles']:,}",
+                f"{paper.curvature_error:.1e} π".replace("e-0", "e-"),
+                f"{report['curvature_error']:.2e} π".replace("e-0", "e-"),
+                f"{paper.qc['linear']:.3f}",
+                f"{report['qc_mean']:.4f}",
+                f"{report['cones']}",
+            ]
+            if report
+            else None
+        )
     headings = "model | triangles | curvature error: paper | here | QC distortion: paper | here | cones"
     return _table(headings, list(_each(tuple(PAPERS), body, made)))
 
@@ -128,12 +136,12 @@ def readings_table(measured: Measured, body: str) -> str:
             made[model] = None
             continue
         found = measured.comparison(model, READINGS, **PAPER)
-        made[model] = [model]
+        row = made[model] = [model]
         for method in READINGS:
             paper, result = PUBLISHED[name].qc.get(method), found[method].result
             assert result is not None, method
-            made[model] += [f"{paper:.3f}"] if paper else []
-            made[model].append(f"{result.distortion.qc_mean:.4f}")
+            row += [f"{paper:.3f}"] if paper else []
+            row.append(f"{result.distortion.qc_mean:.4f}")
     headings = (
         "model | CP: paper | here | with flips | LABF: paper | here | cones held | CF: paper | here | exact"
     )
@@ -145,15 +153,19 @@ def gallery_table(measured: Measured, body: str) -> str:
     made = dict[str, list[str] | None]()
     for model in GALLERY:
         report = measured.report(model)
-        made[model] = report and [
-            f"[{model}](#{model})",
-            f"{report['triangles']:,}",
-            f"{report['cones']}",
-            f"{report['charts']}",
-            f"{report['qc_mean']:.3f}",
-            f"{report['area_std']:.2f}",
-            f"{report['seam_length']:.2f}",
-        ]
+        made[model] = (
+            [
+                f"[{model}](#{model})",
+                f"{report['triangles']:,}",
+                f"{report['cones']}",
+                f"{report['charts']}",
+                f"{report['qc_mean']:.3f}",
+                f"{report['area_std']:.2f}",
+                f"{report['seam_length']:.2f}",
+            ]
+            if report
+            else None
+        )
     headings = "model | triangles | cones | charts | QC distortion | area distortion | seam length, √area"
     return _table(headings, list(_each(GALLERY, body, made)))
 
@@ -256,13 +268,13 @@ def atlases_table(measured: Measured, body: str) -> str:
     was, made, ours = _rows_of(body), dict[str, list[str] | None](), []
     keys = {"charts": "d", "seam_length": ".2f", "qc_mean": ".3f", "packing_efficiency": ".2f"}
     for model in ATLASES:
-        reports = [measured.report(model), measured.report(model, distortion=MORE_CONES)]
-        if None in reports:
+        default, fine = measured.report(model), measured.report(model, distortion=MORE_CONES)
+        if default is None or fine is None:
             made[model] = None
             continue
-        ours.append([[report[key] for report in reports] for key in keys])
-        made[model] = [model, f"{reports[0]['triangles']:,}"]
-        made[model] += [
+        ours.append([[report[key] for report in (default, fine)] for key in keys])
+        row = made[model] = [model, f"{default['triangles']:,}"]
+        row += [
             ", ".join([*(format(value, form) for value in values), *cell.split(", ")[2:]])
             for values, form, cell in zip(ours[-1], keys.values(), was[model][2:], strict=True)
         ]

@@ -87,6 +87,8 @@ def read_trimesh(path: Path) -> Read:
     import trimesh
 
     mesh = trimesh.load(path, process=False, force="mesh")
+    assert isinstance(mesh, trimesh.Trimesh)
+    assert isinstance(mesh.visual, trimesh.visual.TextureVisuals)
     return mesh.vertices[mesh.faces], np.asarray(mesh.visual.uv)[mesh.faces]
 
 

@@ -16,6 +16,7 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "flatten": "pipeline",
+    "Flattener": "flattener",
     "Flattening": "result.flattening",
     "PAPER": "options",
     "read_mesh": "files",
@@ -96,6 +97,7 @@ __all__ = [
     "Distortion",
     "ExactMetric",
     "FlatTriangles",
+    "Flattener",
     "Flattening",
     "FoundCones",
     "IntegerGrid",
@@ -170,6 +172,7 @@ if TYPE_CHECKING:
     from .files import read_flattening, read_mesh
     from .flat.exact.metric import ExactMetric, exact_metric
     from .flat.linear import scaled_lengths
+    from .flattener import Flattener
     from .geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths, mollify
     from .geometry.overlap import Overlaps, find_overlaps
     from .geometry.straight import FlatTriangles, flat_triangles

@@ -16,7 +16,7 @@ from .geometry.operators import area_distortion, weighted_areas
 from .input.components import Component, prepare
 from .options import CurveOptions, FindOptions, Options, read_options, takes
 from .progress import Stages
-from .threads import one_blas_thread
+from .threads import using_threads
 
 if TYPE_CHECKING:
     from .cones.sparse import ConeSearch
@@ -76,7 +76,7 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
     asked = read_options(options, FindOptions)
     chosen = Options(**vars(asked))
     stages = Stages(chosen.progress)
-    with one_blas_thread():
+    with using_threads():
         opened = _open(mesh, faces, chosen, stages)
         if isinstance(opened, FoundCones):
             return opened
@@ -98,7 +98,7 @@ def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Con
     asked = read_options(options, CurveOptions)
     chosen = Options(**{name: value for name, value in vars(asked).items() if name != "most"})
     stages = Stages(chosen.progress)
-    with one_blas_thread():
+    with using_threads():
         opened = _open(mesh, faces, chosen, stages)
         if isinstance(opened, FoundCones):
             return ConeCurve((opened,))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 from numpy.typing import ArrayLike
 
+from ._arrays import FloatArray
 from .atlas.injective import without_overlaps
 from .atlas.overlaid import overlaid
 from .cones.choose import Surface, choose_cones, cone_notes, pursues
@@ -22,12 +24,18 @@ from .geometry.operators import weighted_areas
 from .input.components import Component, Prepared, prepare
 from .input.symmetry import SymmetryUse, are_mirrored, check_symmetry, find_symmetry, symmetry_notes
 from .layout.disk import cutting
+from .mesh import TriangleMesh
 from .options import UNFOLDED, Options, read_options, takes
 from .progress import Stages
 from .result.assemble import assemble
 from .result.flattening import Flattening
 from .solver import solving
-from .threads import one_blas_thread
+from .threads import using_threads
+
+#: Takes the first layout that there is.
+Early: TypeAlias = Callable[[Flattening], object]
+#: Returns a connected mesh with what follows from its (m, 3) lengths, on flips of edges if a metric may make them.
+SurfaceOf: TypeAlias = Callable[[TriangleMesh, FloatArray, bool], Surface]
 
 
 @takes(Options)
@@ -56,16 +64,49 @@ def flatten_as(mesh: Any, faces: ArrayLike | None, options: Options) -> Flatteni
     with stages("check"):
         prepared = prepare(mesh, faces, options)
         check_symmetry(prepared.components, options)
-    with one_blas_thread(), solving(options.solver) as solvers:
-        flat = list(_flat_components(prepared, options, stages))
+    return flatten_prepared(prepared, Surface.of, options, stages)
+
+
+def flatten_prepared(
+    prepared: Prepared, surface_of: SurfaceOf, options: Options, stages: Stages, early: Early | None = None
+) -> Flattening:
+    """Flatten a checked mesh.
+
+    Args:
+        prepared: the mesh.
+        surface_of: returns what the choice of cones needs of a component.
+        options: that have been read.
+        stages: the stopwatch.
+        early: called with the first layout, one chart for each component, before triangles are relaxed and overlaps
+            parted.
+    """
+    with using_threads(options.threads), solving(options.solver) as solvers:
+        runs = [flatten_component(part, surface_of, options, stages) for part in prepared.components]
+        if early is not None:
+            first = []
+            for i, run in enumerate(runs):
+                with _at_component(prepared, i, stages):
+                    first.append(next(run))
+            early(assemble(prepared, first, replace(options, charts="one"), Stages()))
+        flat = []
+        for i, run in enumerate(runs):
+            with _at_component(prepared, i, stages):
+                *_, last = run
+            flat.append(last)
+            stages.end_part()
     return replace(assemble(prepared, flat, options, stages), solvers=tuple(solvers.used))
 
 
-def flatten_component(part: Component, options: Options, stages: Stages) -> LaidOut:
-    """Flatten a connected mesh: find cones, scale the metric, cut, lay out, and part what overlaps."""
+def flatten_component(
+    part: Component, surface_of: SurfaceOf, options: Options, stages: Stages
+) -> Iterator[LaidOut]:
+    """Flatten a connected mesh: find cones, scale the metric, cut, lay out, and part what overlaps.
+
+    The layout comes twice: as soon as there is one, and when it is what was asked for.
+    """
     mesh = part.mesh
     with stages("cones", 0.1):
-        surface = Surface.of(mesh, part.lengths, options.method in UNFOLDED and not options.refine)
+        surface = surface_of(mesh, part.lengths, options.method in UNFOLDED and not options.refine)
         symmetry = find_symmetry(part, options)
 
     def flatten_once(part: Component, options: Options) -> LaidOut:
@@ -84,16 +125,23 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
             use = None if symmetry is None else SymmetryUse(symmetry, is_mirrored, disk.is_symmetric)
             return replace(laid_out, symmetry=use)
 
-    def flatten_by(options: Options) -> LaidOut:
+    def flatten_held(options: Options) -> LaidOut:
         once = partial(flatten_once, options=options)
         may_lack_room = pursues(mesh, options) and options.method in UNFOLDED
-        layout = with_held_cones(once, part) if may_lack_room else once(part)
-        if not relaxes(options):
+        return with_held_cones(once, part) if may_lack_room else once(part)
+
+    first = flatten_held(options)
+    yield first
+
+    def flatten_by(asked: Options) -> LaidOut:
+        layout = first if asked is options else flatten_held(asked)
+        if not relaxes(asked):
             return layout
         with stages("relax", 0.96):
-            return relaxed(layout, part, options, stages.tell)
+            return relaxed(layout, part, asked, stages.tell)
 
     layout = with_quality(flatten_by, part, options)
+    surface.search = None  # It remembers what it was asked for, and takes much memory.
     if options.charts == "atlas":
         with stages("atlas", 1.0):
             part_charts = overlaid if options.mirrored == "overlap" else without_overlaps
@@ -102,19 +150,19 @@ def flatten_component(part: Component, options: Options, stages: Stages) -> Laid
     notes = cone_notes(mesh, len(layout.cones), reached, options) + symmetry_notes(layout.symmetry)
     if options.method in UNFOLDED:
         notes += unheld_notes(layout, part.constraints.names) + split_notes(layout, part.constraints.names)
-    return replace(layout, notes=layout.notes + notes)
+    yield replace(layout, notes=layout.notes + notes)
 
 
-def _flat_components(prepared: Prepared, options: Options, stages: Stages) -> Iterator[LaidOut]:
-    """Yield the flattened components; errors say which one cannot be flattened, if there are several."""
-    for part in prepared.components:
-        stages.share = len(part.faces) / len(prepared.checked.mesh.faces)
-        try:
-            yield flatten_component(part, options, stages)
-        except (CurvatureError, MetricError, SeamError) as error:
-            if len(prepared.components) == 1:
-                raise
-            first = part.constraints.names[0]
-            where = f"in the component of vertex {first} ({len(part.faces):,} triangles)"
-            raise type(error)(f"{where}: {error}") from error
-        stages.end_part()
+@contextmanager
+def _at_component(prepared: Prepared, number: int, stages: Stages) -> Iterator[None]:
+    """Work on a component inside; errors say which one cannot be flattened, if there are several."""
+    part = prepared.components[number]
+    stages.share = len(part.faces) / len(prepared.checked.mesh.faces)
+    try:
+        yield
+    except (CurvatureError, MetricError, SeamError) as error:
+        if len(prepared.components) == 1:
+            raise
+        first = part.constraints.names[0]
+        where = f"in the component of vertex {first} ({len(part.faces):,} triangles)"
+        raise type(error)(f"{where}: {error}") from error

@@ -5,11 +5,31 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 
 from .errors import OptionError
 
 #: Called with what is being done and the fraction of the whole that is done.
 Progress = Callable[[str, float], None]
+
+_ask: ContextVar[Callable[[], None] | None] = ContextVar("coneflat_ask", default=None)
+
+
+@contextmanager
+def asking(ask: Callable[[], None]) -> Iterator[None]:
+    """Have long work inside ask, every few milliseconds and from any thread, whether to go on: who asks may raise."""
+    token = _ask.set(ask)
+    try:
+        yield
+    finally:
+        _ask.reset(token)
+
+
+def go_on() -> None:
+    """Ask whether to go on, within `asking`."""
+    ask = _ask.get()
+    if ask is not None:
+        ask()
 
 
 class Stages:

@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from contextvars import copy_context
+from contextvars import ContextVar, copy_context
 from typing import TypeVar
 
 Result = TypeVar("Result")
 
 # Triangles from which on memory is what matters, and up to which a thread takes longer to start than it saves.
 HUGE, TINY = 3_000_000, 1000
+# How many are used unless told otherwise, on any machine: the last digits depend on it.
+THREADS = 2
+
+_threads: ContextVar[int] = ContextVar("coneflat_threads", default=THREADS)
 
 
 class Later(Future[Result]):
@@ -35,8 +39,8 @@ class Later(Future[Result]):
 def meanwhile(call: Callable[[], Result], triangles: int) -> Iterator[Future[Result]]:
     """Have something done on another thread while what is inside runs, and yield its future.
 
-    Of a huge mesh it is done before, as what both hold in memory would be too much; of a tiny one when its result is
-    asked for.
+    Of a huge mesh, and where there is to be one thread, it is done before, as what both hold in memory would be too
+    much; of a tiny one when its result is asked for.
 
     Both are the same as one after the other: they share no data that either changes. Compiled loops, factorizations
     and most of numpy leave the interpreter to the other thread.
@@ -46,20 +50,29 @@ def meanwhile(call: Callable[[], Result], triangles: int) -> Iterator[Future[Res
         return
     with ThreadPoolExecutor(1, thread_name_prefix="coneflat") as executor:
         future = executor.submit(copy_context().run, call)
-        if triangles > HUGE:
+        if triangles > HUGE or threads() == 1:
             wait([future])
         yield future
 
 
+def threads() -> int:
+    """Return how many threads may be used here."""
+    return _threads.get()
+
+
 @contextmanager
-def one_blas_thread() -> Iterator[None]:
-    """Keep OpenBLAS to one thread inside.
+def using_threads(count: int = THREADS) -> Iterator[None]:
+    """Have everything inside use so many threads: PARDISO all, our own stages two at most, and OpenBLAS one.
 
     The dense matrices here are small: its threads gain nothing on them, and while they wait for more to do they take
-    the cores from everything else, which then takes a third longer. PARDISO keeps its threads.
+    the cores from everything else, which then takes a third longer.
     """
     import scipy.linalg  # noqa: F401 - comes with a library of its own, which must be there to be told
     from threadpoolctl import ThreadpoolController
 
-    with ThreadpoolController().select(internal_api="openblas").limit(limits=1):
-        yield
+    token = _threads.set(count)
+    try:
+        with ThreadpoolController().select(internal_api="openblas").limit(limits=1):
+            yield
+    finally:
+        _threads.reset(token)

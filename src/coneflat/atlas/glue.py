@@ -13,6 +13,7 @@ from .._arrays import BoolArray, FloatArray, IntArray
 from ..geometry.overlap import find_overlaps
 from ..geometry.planar import bounds, signed_double_areas
 from ..mesh import TriangleMesh
+from ..progress import go_on
 from .chart_seams import Layout, Seams, same_points
 
 # Relative to the length of a seam edge: how far its two sides may be apart, moved together, to be glued.
@@ -68,6 +69,7 @@ class _Gluing:
         glued = False
         total = np.array([lengths[self.seams.edges[members]].sum() for members in self.stretches])
         for best in np.argsort(-total, kind="stable"):
+            go_on()
             members = self.stretches[best]
             one, other = self.seams.charts[members[0]]
             key = (

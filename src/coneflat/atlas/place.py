@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import OptionError
+from ..progress import go_on
 from .charts import Outlines
 from .masks import Masks, cover_charts, turned_boxes
 from .strips import place_all
@@ -200,6 +201,7 @@ def _climb(
     best, goal = None, width
     end = strips.work + max(WORK, FILLS * placed.work)
     for _ in range(tries):
+        go_on()
         if placed.height <= goal:
             best, width = _narrow(strips, placed, reach, goal, end)
             goal = width - 1

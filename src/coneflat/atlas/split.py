@@ -14,6 +14,7 @@ from ..errors import ArrayShapeError, FaceIndexError, OptionError
 from ..geometry.charts import label_charts
 from ..geometry.graph import MultiGraph, trace_back
 from ..mesh import NEXT, TriangleMesh, corner_fans, label_components, sort_by_counting, sort_pairs
+from ..progress import go_on
 from ..text import list_some, plural
 
 
@@ -43,6 +44,7 @@ def split_overlaps(
     chart, count = np.zeros(len(corners), dtype=np.int64), 1
     waiting = [(np.arange(len(corners)), pairs)] if len(pairs) else []
     while waiting and count < most:
+        go_on()
         faces, pairs = waiting.pop()
         disk = as_disk(points, corners[faces])
         one, other = np.zeros((2, len(faces)), dtype=bool)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from .._arrays import BoolArray, FloatArray
+from .._arrays import BoolArray, FloatArray, IntArray
 from ..geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
 from ..geometry.delaunay import intrinsic_delaunay
+from ..geometry.intrinsic import IntrinsicTriangulation
 from ..geometry.operators import vertex_areas, weighted_areas
 from ..geometry.ties import tie_key
 from ..input.constraints import Constraints
@@ -25,6 +27,7 @@ from . import ConeSolution, check_enough, check_feasible, cones_at, cones_with_c
 
 if TYPE_CHECKING:
     from .sparse import ConeSearch, SparseCones
+    from .sparse.linear_model import LinearModel
 
 # The angle of a cone for which each triangle around it has room on its straight sides: less than half a turn, as not
 # all of them can be spread alike.
@@ -60,7 +63,9 @@ class Surface:
         curvature: (n,) angle defect, radians.
         areas: (n,) vertex areas.
         widest: (n,) the widest corner at each vertex as a share of all there.
+        flips: whether Laplacian and areas may be those of its intrinsic Delaunay triangulation.
         search: the search for cones that has been opened on it, if any.
+        is_kept: whether other cones will be chosen on it, for which it keeps what serves all of them.
     """
 
     mesh: TriangleMesh
@@ -69,7 +74,10 @@ class Surface:
     curvature: FloatArray
     areas: FloatArray
     widest: FloatArray
+    flips: bool = True
     search: ConeSearch | None = None
+    is_kept: bool = False
+    _linear: LinearModel | None = None
 
     @classmethod
     def of(cls, mesh: TriangleMesh, lengths: FloatArray, flips: bool = True) -> Surface:
@@ -92,7 +100,33 @@ class Surface:
             if len(done) > STRETCHED * len(mesh.edges):
                 faces, sides = triangulation.faces, triangulation.length.reshape(-1, 3)
         laplacian = cotangent_laplacian(faces, cotangents(sides), n)
-        return cls(mesh, lengths, laplacian, curvature, vertex_areas(faces, sides, n), widest)
+        return cls(mesh, lengths, laplacian, curvature, vertex_areas(faces, sides, n), widest, flips)
+
+    @cached_property
+    def tie_key(self) -> FloatArray:
+        """(n,) what breaks ties between vertices."""
+        return tie_key(self.mesh.vertices)
+
+    def linear_model(self, takes_rest: BoolArray, weights: FloatArray | None) -> LinearModel:
+        """Return the linear model of cones off some vertices (n,), whose (n,) weights, or None, count in E.
+
+        The last one is kept, unless the mesh is huge: its factorization serves other weights, too.
+        """
+        from .sparse.linear_model import LinearModel
+
+        share, linear = weighted_areas(self.areas, weights), self._linear
+        if linear is not None and np.array_equal(linear.is_boundary, takes_rest):
+            linear = linear.weighing(share)
+        else:
+            linear = LinearModel.of(self.laplacian, self.curvature, share, takes_rest, self.tie_key)
+        if self.is_kept or len(self.mesh.faces) <= HUGE:
+            self._linear = linear
+        return linear
+
+    @cached_property
+    def delaunay(self) -> tuple[IntrinsicTriangulation, IntArray]:
+        """The intrinsic Delaunay triangulation, and the half-edges flipped for it."""
+        return intrinsic_delaunay(self.mesh, self.lengths)
 
 
 def _far_from_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> bool:
@@ -145,11 +179,9 @@ def choose_cones(
             *given,
             epsilon=options.epsilon,
             max_cones=options.max_cones,
-            tie_key=tie_key(mesh.vertices),
+            tie_key=surface.tie_key,
             progress=stages.tell,
         )
-    elif len(constraints.cones) and np.isfinite(constraints.cones.curvatures).all():
-        solution = cones_with_curvature(*given, constraints.cones.vertices, constraints.cones.curvatures)
     elif np.isfinite(constraints.cones.curvatures).any():
         solution = _fitted(surface, constraints, options)
     else:
@@ -163,15 +195,12 @@ def choose_cones(
 
 
 def _fitted(surface: Surface, constraints: Constraints, options: Options) -> ConeSolution:
-    """Return the cones of which some have curvatures, the others with the best."""
+    """Return the cones of which some or all have curvatures, the others with the best."""
     from .fitted import fitted_cones
 
     mesh = surface.mesh
     return fitted_cones(
-        surface.laplacian,
-        surface.curvature,
-        weighted_areas(surface.areas, constraints.weights),
-        mesh.is_boundary_vertex,
+        surface.linear_model(mesh.is_boundary_vertex, constraints.weights),
         mesh.euler_characteristic,
         constraints.cones.vertices,
         constraints.cones.curvatures,
@@ -294,13 +323,13 @@ def search_on(surface: Surface, constraints: Constraints, options: Options, stag
         return surface.search
     if len(room) >= FINE:
         room = np.minimum(room, WIDEST / surface.widest)
+    takes_rest = _takes_rest(mesh, constraints, options)
     search = ConeSearch(
         surface.laplacian,
         surface.curvature,
         surface.areas,
-        _takes_rest(mesh, constraints, options),
+        takes_rest,
         mesh.euler_characteristic,
-        tie_key=tie_key(mesh.vertices),
         # A corner of angle a has a curvature of pi - a: cones inside keep to the same bound.
         min_cone_angle=options.min_cone_angle + (np.pi if is_straight else 0.0),
         max_cone_angle=options.max_cone_angle,
@@ -309,6 +338,7 @@ def search_on(surface: Surface, constraints: Constraints, options: Options, stag
         required=constraints.required.vertices,
         allowed=constraints.is_allowed,
         room=None if options.refine else room.astype(np.float64),
+        linear=surface.linear_model(takes_rest, constraints.weights),
     )
     search.tell = stages.tell
     if len(mesh.faces) <= HUGE:  # else it holds too much memory

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csc_matrix
 
-from .._arrays import BoolArray, FloatArray, IntArray
-from .given import cones_with_curvature
+from .._arrays import FloatArray, IntArray
+from .given import checked_sum
 from .solution import ConeSolution
 from .sparse.fit_curvatures import fit_curvatures
-from .sparse.green import GreenOperator
 from .sparse.limits import Limits
+from .sparse.linear_model import LinearModel
 
 
 def fitted_cones(
-    laplacian: csc_matrix,
-    curvature: FloatArray,
-    areas: FloatArray,
-    is_boundary: BoolArray,
+    linear: LinearModel,
     euler_characteristic: int,
     cones: IntArray,
     curvatures: FloatArray,
@@ -31,23 +27,27 @@ def fitted_cones(
     convex quadratic program in the curvatures that are not given.
 
     Args:
-        laplacian, curvature, is_boundary: of n vertices.
-        areas: (n,) weights that sum to 1.
-        euler_characteristic: of the connected mesh.
+        linear: of the connected mesh.
+        euler_characteristic: of it.
         cones, curvatures: (s,) vertices off the boundary and radians, NaN where it is to be computed.
         min_cone_angle, max_cone_angle: bounds of what is computed, radians; left out where the sum that the surface
             needs cannot be had within them.
+
+    Raises:
+        CurvatureError: all are given, and on a closed mesh do not sum to 2 pi chi.
     """
-    is_free = np.isnan(curvatures)
-    is_closed = not is_boundary.any()
+    operator, is_free = linear.operator, np.isnan(curvatures)
+    euler = euler_characteristic if operator.is_closed else None
+    if not is_free.any():
+        return linear.solution_of(cones, checked_sum(curvatures, euler))
     limits = Limits.of_angles(None, min_cone_angle, max_cone_angle, positive_only=False)
-    operator = GreenOperator(laplacian, areas, is_boundary, np.arange(len(areas)))
-    responses = operator.responses(np.searchsorted(operator.vertices, cones))
-    log_scale = -operator.solve(curvature[operator.vertices])
+    unknown = np.full(len(linear.curvature), -1, dtype=np.int64)
+    unknown[operator.vertices] = np.arange(len(operator.vertices))
+    responses = operator.known_responses(unknown[cones])
     gram = _covariances(responses, responses, operator.areas)
-    slope = _covariances(responses, log_scale[None], operator.areas)[:, 0]
+    slope = _covariances(responses, linear.log_scale[None], operator.areas)[:, 0]
     held = curvatures[~is_free]
-    total = 2 * np.pi * euler_characteristic - held.sum() if is_closed else np.nan
+    total = np.nan if euler is None else 2 * np.pi * euler - held.sum()
     count = int(is_free.sum())
     found, _, _ = fit_curvatures(
         np.ascontiguousarray(gram[np.ix_(is_free, is_free)]),
@@ -58,7 +58,7 @@ def fitted_cones(
     )
     filled = curvatures.copy()
     filled[is_free] = found
-    return cones_with_curvature(laplacian, curvature, is_boundary, euler_characteristic, cones, filled)
+    return linear.solution_of(cones, checked_sum(filled, euler))
 
 
 def _covariances(one: FloatArray, other: FloatArray, areas: FloatArray) -> FloatArray:

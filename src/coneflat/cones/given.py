@@ -57,22 +57,32 @@ def cones_with_curvature(
     Raises:
         CurvatureError: on a closed mesh, the curvatures do not sum to 2 pi chi.
     """
+    is_closed = not is_boundary.any()
     target = np.zeros(len(curvature))
-    target[cones] = curvatures
+    target[cones] = checked_sum(curvatures, euler_characteristic if is_closed else None)
     grounded = is_boundary.copy()
-    if not is_boundary.any():
-        needed = 2 * np.pi * euler_characteristic
-        found = float(np.sum(curvatures))
-        if abs(found - needed) > SUM_TOLERANCE:
-            raise CurvatureError(
-                f"cone curvatures must sum to 2 pi chi = {needed:.7g} ({2 * euler_characteristic} pi) on this "
-                f"closed surface, but sum to {found:.7g} ({found / np.pi:.6g} pi): off by {found - needed:.3g}"
-            )
-        if len(cones):
-            target[cones] += (needed - found) / len(cones)
-            grounded[cones[0]] = True
-        else:
-            grounded[0] = True
+    if is_closed:
+        grounded[cones[0] if len(cones) else 0] = True
     phi = GroundedLaplacian(laplacian, grounded).solve(target - curvature)
     on_boundary = target_from_log_scale(laplacian, curvature, phi, is_boundary)
     return ConeSolution(cones, target + on_boundary, phi)
+
+
+def checked_sum(curvatures: FloatArray, euler_characteristic: int | None) -> FloatArray:
+    """Return the curvatures (s,) of a closed mesh's cones, radians, with the sum that they must have, to rounding.
+
+    euler_characteristic: None where there is a boundary, which takes what they leave.
+
+    Raises:
+        CurvatureError: they do not sum to 2 pi chi.
+    """
+    if euler_characteristic is None:
+        return curvatures
+    needed = 2 * np.pi * euler_characteristic
+    found = float(np.sum(curvatures))
+    if abs(found - needed) > SUM_TOLERANCE:
+        raise CurvatureError(
+            f"cone curvatures must sum to 2 pi chi = {needed:.7g} ({2 * euler_characteristic} pi) on this "
+            f"closed surface, but sum to {found:.7g} ({found / np.pi:.6g} pi): off by {found - needed:.3g}"
+        )
+    return curvatures + (needed - found) / len(curvatures) if len(curvatures) else curvatures

@@ -48,7 +48,8 @@ def find_metric(
                 pass
         if mesh.genus():
             return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantise)
-    return exact_flattening(mesh, lengths, solution, choices)
+    flipped = surface.delaunay if surface.is_kept else None
+    return exact_flattening(mesh, lengths, solution, choices, flipped)
 
 
 def turning_meter(surface: Surface, constraints: Constraints, options: Options) -> Turned | None:

@@ -86,13 +86,13 @@ class PackingProblem(ConformalProblem):
 
     radii: FloatArray = field(default_factory=lambda: np.empty(0))
 
-    def prepare(self, delaunay: bool) -> int:
+    def prepare(self, delaunay: bool, flipped: IntArray | None = None) -> int:
         """Put circles on the input, made Delaunay and then weighted Delaunay, if so wanted; return the number of flips.
 
         Neither changes the surface, and circles in the triangles around their centres do not overlap whatever
         the triangles.
         """
-        flips = super().prepare(delaunay)
+        flips = super().prepare(delaunay, flipped)
         self.radii = packed_radii(self.triangulation.length.reshape(-1, 3), self.triangulation.faces)
         if delaunay:
             self.records.append(make_delaunay(self.triangulation, radii=self.radii))

@@ -18,7 +18,7 @@ from ..progress import Progress, Stages
 from ..result.flattening import Flattening
 from ..result.promises import broken_promises
 from ..text import plural
-from ..threads import one_blas_thread
+from ..threads import THREADS, using_threads
 from .aligned import Layout, aligned
 from .attempt import area_of, attempt, scaled
 from .coarsest import TRIES, coarsest_grid
@@ -106,7 +106,7 @@ def integer_grid(
         # What a map does not keep of its promises is not what the grid does not keep.
         told = tuple(note for note in result.notes if note not in broken_promises(result))
     stages.done = 1.0
-    with stages("grid"), one_blas_thread():
+    with stages("grid"), using_threads(result.settings.get("threads", THREADS)):
         layout = aligned(result, QUADS if quads is None else quads, size)
         found = _of_layout(layout, energy, coarsest, progress)
     loose = _loose_border(layout) if result.settings.get("boundary") == "straight" else 0
@@ -161,7 +161,7 @@ def _sharp(
     """Return a grid with as many sharp edges on grid lines as can be."""
     why = "none is long enough for quads of this size"
     for found in sharp_layouts(mesh, faces, quads, size, given, OPTIONS, progress):
-        with one_blas_thread():
+        with using_threads(given.get("threads", THREADS)):
             grid, why = attempt(found.layout, energy)
         if grid is not None:
             return replace(grid, features=found.features, notes=(*grid.notes, *found.notes))

@@ -18,7 +18,7 @@ from ..options import Options, read_options
 from ..progress import Progress
 from ..solver import solving
 from ..text import list_some, plural
-from ..threads import one_blas_thread
+from ..threads import using_threads
 from .aligned import Layout
 from .bisect import split_faces, split_for_features
 from .features import border_of, dangling, opened, patches_of, sharp_edges, without_stubs
@@ -98,7 +98,7 @@ def sharp_layouts(
             progress(f"patch {patch + 1:,} of {count:,} between sharp edges", (tries + patch / count) / TRIES)
 
     search = _Search(checked, given_edges, square, area, options, tell)
-    with one_blas_thread(), solving(options.solver):
+    with using_threads(options.threads), solving(options.solver):
         for layout, features in search.layouts():
             yield SharpLayout(
                 _at_scale(layout, exponent, square), features, (*prepared.notes, *search.notes())

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +12,7 @@ from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import OptionError
 from ..geometry import edge_lengths, mollify
 from ..geometry.visibility import visible_share
+from ..kept import Last
 from ..mesh import TriangleMesh
 from ..options import Options
 from ..seams import CutMesh, edge_costs, open_along
@@ -69,6 +69,81 @@ class Prepared:
     own_lengths: FloatArray | None
 
 
+#: A connected mesh, its vertices and faces in the whole one, and its (m, 3) side lengths.
+Part: TypeAlias = tuple[TriangleMesh, IntArray, IntArray, FloatArray]
+
+
+class Source:
+    """An input, and what follows from it whatever else is asked of it.
+
+    What was needed last is kept: another repair, other lengths or other marked seams take its place. As long as none
+    does, components have the same meshes, the very objects.
+
+    Attributes:
+        given: the input, which must not change.
+    """
+
+    def __init__(self, given: InputMesh) -> None:
+        self.given = given
+        self._checked: Last[tuple[CheckedMesh, BoolArray]] = Last()
+        self._lengths: Last[tuple[FloatArray, str | None]] = Last()
+        self._seen: Last[FloatArray] = Last()
+        self._parts: Last[tuple[Part, ...]] = Last()
+
+    def prepared(self, options: Options) -> Prepared:
+        """Check the input, and what the options say of its vertices.
+
+        Raises:
+            MeshError: the mesh cannot be flattened.
+            OptionError: an option does not fit it.
+        """
+        given = self.given
+        checked, is_diagonal = self._checked.of(options.repair, lambda: self._check(options.repair))
+        own = _own_lengths(given, checked, options)
+        metric = options.repair, options.strict, None if own is None else own.tobytes()
+        lengths, note = self._lengths.of(metric, lambda: _open_triangles(checked, own, options.strict))
+        constraints = locate_constraints(checked, options, given)
+        notes = [] if note is None else [note]
+        forbidden = np.zeros(len(checked.mesh.edges), dtype=bool)
+        if options.forbidden_seams is not None:
+            forbidden[named_edges(checked, np.asarray(options.forbidden_seams))] = True
+        forbidden |= edges_within(checked, options.seamless, len(np.asarray(given.vertices)))
+        marked = np.empty(0, dtype=np.int64)
+        if options.marks_seams:
+            marked, alone = effective_marks(checked.mesh, marked_edges(checked, options, given, forbidden))
+            if len(alone):
+                notes.append(_nothing_cut(constraints.names[checked.mesh.edges[alone]]))
+            constraints.keep_off(checked.mesh.edges[marked])
+            constraints = constraints.with_marks(checked.mesh.edges[marked])
+        parts = self._parts.of((metric, marked.tobytes()), lambda: _parts(checked.mesh, marked, lengths))
+        seen = self._visibility(checked, options) if options.hide_seams else None
+        is_forbidden = forbidden[checked.mesh.halfedge_edges].reshape(-1, 3)
+        components = tuple(
+            Component(
+                mesh,
+                vertices,
+                faces,
+                own_lengths,
+                is_diagonal[faces],
+                is_forbidden[faces],
+                None if seen is None else seen[vertices],
+                _within_reach(constraints.within(vertices), mesh, is_forbidden[faces]),
+            )
+            for mesh, vertices, faces, own_lengths in parts
+        )
+        return Prepared(given, checked, tuple(notes), components, checked.mesh.edges[marked], own)
+
+    def _check(self, repair: bool) -> tuple[CheckedMesh, BoolArray]:
+        """Return the mesh, and (m, 3) its sides inside a polygon of the input."""
+        checked = at_unit_size(check_mesh(self.given.vertices, self.given.faces, repair=repair))
+        return checked, turn_corners(checked, ~self.given.is_side())
+
+    def _visibility(self, checked: CheckedMesh, options: Options) -> FloatArray:
+        up = None if options.up is None else np.array(options.up)
+        key = options.repair, None if up is None else up.tobytes()
+        return self._seen.of(key, lambda: visible_share(checked.mesh.vertices, checked.mesh.faces, up))
+
+
 def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
     """Check a mesh, and what the options say of its vertices; see `coneflat.flatten` for the arguments.
 
@@ -76,52 +151,29 @@ def prepare(mesh: Any, faces: ArrayLike | None, options: Options) -> Prepared:
         MeshError: the mesh cannot be flattened.
         OptionError: an option does not fit it.
     """
-    given = as_input(mesh, faces)
-    checked = at_unit_size(check_mesh(given.vertices, given.faces, repair=options.repair))
-    own = _own_lengths(given, checked, options)
-    lengths, note = mollify(
-        edge_lengths(checked.mesh.vertices, checked.mesh.faces) if own is None else own,
-        strict=options.strict,
-        names=checked.face_origin,
+    return Source(as_input(mesh, faces)).prepared(options)
+
+
+def _open_triangles(
+    checked: CheckedMesh, own: FloatArray | None, strict: bool
+) -> tuple[FloatArray, str | None]:
+    """Return (m, 3) side lengths with which every triangle has area, and a note if they had to change."""
+    lengths = edge_lengths(checked.mesh.vertices, checked.mesh.faces) if own is None else own
+    return mollify(lengths, strict=strict, names=checked.face_origin)
+
+
+def _parts(mesh: TriangleMesh, marked: IntArray, lengths: FloatArray) -> tuple[Part, ...]:
+    """Return the connected parts of a mesh that is open along edges (k,)."""
+    opened = open_along(mesh, marked) if len(marked) else CutMesh(mesh, np.arange(len(mesh.vertices)))
+    return tuple(
+        (part, opened.origin[vertices], faces, lengths[faces])
+        for part, vertices, faces in opened.mesh.split_components()
     )
-    is_diagonal = turn_corners(checked, ~given.is_side())
-    constraints = locate_constraints(checked, options, given)
-    notes = [] if note is None else [note]
-    forbidden = np.zeros(len(checked.mesh.edges), dtype=bool)
-    if options.forbidden_seams is not None:
-        forbidden[named_edges(checked, np.asarray(options.forbidden_seams))] = True
-    forbidden |= edges_within(checked, options.seamless, len(np.asarray(given.vertices)))
-    marked = np.empty(0, dtype=np.int64)
-    opened = CutMesh(checked.mesh, np.arange(len(checked.mesh.vertices)))
-    if options.marks_seams:
-        marked, alone = effective_marks(checked.mesh, marked_edges(checked, options, given, forbidden))
-        if len(alone):
-            notes.append(_nothing_cut(constraints.names[checked.mesh.edges[alone]]))
-        constraints.keep_off(checked.mesh.edges[marked])
-        constraints = constraints.with_marks(checked.mesh.edges[marked])
-        opened = open_along(checked.mesh, marked)
-    seen = None
-    if options.hide_seams:
-        up = None if options.up is None else np.array(options.up)
-        seen = visible_share(checked.mesh.vertices, checked.mesh.faces, up)
 
-    def components() -> Iterator[Component]:
-        for part, vertices, part_faces in opened.mesh.split_components():
-            origin = opened.origin[vertices]
-            is_forbidden = forbidden[checked.mesh.halfedge_edges].reshape(-1, 3)[part_faces]
-            own = constraints.within(origin)
-            yield Component(
-                part,
-                origin,
-                part_faces,
-                lengths[part_faces],
-                is_diagonal[part_faces],
-                is_forbidden,
-                None if seen is None else seen[origin],
-                own.without(out_of_reach(part, is_forbidden)) if is_forbidden.any() else own,
-            )
 
-    return Prepared(given, checked, tuple(notes), tuple(components()), checked.mesh.edges[marked], own)
+def _within_reach(constraints: Constraints, mesh: TriangleMesh, is_forbidden: BoolArray) -> Constraints:
+    """Return constraints of a component that forbid cones where no seam gets."""
+    return constraints.without(out_of_reach(mesh, is_forbidden)) if is_forbidden.any() else constraints
 
 
 def _own_lengths(given: InputMesh, checked: CheckedMesh, options: Options) -> FloatArray | None:

@@ -378,6 +378,12 @@ class RunOptions(InputOptions):
         Choice(SOLVERS),
         "What solves the linear systems; auto is the fastest that is installed. amg iterates, for what fits no other.",
     )
+    threads: int = option(
+        2,
+        Whole(256),
+        "Threads of PARDISO, which solves large systems; two stages at once at most are done by more than one. The "
+        "last digits depend on it, so that it is the same on every machine unless told otherwise.",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import FloatArray, IntArray
+from ..progress import go_on
 from .key_paths import Fixed, KeyPaths, Parts, find_key_paths
 from .open_mesh import NO_COSTS, NOTHING, OpenMesh, Reach
 
@@ -41,6 +42,7 @@ def shorten(work: OpenMesh, fixed: Fixed, enough: int) -> None:
         work.glue(seams.halfedges(loose))
         changed: set[int] = set()
         for gone in () if loose else _exchanges(seams, waiting[0]):
+            go_on()
             if work.effort >= enough:
                 break
             name = _name(work, seams.halfedges(gone))

@@ -4,7 +4,15 @@ The ladder, best first: MKL PARDISO (pypardiso) for large systems, CHOLMOD witho
 (SciPy), and conjugate gradients with multigrid (pyamg) for what fits no factorization.
 """
 
-from .back_ends import HermitianFactor, available, factorize, solving
+from .back_ends import HermitianFactor, available, factorize, solving, used_again
 from .factors import Factor, NotPositiveDefinite
 
-__all__ = ["Factor", "HermitianFactor", "NotPositiveDefinite", "available", "factorize", "solving"]
+__all__ = [
+    "Factor",
+    "HermitianFactor",
+    "NotPositiveDefinite",
+    "available",
+    "factorize",
+    "solving",
+    "used_again",
+]

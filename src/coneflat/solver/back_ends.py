@@ -109,6 +109,14 @@ def factorize(
     return factor
 
 
+def used_again(factor: Factor) -> Factor:
+    """Return a factor that was kept; its back end counts as used."""
+    choice = _choice.get()
+    if choice is not None and factor.name:
+        choice.used[factor.name] = None
+    return factor
+
+
 def best_for(size: int) -> str:
     """Return the name of the back end for so many unknowns."""
     names: tuple[str, ...] = ("cholespy",)

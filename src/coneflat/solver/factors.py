@@ -23,9 +23,11 @@ class Factor(Protocol):
     """A factorized matrix.
 
     Attributes:
+        name: of the back end; "" for none.
         break_even: how many solutions, with what conjugate gradients do besides, take as long as another factorization.
     """
 
+    name: str
     break_even: int
 
     def solve(self, right: FloatArray) -> FloatArray:
@@ -44,6 +46,7 @@ class Factor(Protocol):
 class EmptyFactor:
     """The factor of a matrix without rows, which a mesh without free vertices has."""
 
+    name = ""
     break_even = 1
 
     def solve(self, right: FloatArray) -> FloatArray:
@@ -58,6 +61,7 @@ class EmptyFactor:
 class SuperLUFactor:
     """A sparse LU factorization that keeps a symmetric ordering."""
 
+    name = "scipy"
     break_even = 60
 
     def __init__(self, matrix: csc_matrix) -> None:
@@ -82,6 +86,7 @@ class SuperLUFactor:
 class CholespyFactor:
     """A sparse Cholesky factorization by CHOLMOD: wheels everywhere, quick to load, slow on large meshes."""
 
+    name = "cholespy"
     break_even = 60
 
     def __init__(self, matrix: csc_matrix) -> None:
@@ -120,6 +125,7 @@ ACCURACY, ITERATIONS = 1e-11, 400
 class MultigridSolver:
     """Conjugate gradients preconditioned by a hierarchy of coarser systems: memory in proportion to the mesh."""
 
+    name = "amg"
     break_even = 4
 
     def __init__(self, matrix: csc_matrix) -> None:

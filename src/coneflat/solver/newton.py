@@ -9,6 +9,7 @@ import numpy as np
 
 from .._arrays import FloatArray
 from ..errors import MetricError
+from ..progress import go_on
 
 # A step of this share of the variables is lost in the sum.
 ROUNDING = 2.0**-52
@@ -130,6 +131,7 @@ def _search_line(
         place = here.place + length * step
         if np.array_equal(place, here.place):  # shorter than rounding
             return None
+        go_on()
         found = function.evaluate(place)
         is_short = float(found.residual @ step) >= 0
         if (is_short or found.largest <= least / 2) and found.is_admissible:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
 from .._arrays import FloatArray
+from ..threads import threads
 from .factors import NotPositiveDefinite
 
 AnyArray: TypeAlias = NDArray[Any]
@@ -29,10 +30,6 @@ ANALYSE, FACTORIZE, SOLVE, RELEASE = 11, 22, 33, -1
 NO_DEFAULTS, ORDERING, SCHEDULE, FROM_ZERO = 0, 1, 23, 34
 # A permutation, given or asked for, switches the factorization on two levels off without a word.
 PARALLEL_NESTED_DISSECTION, ON_TWO_LEVELS = 3, 1
-# In every phase: to solve on fewer threads than were factorized on gives wrong results without an error, and to
-# factorize anew on more than were solved on ends the process. On two levels results are the same, bit for bit, from one
-# run to the next, and two threads are used on any machine.
-THREADS = 2
 # So many right-hand sides are solved faster together than one by one.
 TOGETHER = 2
 # MKL's file on each system, and what tells pypardiso of another one.
@@ -46,12 +43,18 @@ OUT_OF_MEMORY, ZERO_PIVOT = -2, -4
 
 
 class PardisoFactor:
-    """A sparse Cholesky factorization whose analysis serves other matrices of the same pattern."""
+    """A sparse Cholesky factorization whose analysis serves other matrices of the same pattern.
 
+    It stays on as many threads as it was made on: to solve on fewer than were factorized on gives wrong results
+    without an error, and to factorize anew on more than were solved on ends the process. On two levels results are the
+    same, bit for bit, from one run to the next, and differ in the last digits between numbers of threads.
+    """
+
+    name = "pardiso"
     break_even = 30
 
     def __init__(self, matrix: csc_matrix, kind: int = POSITIVE_DEFINITE) -> None:
-        n, self._kind = matrix.shape[0], kind
+        n, self._kind, self._threads = matrix.shape[0], kind, threads()
         self._handle = np.zeros(64, dtype=np.int64)
         self._table = np.zeros(64, dtype=np.int32)
         self._table[[NO_DEFAULTS, ORDERING, SCHEDULE, FROM_ZERO]] = (
@@ -62,7 +65,7 @@ class PardisoFactor:
         )
         self._order = np.zeros(n, dtype=np.int32)
         # What is released when this object goes: PARDISO keeps its memory elsewhere.
-        self._finalizer = weakref.finalize(self, _release, kind, self._handle, self._table, n)
+        self._finalizer = weakref.finalize(self, _release, kind, self._threads, self._handle, self._table, n)
         self._set_pattern(matrix)
         self._fill(matrix)
 
@@ -101,6 +104,7 @@ class PardisoFactor:
         count = 1 if right is None or right.ndim == 1 else len(right)
         code = _pardiso(
             self._kind,
+            self._threads,
             phase,
             self._handle,
             self._table,
@@ -126,15 +130,16 @@ def _aligned(array: AnyArray, with_values: bool = True) -> FloatArray:
     return copy
 
 
-def _release(kind: int, handle: AnyArray, table: AnyArray, n: int) -> None:
+def _release(kind: int, thread_count: int, handle: AnyArray, table: AnyArray, n: int) -> None:
     none = np.zeros(1)
     order = np.zeros(1, dtype=np.int32)
     starts = np.zeros(n + 1, dtype=np.int32)
-    _pardiso(kind, RELEASE, handle, table, (none, starts, order, order), (None, None), 1)
+    _pardiso(kind, thread_count, RELEASE, handle, table, (none, starts, order, order), (None, None), 1)
 
 
 def _pardiso(
     kind: int,
+    thread_count: int,
     phase: int,
     handle: AnyArray,
     table: AnyArray,
@@ -145,7 +150,7 @@ def _pardiso(
     values, starts, rows, order = matrix
     code = ctypes.c_int32(0)
     pardiso, set_threads = _routines()
-    threads = set_threads(THREADS)
+    before = set_threads(thread_count)
     pardiso(
         _address(handle),
         *map(_number, (1, 1, kind, phase, len(starts) - 1)),
@@ -156,7 +161,7 @@ def _pardiso(
         *map(_address, sides),
         ctypes.byref(code),
     )
-    set_threads(threads)
+    set_threads(before)
     return code.value
 
 

@@ -1,6 +1,7 @@
 """A process that flattens: `python -m coneflat.apps.studio.child` reads jobs and writes layouts.
 
-A flattening is given up as soon as a newer one is wanted. The mesh stays in memory between them.
+A flattening is given up as soon as a newer one is wanted. The mesh stays in memory between them, with all that depends
+on it alone.
 """
 
 from __future__ import annotations
@@ -16,12 +17,19 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from ...errors import ConeflatError, NonManifoldError, NonOrientableError, StudioError
+from ...progress import asking
 from .frames import Head, read_frame, write_frame
 
 if TYPE_CHECKING:
+    from ...flattener import Flattener
     from ...input.join import Joined
     from ...result.flattening import Flattening
 
+#: Polygons from which on the first layout is shown, too: of smaller meshes the last is there as soon.
+EARLY = 20_000
+#: What stands for numbers until they are known, and what the first layout is.
+TO_COME = "…"
+FIRST = "First view: distortion is yet to be evened out, and overlaps to be parted  ·  …"
 #: Failures that a repair would mend.
 REPAIRABLE = (NonManifoldError, NonOrientableError)
 
@@ -65,35 +73,52 @@ class Jobs:
         return self._over or job != self._newest
 
 
-class Flattener:
-    """Flattens a mesh again and again.
+class Bench:
+    """Flattens again and again; what depends on the mesh alone stays from one flattening to the next.
 
     Attributes:
         result: of the last flattening; None where it has failed.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, early_from: int = EARLY) -> None:
+        """early_from: polygons of meshes whose first layout is shown, too."""
         self.result: Flattening | None = None
+        self._early_from = early_from
         self._source: Joined | None = None
+        self._flattener: Flattener | None = None
         self._read: tuple[str, str] | None = None
 
-    def flatten(self, job: Head, told: Callable[[str, float], None]) -> tuple[Head, bytes]:
-        """Return a layout as the page takes it: numbers and texts, and arrays."""
-        from ...pipeline import flatten
-        from ...view.page.content import content_of
-        from ...view.page.payload import head_and_block
-        from ...view.page.webpage import MOST_TRIANGLES
+    def flatten(
+        self, job: Head, told: Callable[[str, float], None], show: Callable[[Head, bytes], None]
+    ) -> tuple[Head, bytes]:
+        """Return a layout as the page takes it: numbers and texts, and arrays.
 
+        Args:
+            job: the mesh, and what is chosen.
+            told: called with what is being done, and the fraction that is done.
+            show: called with the first layout, in the same form, before it is what it is to be.
+        """
         self.result = None
-        source = self._open(job["mesh"], job["sha256"], told)
-        result = flatten(source.mesh, progress=told, **arguments(source, job["choices"]))
+        source, flattener = self._open(job["mesh"], job["sha256"], told)
+        name, furthest = Path(job["mesh"]).name, 0.0
+
+        def told_on(stage: str, fraction: float) -> None:
+            nonlocal furthest
+            furthest = max(furthest, fraction)
+            told(stage, furthest)
+
+        def show_first(first: Flattening) -> None:
+            told_on("first view", furthest)
+            show(*_picture(first, name, is_first=True))
+
+        chosen = arguments(source, job["choices"])
+        is_large = len(source.mesh.offsets) - 1 >= self._early_from
+        result = flattener.flatten(early=show_first if is_large else None, progress=told_on, **chosen)
         result = replace(result, notes=source.notes_of(result.notes))
         told("picture", 1.0)
-        content = content_of(result, MOST_TRIANGLES)
-        head, block = head_and_block(result, content, None, Path(job["mesh"]).name, "y", "checker")
+        picture = _picture(result, name)
         self.result = result
-        cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
-        return {"head": head, "found": cones.tolist(), "seconds": result.seconds}, block
+        return picture
 
     def export(self, ending: str) -> bytes:
         """Return the result as a file.
@@ -112,13 +137,34 @@ class Flattener:
         write_stream(self.result, stream, ending)
         return stream.getvalue()
 
-    def _open(self, mesh: str, sha256: str, told: Callable[[str, float], None]) -> Joined:
+    def _open(self, mesh: str, sha256: str, told: Callable[[str, float], None]) -> tuple[Joined, Flattener]:
         from ...files.read import read_joined
+        from ...flattener import Flattener
 
-        if self._source is None or self._read != (mesh, sha256):
+        if self._source is None or self._flattener is None or self._read != (mesh, sha256):
             told("read", 0.0)
-            self._source, self._read = read_joined(Path(mesh)), (mesh, sha256)
-        return self._source
+            self._source = self._flattener = None  # There may not be memory for both.
+            source = read_joined(Path(mesh))
+            self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
+        return self._source, self._flattener
+
+
+def _picture(result: Flattening, name: str, is_first: bool = False) -> tuple[Head, bytes]:
+    """Return what the page shows of a result; of the first layout no numbers, which will be others."""
+    from ...result.from_uv import shown_rows
+    from ...view.page.content import content_of
+    from ...view.page.payload import Told, head_and_block
+    from ...view.page.webpage import MOST_TRIANGLES
+
+    told = None
+    if is_first:
+        rows = [(measure, TO_COME, meaning) for measure, _, meaning in shown_rows(result)]
+        told = Told(FIRST, rows)
+        result = replace(result, notes=())
+    content = content_of(result, MOST_TRIANGLES)
+    head, block = head_and_block(result, content, None, name, "y", "checker", told)
+    cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
+    return {"head": head, "found": cones.tolist(), "seconds": result.seconds}, block
 
 
 def arguments(source: Joined, choices: dict[str, Any]) -> dict[str, Any]:
@@ -130,20 +176,28 @@ def arguments(source: Joined, choices: dict[str, Any]) -> dict[str, Any]:
 
 def serve(jobs: Jobs, answers: IO[bytes]) -> None:
     """Do jobs until there are no more."""
-    flattener = Flattener()
+    bench = Bench()
     while (job := jobs.next()) is not None:
         number = job["job"]
 
-        def told(stage: str, fraction: float, number: int = number) -> None:
+        def ask(number: int = number) -> None:
             if jobs.is_stale(number):
                 raise Superseded
+
+        def told(stage: str, fraction: float, number: int = number) -> None:
+            ask(number)
             write_frame(answers, {"job": number, "stage": stage, "fraction": fraction})
+
+        def show(head: Head, body: bytes, number: int = number) -> None:
+            ask(number)
+            write_frame(answers, {"job": number, "early": head}, body)
 
         try:
             if job["do"] == "flatten":
-                head, body = flattener.flatten(job, told)
+                with asking(ask):
+                    head, body = bench.flatten(job, told, show)
             else:
-                head, body = {}, flattener.export(job["ending"])
+                head, body = {}, bench.export(job["ending"])
             write_frame(answers, {"job": number, "done": head}, body)
         except Superseded:
             write_frame(answers, {"job": number, "given_up": True})

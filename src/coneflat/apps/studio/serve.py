@@ -78,7 +78,7 @@ class Teller:
         trouble = "" if state["trouble"] is None else str(state["trouble"]["text"])
         layout, before = self._told
         self._told = (state["layout"], trouble)
-        if state["layout"] != layout and shown is not None:
+        if state["layout"] != layout and shown is not None and not state["early"]:
             self._tell(f"layout {state['layout']} in {state['seconds']:.2f} s: {shown[0]['title']}")
         if trouble and trouble != before:
             self._tell(trouble)

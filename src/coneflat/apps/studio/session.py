@@ -6,7 +6,7 @@ import math
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...errors import MeshFileError, ProjectError, StudioError
 from ...options.kinds import as_number, as_whole
@@ -24,6 +24,14 @@ EXPORTS = (".obj", ".ply", ".glb", ".npz", ".svg")
 PATIENCE = 600.0  # seconds that saving waits for the flattening before it
 
 
+class _Layout(NamedTuple):
+    """What is shown, the cones of it, and the seconds that it took."""
+
+    shown: tuple[Head, bytes] | None
+    found: list[int]
+    seconds: dict[str, float]
+
+
 class Session:
     """What the user works on. All of it may be called from any thread.
 
@@ -31,6 +39,7 @@ class Session:
         folder: where projects are, and whatever the page names.
         version: counts what has happened; who has seen a version need not look again.
         layout: the number of the layout that is shown; 0 for none.
+        is_early: whether that is the first one of a change, and another will follow.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -38,6 +47,7 @@ class Session:
         self.folder = folder.resolve()
         self.version = 0
         self.layout = 0
+        self.is_early = False
         self.project_file: Path | None = None
         self._mesh: Path | None = None
         self._sha256 = ""
@@ -48,6 +58,7 @@ class Session:
         self._found: list[int] = []
         self._seconds: dict[str, float] = {}
         self._shown: tuple[Head, bytes] | None = None
+        self._last: _Layout | None = None  # of an earlier change, while one on the way is shown
         self._answers: dict[int, tuple[Head, bytes]] = {}
         self._written: tuple[Choices | None, dict[str, str]] = None, {}
         self._changed = threading.Condition(threading.RLock())
@@ -117,6 +128,7 @@ class Session:
             self._mesh, self._sha256, self.project_file = mesh.resolve(), sha256, project
             self._history = History(chosen)
             self._found, self._shown, self.layout = [], None, 0
+            self.is_early, self._last = False, None
             self._flatten()
 
     # What the user does.
@@ -196,6 +208,11 @@ class Session:
 
     # What comes of it.
 
+    @property
+    def stages(self) -> dict[str, float]:
+        """The seconds that each stage of the layout that is shown took."""
+        return dict(self._seconds)
+
     def state(self) -> dict[str, Any]:
         """Return all that there is to know, as plain values."""
         with self._changed:
@@ -213,6 +230,7 @@ class Session:
                 "busy": self._busy,
                 "trouble": self._trouble,
                 "layout": self.layout,
+                "early": self.is_early,
                 "found": self._found,
                 "seconds": sum(self._seconds.values()),
                 **self._replayed(),
@@ -289,22 +307,38 @@ class Session:
                 return
             if "stage" in head:
                 self._busy = {"stage": head["stage"], "fraction": head["fraction"]}
+            elif "early" in head:
+                self._last = self._last or _Layout(self._shown, self._found, self._seconds)
+                self._show(head["early"], body)
+                self.is_early = True
             elif "error" in head:
-                self._busy = None
+                self._go_back()
                 self._trouble = {"text": head["error"], "repair": head["repair"] and not self._repairs()}
             elif "done" in head:
                 self._busy = None
-                self.layout += 1
-                self._found, self._seconds = head["done"]["found"], head["done"]["seconds"]
-                self._shown = head["done"]["head"], body
+                self._show(head["done"], body)
+                self.is_early, self._last = False, None
             self._tell()
+
+    def _show(self, told: Head, body: bytes) -> None:
+        self.layout += 1
+        self._found, self._seconds = told["found"], told["seconds"]
+        self._shown = told["head"], body
+
+    def _go_back(self) -> None:
+        """Work no more, and show the last layout that was finished instead of one on the way."""
+        self._busy = None
+        if self.is_early and self._last is not None and self._last.shown is not None:
+            self._shown, self._found, self._seconds = self._last
+            self.layout += 1
+            self.is_early, self._last = False, None
 
     def _mourn(self, how: str) -> None:
         with self._changed:
             said = f"the process that flattens {how}; nothing is lost: try again, or undo the last change"
             for job in self._answers:
                 self._answers[job] = ({"error": said}, b"")
-            self._busy = None
+            self._go_back()
             self._trouble = {"text": said, "repair": False}
             self._tell()
 

@@ -7,10 +7,9 @@ import numpy as np
 from ..._arrays import BoolArray, FloatArray, IntArray
 from ...compiled import compiled
 from .best_sets import BestSets
-from .coarse_model import CoarseModel
 from .dense_model import DenseModel, first_least
-from .green import GreenOperator
 from .limits import Limits
+from .linear_model import LinearModel
 
 # A move is tried if it promises to lower E^2 by this share.
 WORTHWHILE = 1e-3
@@ -29,27 +28,26 @@ class ExactModel(DenseModel):
 
     def __init__(
         self,
-        operator: GreenOperator,
-        coarse: CoarseModel,
-        log_scale: FloatArray,
+        linear: LinearModel,
         required: IntArray,
         limits: Limits,
         least: FloatArray,
     ) -> None:
-        none = np.empty(0)
+        none, coarse, operator, log_scale = np.empty(0), linear.coarse, linear.operator, linear.log_scale
         fixed = np.arange(len(required))
         super().__init__(np.empty((0, 0)), none, coarse.constant, none.astype(bool), fixed, limits, none)
         self._operator, self._coarse, self._log_scale = operator, coarse, log_scale
         self._usable = np.ones(len(log_scale), dtype=bool)
         self._indptr = operator.laplacian.indptr.astype(np.int64)
         self._indices = operator.laplacian.indices.astype(np.int64)
-        self._slope = operator.solve(operator.weighted(log_scale))
+        self._slope = linear.score
         self._least = least
         # The Green's functions of the unknowns, in blocks as they came, and their means.
         self._responses: list[FloatArray] = []
         self._means: list[FloatArray] = []
         self.unknowns: IntArray = np.empty(0, dtype=np.int64)
-        self.insert(required)
+        if len(required):
+            self._add(required, operator.known_responses(required))
 
     def restrict(self, usable: BoolArray) -> None:
         """Let cones move to the (f,) usable unknowns alone, and forget the sets found; energies stay known."""
@@ -61,23 +59,25 @@ class ExactModel(DenseModel):
         """Add vertices, if they are not in, and return the places of all."""
         new = np.setdiff1d(unknowns, self.unknowns)
         if len(new):
-            # Required ones come first and stay in the order given.
-            new = unknowns if not len(self.unknowns) else new
-            old = len(self.unknowns)
-            self.unknowns = np.concatenate([self.unknowns, new])
-            rows = self._covariances(self._operator.responses(new))
-            gram = np.empty((len(self.unknowns), len(self.unknowns)))
-            gram[:old, :old] = self.gram
-            gram[old:] = rows
-            gram[:old, old:] = rows[:, :old].T
-            gram[old:, old:] = (rows[:, old:] + rows[:, old:].T) / 2
-            self.gram = gram
-            self.slope = self._slope[self.unknowns]
-            self.usable = self._usable[self.unknowns]
-            self.usable[self.fixed] = False
-            self.least = self._least[self.unknowns]
+            self._add(new, self._operator.responses(new))
         order = np.argsort(self.unknowns, kind="stable")
         return order[np.searchsorted(self.unknowns, unknowns, sorter=order)]
+
+    def _add(self, new: IntArray, responses: FloatArray) -> None:
+        """Add k vertices with their Green's functions (k, f)."""
+        old = len(self.unknowns)
+        self.unknowns = np.concatenate([self.unknowns, new])
+        rows = self._covariances(responses)
+        gram = np.empty((len(self.unknowns), len(self.unknowns)))
+        gram[:old, :old] = self.gram
+        gram[old:] = rows
+        gram[:old, old:] = rows[:, :old].T
+        gram[old:, old:] = (rows[:, old:] + rows[:, old:].T) / 2
+        self.gram = gram
+        self.slope = self._slope[self.unknowns]
+        self.usable = self._usable[self.unknowns]
+        self.usable[self.fixed] = False
+        self.least = self._least[self.unknowns]
 
     def _covariances(self, responses: FloatArray) -> FloatArray:
         """Add the Green's functions (k, f) of k unknowns more; return (k, m + k) their covariances with all."""

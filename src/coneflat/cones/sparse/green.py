@@ -7,16 +7,20 @@ functions, a back-substitution each.
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
 from ..._arrays import BoolArray, FloatArray, IntArray
-from ...solver import Factor, factorize
+from ...solver import Factor, factorize, used_again
 
 # Right-hand sides solved at once: more gain nothing and cost memory, of which they take so many numbers at most.
 BATCH, NUMBERS = 32, 50_000_000
+# The last Green's functions of cones that the user places are kept, in so many numbers at most. So many are solved for
+# at a time, whatever is wanted: on their number the last digits depend, and what was kept must be what would be found.
+KEPT, SIDE_BY_SIDE = 8_000_000, 4
 
 
 class GreenOperator:
@@ -37,9 +41,24 @@ class GreenOperator:
         self.laplacian.sort_indices()
         self.areas = areas[self.vertices]
         self.is_closed = len(self.vertices) == len(order)
+        self._share = areas
+        self._known: dict[int, FloatArray] = {}
+
+    def weighing(self, areas: FloatArray) -> GreenOperator:
+        """Return the operator with other weights (n,); the factorization is the same."""
+        if np.array_equal(areas, self._share):
+            return self
+        _ = self._factorized  # which the copy has, too
+        other = copy(self)
+        other.areas, other._share, other._known = areas[self.vertices], areas, {}
+        return other
+
+    @property
+    def _factor(self) -> Factor:
+        return used_again(self._factorized)
 
     @cached_property
-    def _factor(self) -> Factor:
+    def _factorized(self) -> Factor:
         inner = self.laplacian[1:][:, 1:] if self.is_closed else self.laplacian
         return factorize(csc_matrix(inner))
 
@@ -91,4 +110,21 @@ class GreenOperator:
             own[:] = -self.areas if self.is_closed else 0.0
             own[each, some] += 1.0
             own[:] = self._solve_closed(own) if self.is_closed else self._factor.solve(own.T).T
+        return rows
+
+    def known_responses(self, unknowns: IntArray) -> FloatArray:
+        """Return (k, f) the Green's functions of sources at some unknowns, of which those used last are kept."""
+        wanted, known = unknowns.tolist(), self._known
+        new = [unknown for unknown in dict.fromkeys(wanted) if unknown not in known]
+        for start in range(0, len(new), SIDE_BY_SIDE):
+            some = new[start : start + SIDE_BY_SIDE]
+            block = np.array(some + some[:1] * (SIDE_BY_SIDE - len(some)))
+            for unknown, response in zip(some, self.responses(block), strict=False):
+                known[unknown] = response.copy()
+        for unknown in wanted:
+            # Taken out and put back, so that the first is the one that was used longest ago.
+            known[unknown] = known.pop(unknown)
+        rows = np.array([known[unknown] for unknown in wanted]).reshape(len(wanted), len(self.vertices))
+        for unknown in list(known)[: max(0, len(known) - max(1, KEPT // len(self.vertices)))]:
+            del known[unknown]
         return rows

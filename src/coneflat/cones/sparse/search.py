@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,18 +26,14 @@ from ...geometry.operators import vertex_areas, weighted_areas
 from ...geometry.ties import tie_key as key_of_shape
 from ...mesh import TriangleMesh
 from ...text import list_some, plural
-from ...threads import meanwhile
-from ..solution import FULL_TURN, ConeSolution, LaplacianInverse, target_from_log_scale
+from ..solution import FULL_TURN, ConeSolution
 from .best_sets import ConeSet
-from .coarse_model import candidates, coarse_model
+from .coarse_model import candidates
 from .dense_model import DenseModel
 from .exact_model import ExactModel
-from .green import GreenOperator
 from .limits import MOST_CONES, Limits
+from .linear_model import LinearModel
 
-# Unknowns of the coarse model: one for so many vertices, within bounds that keep its dense inverse cheaper than the
-# factorization of the mesh's own Laplacian.
-VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 12, 600, 1200
 # How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself.
 COARSE_DOUBT = 1.35
 # Where the best set of a size misses by less than this factor of E^2, by what the coarse model tells of it or on the
@@ -87,6 +82,7 @@ class ConeSearch:
         required: vertices that are cones in any case.
         allowed: (n,) mask of the other vertices that may be cones; None: all.
         room: (n,) the widest angle of a cone at each vertex, radians; None: as far as `max_cone_angle` goes.
+        linear: the linear model of these, with these weights, if something has it already.
 
     Attributes:
         tell: called with what is being tried.
@@ -112,29 +108,25 @@ class ConeSearch:
         required: Iterable[int] = (),
         allowed: BoolArray | None = None,
         room: FloatArray | None = None,
+        linear: LinearModel | None = None,
     ) -> None:
         chi = None if is_boundary.any() else euler_characteristic
         limits = self.limits = Limits.of_angles(chi, min_cone_angle, max_cone_angle, positive_only)
         cones = required_vertices(required, is_boundary)
         usable = ~is_boundary if allowed is None else ~is_boundary & allowed
-        order = np.lexsort((curvature, areas)) if tie_key is None else np.argsort(tie_key, kind="stable")
-        share = weighted_areas(areas, weights)
         limits.check_available(usable, cones)
-        self._laplacian, self.curvature, self.is_boundary = laplacian, curvature, is_boundary
+        self.curvature, self.is_boundary = curvature, is_boundary
         self.tell: Callable[[str], None] = lambda _: None
-        self.operator = GreenOperator(laplacian, share, is_boundary, order)
+        if linear is None:
+            share = weighted_areas(areas, weights)
+            linear = LinearModel.of(laplacian, curvature, share, is_boundary, tie_key)
+        self._linear, self.operator, self._coarse_model = linear, linear.operator, linear.coarse
         vertices = self.operator.vertices
-        inner = curvature[vertices]
-        size = min(max(len(vertices) // VERTICES_PER_UNKNOWN, LEAST_SIZE), MOST_SIZE)
-        with meanwhile(partial(coarse_model, self.operator, inner, size), 2 * len(vertices)) as modelling:
-            log_scale = -self.operator.solve(inner)
-            model = modelling.result().scaled_to(float(log_scale @ self.operator.weighted(log_scale)))
-        self._coarse_model = model
         self._least = np.full(len(vertices), limits.least)
         if room is not None:
             self._least = np.maximum(self._least, np.minimum(FULL_TURN - room[vertices], 0.0))
         self._required = self.unknowns_of(cones)
-        self.exact = ExactModel(self.operator, model, log_scale, self._required, limits, self._least)
+        self.exact = ExactModel(linear, self._required, limits, self._least)
         self.restrict(usable)
 
     @classmethod
@@ -360,17 +352,7 @@ class ConeSearch:
 
     def solution_of(self, unknowns: IntArray, curvatures: FloatArray) -> ConeSolution:
         """Return the solution of given cones and curvatures."""
-        operator = self.operator
-        cones = operator.vertices[unknowns]
-        target = np.zeros(len(self.curvature))
-        target[cones] = curvatures
-        log_scale = np.zeros(len(target))
-        log_scale[operator.vertices] = operator.solve((target - self.curvature)[operator.vertices])
-        absorbed = target_from_log_scale(self._laplacian, self.curvature, log_scale, self.is_boundary)
-        is_zero = np.ones(len(target), dtype=bool)
-        is_zero[operator.vertices] = False
-        inverse = LaplacianInverse(operator.solve_at_vertices, self._laplacian, is_zero, operator.break_even)
-        return ConeSolution(cones, target + absorbed, log_scale, inverse)
+        return self._linear.solution_of(self.operator.vertices[unknowns], curvatures)
 
 
 def required_vertices(required: Iterable[int], is_boundary: BoolArray) -> IntArray:

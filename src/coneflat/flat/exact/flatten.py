@@ -10,6 +10,7 @@ import numpy as np
 from ..._arrays import BoolArray, FloatArray, IntArray
 from ...cones import ConeSolution
 from ...geometry import double_areas
+from ...geometry.intrinsic import IntrinsicTriangulation
 from ...geometry.straight import FlatTriangles
 from ...layout.unfold import unfold
 from ...layout.untangle import Untangled, untangle
@@ -221,7 +222,11 @@ class ExactFlatMetric:
 
 
 def exact_flattening(
-    mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, choices: ExactChoices
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    solution: ConeSolution,
+    choices: ExactChoices,
+    flipped: tuple[IntrinsicTriangulation, IntArray] | None = None,
 ) -> ExactFlatMetric:
     """Return the exact discrete conformal metric that the linear solution is the first step to.
 
@@ -230,6 +235,7 @@ def exact_flattening(
         lengths: (m, 3) side lengths, model units.
         solution: cones, target curvatures and the linear log scale.
         choices: what is prescribed.
+        flipped: the intrinsic Delaunay triangulation and the half-edges flipped for it, if something has them already.
 
     Raises:
         ConvergenceError: the solve ends short of its tolerance, unless `best_effort`.
@@ -240,7 +246,7 @@ def exact_flattening(
         fixed[solution.cones] = True
     is_open = choices.is_open(mesh)
     fixed |= is_open
-    solved, target = _solve(mesh, lengths, solution, choices, fixed)
+    solved, target = _solve(mesh, lengths, solution, choices, fixed, flipped)
     failure = None
     if not solved.converged:
         worst = solved.worst_vertex if choices.names is None else choices.names[solved.worst_vertex]
@@ -324,6 +330,7 @@ def _solve(
     solution: ConeSolution,
     choices: ExactChoices,
     fixed: BoolArray,
+    flipped: tuple[IntrinsicTriangulation, IntArray] | None,
 ) -> tuple[ExactMetric, FloatArray]:
     """Return the metric and the curvature it was solved for; a round boundary follows from the metric."""
     boundary = choices.boundary
@@ -336,7 +343,14 @@ def _solve(
         # The common subdivision is that of the mesh's own conformal class, without flips before the solve.
         flips = not choices.refine
         return exact_metric(
-            mesh, lengths, wanted, fixed=fixed, start=start, delaunay=flips, preconditioner=inverse
+            mesh,
+            lengths,
+            wanted,
+            fixed=fixed,
+            start=start,
+            delaunay=flips,
+            preconditioner=inverse,
+            flipped=flipped if flips else None,
         )
 
     inside = np.where(mesh.is_boundary_vertex, 0.0, solution.target)

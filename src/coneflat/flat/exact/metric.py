@@ -76,6 +76,7 @@ def exact_metric(
     preconditioner: Inverse | None = None,
     tolerance: float = 1e-10,
     delaunay: bool = True,
+    flipped: tuple[IntrinsicTriangulation, IntArray] | None = None,
     max_steps: int = 200,
     kind: type[ConformalProblem] = ConformalProblem,
 ) -> ExactMetric:
@@ -97,6 +98,7 @@ def exact_metric(
             permits.
         delaunay: flip the input to its intrinsic Delaunay triangulation first. Without it, the conformal
             class is that of the input's own triangles; the same on Delaunay meshes.
+        flipped: that triangulation with the half-edges flipped, from `intrinsic_delaunay`, if something has it already.
         max_steps: Newton steps after which the best metric so far is returned; counted anew if the surface
             has to be doubled.
         kind: what scales the lengths: factors at the vertices, or the radii of circles there
@@ -134,7 +136,8 @@ def exact_metric(
 
     def solved_from(first: FloatArray) -> tuple[ConformalProblem, State, IntArray, int, int]:
         """Return the problem, its best state, the vertices it is about, how many flips made it Delaunay, and steps."""
-        triangulation, original = intrinsic_triangulation(mesh, lengths), np.arange(n)
+        original, known = np.arange(n), flipped if delaunay and not doubled else None
+        triangulation = intrinsic_triangulation(mesh, lengths) if known is None else known[0].copy()
         if doubled:
             triangulation, original = double(triangulation)
             problem = kind(
@@ -146,7 +149,7 @@ def exact_metric(
             )
         else:
             problem = kind(triangulation, flat_turn, target, fixed, pinned, preconditioner)
-        euclidean = problem.prepare(delaunay)
+        euclidean = problem.prepare(delaunay, None if known is None else known[1])
         state, steps = find_scale(problem, first[original], tolerance, max_steps)
         return problem, state, original, euclidean, steps
 

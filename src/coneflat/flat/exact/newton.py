@@ -93,11 +93,14 @@ class ConformalProblem:
         """Whether there is a boundary, where edges cannot be flipped and triangles may stay broken."""
         return bool((self.triangulation.twin < 0).any())
 
-    def prepare(self, delaunay: bool) -> int:
-        """Flip the input to Delaunay in its own metric, if so wanted; return the number of flips."""
+    def prepare(self, delaunay: bool, flipped: IntArray | None = None) -> int:
+        """Flip the input to Delaunay in its own metric, if so wanted; return the number of flips.
+
+        flipped: the half-edges by whose flips it has become so already, if it has.
+        """
         if not delaunay:
             return 0
-        self.records.append(make_delaunay(self.triangulation))
+        self.records.append(make_delaunay(self.triangulation) if flipped is None else flipped)
         return len(self.records[0])
 
     def flat_lengths(self, log_scale: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ class Studio {
     this.viewer = this.news = this.refused = null;
     this.layout = 0;
     this.pending = 0;
-    this.took = 0; // milliseconds from the last change to its picture
+    this.took = this.sight = 0; // milliseconds from the last change to its picture, and to the first view of it
     this.selected = null; // the vertex of the cone that is picked, whatever number it has
     this.tools = new Tools(this);
     this.paint = new Paint(this);
@@ -78,12 +78,16 @@ class Studio {
     if (!isSame) this.selected = null;
     this.repicking = false;
     this.pickSelected();
-    requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime()));
+    const {asked, news} = this;
+    requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime(asked, news.early)));
   }
 
-  noteTime() {
-    if (!this.asked) return;
-    this.took = performance.now() - this.asked;
+  /** Note that what was asked for at some time is drawn, or a first view of it. */
+  noteTime(asked, isEarly) {
+    if (!asked || asked !== this.asked) return;
+    this.sight ||= performance.now() - asked;
+    if (isEarly) return;
+    this.took = performance.now() - asked;
     this.asked = 0;
     this.panel.showWork();
   }
@@ -92,6 +96,7 @@ class Studio {
 
   async act(action) {
     this.asked = performance.now();
+    this.sight = 0;
     this.refused = null;
     this.pending++;
     try {

@@ -1,0 +1,98 @@
+"""The linear model of a mesh, phi = phi_0 + sum_s k_s g_s: all of it that no cone has a part in."""
+
+from __future__ import annotations
+
+from functools import cached_property, partial
+
+import numpy as np
+from scipy.sparse import csc_matrix
+
+from ..._arrays import BoolArray, FloatArray, IntArray
+from ...threads import meanwhile
+from ..solution import ConeSolution, LaplacianInverse, target_from_log_scale
+from .coarse_model import CoarseModel, coarse_model
+from .green import GreenOperator
+
+# Unknowns of the coarse model: one for so many vertices, within bounds that keep its dense inverse cheaper than the
+# factorization of the mesh's own Laplacian.
+VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 12, 600, 1200
+
+
+class LinearModel:
+    """What the log scales of all sets of cones on a connected mesh have in common; each part is found when needed.
+
+    Attributes:
+        laplacian: (n, n) cotangent Laplacian.
+        curvature: (n,) angle defect, radians.
+        is_boundary: (n,) vertices at phi = 0 that take what the cones leave.
+        operator: the Laplacian off the boundary, factorized once.
+    """
+
+    def __init__(
+        self, laplacian: csc_matrix, curvature: FloatArray, is_boundary: BoolArray, operator: GreenOperator
+    ) -> None:
+        self.laplacian, self.curvature, self.is_boundary = laplacian, curvature, is_boundary
+        self.operator = operator
+
+    @classmethod
+    def of(
+        cls,
+        laplacian: csc_matrix,
+        curvature: FloatArray,
+        share: FloatArray,
+        is_boundary: BoolArray,
+        tie_key: FloatArray | None,
+    ) -> LinearModel:
+        """Return the model of a mesh.
+
+        Args:
+            laplacian, curvature, is_boundary: see above.
+            share: (n,) what each vertex counts in E; they sum to 1.
+            tie_key: (n,) in whose order unknowns come; None: that of areas and curvatures.
+        """
+        order = np.lexsort((curvature, share)) if tie_key is None else np.argsort(tie_key, kind="stable")
+        return cls(laplacian, curvature, is_boundary, GreenOperator(laplacian, share, is_boundary, order))
+
+    def weighing(self, share: FloatArray) -> LinearModel:
+        """Return the model of the same mesh whose vertices (n,) count otherwise; the factorization serves both."""
+        operator = self.operator.weighing(share)
+        if operator is self.operator:
+            return self
+        return LinearModel(self.laplacian, self.curvature, self.is_boundary, operator)
+
+    @property
+    def inner(self) -> FloatArray:
+        """(f,) curvature of the unknowns."""
+        return self.curvature[self.operator.vertices]
+
+    @cached_property
+    def log_scale(self) -> FloatArray:
+        """(f,) phi_0: without cones."""
+        return -self.operator.solve(self.inner)
+
+    @cached_property
+    def score(self) -> FloatArray:
+        """(f,) half the derivative of E^2 by the curvature of a cone at each vertex, before there is one."""
+        return self.operator.solve(self.operator.weighted(self.log_scale))
+
+    @cached_property
+    def coarse(self) -> CoarseModel:
+        """The kernel of E on a coarse basis."""
+        operator = self.operator
+        size = min(max(len(operator.vertices) // VERTICES_PER_UNKNOWN, LEAST_SIZE), MOST_SIZE)
+        modelled = partial(coarse_model, operator, self.inner, size)
+        with meanwhile(modelled, 2 * len(operator.vertices)) as modelling:
+            constant = float(self.log_scale @ operator.weighted(self.log_scale))
+            return modelling.result().scaled_to(constant)
+
+    def solution_of(self, cones: IntArray, curvatures: FloatArray) -> ConeSolution:
+        """Return the solution of cones (s,) off the boundary with given curvatures (s,), radians."""
+        operator, target = self.operator, np.zeros(len(self.curvature))
+        target[cones] = curvatures
+        log_scale = np.zeros(len(target))
+        log_scale[operator.vertices] = operator.solve((target - self.curvature)[operator.vertices])
+        absorbed = target_from_log_scale(self.laplacian, self.curvature, log_scale, self.is_boundary)
+        is_zero = np.ones(len(target), dtype=bool)
+        is_zero[operator.vertices] = False
+        inverse = LaplacianInverse(operator.solve_at_vertices, self.laplacian, is_zero, operator.break_even)
+        return ConeSolution(cones, target + absorbed, log_scale, inverse)
