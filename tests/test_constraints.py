@@ -255,6 +255,17 @@ class TestRegions:
         with pytest.raises(errors.OptionError, match="a seamless vertex, 100000, is no vertex"):
             flatten(vertices, faces, seamless=[100000])
 
+    def test_what_must_be_cut_all_the_same_is_noted(self):
+        # A ramp of two turns lies over itself in the plane, unless it is cut.
+        plan, faces = shapes.grid(80, 4)
+        turn, radius = 4 * np.pi * plan[:, 0], 1 + 0.5 * plan[:, 1]
+        ramp = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0.1 * turn], axis=1)
+        result = flatten(ramp, faces, cones="none", charts="atlas", seamless=range(len(ramp)))
+        assert len(result.seams)
+        message = f"Cut all the same: {len(result.seams)} edges forbidden as seams"
+        assert any(note.startswith(message) for note in result.notes)
+        assert not flatten(ramp, faces, cones="none", charts="one", seamless=range(len(ramp))).notes
+
     def test_weights_of_some(self, ball):
         vertices, faces, important = ball
         some = dict.fromkeys(np.flatnonzero(important).tolist(), 100.0)

@@ -12,11 +12,10 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from ...errors import ConeflatError, NonManifoldError, NonOrientableError, StudioError
+from ...errors import ConeflatError, NonManifoldError, NonOrientableError
 from ...progress import asking
 from .frames import Head, read_frame, write_frame
 
@@ -120,22 +119,18 @@ class Bench:
         self.result = result
         return picture
 
-    def export(self, ending: str) -> bytes:
-        """Return the result as a file.
+    def make(self, job: Head, told: Callable[[str, float], None]) -> tuple[Head, bytes]:
+        """Return what is asked for beside layouts: a file of the result, quads, or a curve."""
+        from .choices import Choices
+        from .outputs import curve_of, quads_of, saved
 
-        Raises:
-            StudioError: there is no result.
-        """
-        from ...files.write import write_stream
-        from .outlines import layout_svg
-
-        if self.result is None:
-            raise StudioError("there is nothing to save: the last change could not be flattened")
-        if ending == ".svg":
-            return layout_svg(self.result).encode("utf-8")
-        stream = BytesIO()
-        write_stream(self.result, stream, ending)
-        return stream.getvalue()
+        if job["do"] == "export":
+            return {}, saved(self.result, job["ending"])
+        source, _ = self._open(job["mesh"], job["sha256"], told)
+        chosen = Choices.from_plain(job["choices"])
+        if job["do"] == "quads":
+            return {}, quads_of(source, chosen, job["count"], job["ending"], told)
+        return curve_of(source, chosen, told), b""
 
     def _open(self, mesh: str, sha256: str, told: Callable[[str, float], None]) -> tuple[Joined, Flattener]:
         from ...files.read import read_joined
@@ -180,24 +175,23 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
     while (job := jobs.next()) is not None:
         number = job["job"]
 
-        def ask(number: int = number) -> None:
-            if jobs.is_stale(number):
+        def ask(wanted: int = job.get("after") or number) -> None:
+            if jobs.is_stale(wanted):
                 raise Superseded
 
         def told(stage: str, fraction: float, number: int = number) -> None:
-            ask(number)
+            ask()
             write_frame(answers, {"job": number, "stage": stage, "fraction": fraction})
 
         def show(head: Head, body: bytes, number: int = number) -> None:
-            ask(number)
+            ask()
             write_frame(answers, {"job": number, "early": head}, body)
 
         try:
-            if job["do"] == "flatten":
-                with asking(ask):
-                    head, body = bench.flatten(job, told, show)
-            else:
-                head, body = {}, bench.export(job["ending"])
+            with asking(ask):
+                head, body = (
+                    bench.flatten(job, told, show) if job["do"] == "flatten" else bench.make(job, told)
+                )
             write_frame(answers, {"job": number, "done": head}, body)
         except Superseded:
             write_frame(answers, {"job": number, "given_up": True})

@@ -27,7 +27,7 @@ from .session import Session
 
 MOST_UPLOADED = 512 * 1024 * 1024  # bytes of a mesh
 LONG_POLL = 20.0  # seconds that a question for news waits for some
-TYPES = {".svg": "image/svg+xml", ".obj": "text/plain"}
+TYPES = {".svg": "image/svg+xml", ".obj": "text/plain", ".json": "application/json", ".png": "image/png"}
 
 
 class StudioServer(uvicorn.Server):
@@ -122,6 +122,14 @@ def studio_app(session: Session, token: str, port: int, most_uploaded: int = MOS
         content = await run_sync(session.export, ending)
         return Response(content, media_type=TYPES.get(ending, "application/octet-stream"))
 
+    async def quads(request: Request) -> Response:
+        ending = f".{request.path_params['ending']}"
+        content = await run_sync(session.quads, ending, _number(request.query_params.get("count", "")))
+        return Response(content, media_type=TYPES.get(ending, "application/octet-stream"))
+
+    async def curve(request: Request) -> Response:
+        return JSONResponse(await run_sync(session.curve))
+
     async def upload(request: Request) -> Response:
         path = session.file_named(request.query_params.get("name", ""))
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
@@ -137,6 +145,8 @@ def studio_app(session: Session, token: str, port: int, most_uploaded: int = MOS
             Route("/layout", layout),
             Route("/act", act, methods=["POST"]),
             Route("/export/{ending}", export, methods=["POST"]),
+            Route("/quads/{ending}", quads, methods=["POST"]),
+            Route("/curve", curve, methods=["POST"]),
             Route("/mesh", upload, methods=["POST"]),
         ],
         exception_handlers={
@@ -147,6 +157,11 @@ def studio_app(session: Session, token: str, port: int, most_uploaded: int = MOS
         },
     )
     return Guard(app, token, port)
+
+
+def _number(text: str) -> object:
+    """Return the number that a text of a request is, or the text."""
+    return int(text) if text.isdecimal() and text.isascii() and len(text) < 16 else text
 
 
 async def _said(request: Request, error: Exception) -> Response:

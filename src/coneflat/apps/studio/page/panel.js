@@ -7,6 +7,7 @@ class Panel {
     this.studio = studio;
     this.part = (id) => document.getElementById(id);
     this.snap = 0;
+    this.curve = new ConeCurve(studio);
     this.fill();
     this.connect();
   }
@@ -20,6 +21,8 @@ class Panel {
     );
     this.part("exports").append(
       ...["obj", "ply", "glb", "npz", "svg"].map((ending) => button(ending.toUpperCase(), `Save as .${ending}`, () => this.studio.save(ending), {id: `save-${ending}`})),
+      button("Picture", "Save the layout as a picture, .png", () => this.studio.save("png"), {id: "save-png"}),
+      button("Report", "Save the report, .json", () => this.studio.save("json"), {id: "save-json"}),
     );
     for (const id of ["unit", "shown-in"]) this.part(id).replaceChildren(...UNITS.map(([key, name]) => new Option(key || id === "unit" ? name : "the same", key)));
   }
@@ -45,6 +48,7 @@ class Panel {
     this.part("mirrored").addEventListener("change", (event) => set("mirrored", event.target.checked ? "overlap" : "apart"));
     this.part("own-seams").addEventListener("change", (event) => set("seams", event.target.checked ? "input" : null));
     this.part("follow").addEventListener("change", (event) => studio.setFollowing(event.target.checked));
+    this.part("save-quads").addEventListener("click", () => studio.saveQuads(this.part("quad-count").value));
     this.part("brush-size").addEventListener("input", (event) => studio.growBrush(Number(event.target.value) / studio.brush.radius));
     this.part("brush-weight").addEventListener("change", (event) => (studio.brush.weight = Number(event.target.value)));
     for (const id of ["unit", "shown-in"]) this.part(id).addEventListener("change", () => this.measureIn(id));
@@ -124,6 +128,9 @@ class Panel {
     this.value("stretch", options.stretch ?? 0);
     this.value("charts", options.charts ?? "atlas");
     for (const saving of this.part("exports").children) saving.disabled = !this.studio.viewer;
+    this.part("save-quads").disabled = !this.studio.viewer || this.studio.making === "quads";
+    this.part("save-quads").textContent = this.studio.making === "quads" ? "Making quads…" : "Quads, OBJ";
+    this.curve.show();
     this.part("command").textContent = news?.command ?? "";
     this.part("python").textContent = news?.python ?? "";
     this.part("kept-in").textContent = news?.project ? `Kept in ${news.project}.` : "";

@@ -17,6 +17,7 @@ class Studio {
     this.tools = new Tools(this);
     this.paint = new Paint(this);
     this.brush = new Brush(this);
+    this.making = ""; // what is made beside layouts
     this.follows = true; // Paths follow sharp edges.
     this.overlay = new Overlay(this);
     this.panel = new Panel(this);
@@ -118,9 +119,27 @@ class Studio {
     return this.pending > 0 || Boolean(this.news?.busy);
   }
 
+  get stem() {
+    return this.news.mesh.replace(/\.[^.]*$/, "");
+  }
+
   async save(ending) {
-    const stem = this.news.mesh.replace(/\.[^.]*$/, "");
-    await this.server.save(ending, `${stem}_uv.${ending}`).catch((error) => this.refuse(error));
+    const name = {json: "report", png: "layout"}[ending] ?? "uv";
+    await this.server.save(`/export/${ending}`, `${this.stem}_${name}.${ending}`).catch((error) => this.refuse(error));
+  }
+
+  /** Make quads of the mesh, about so many, and hand them to the browser. */
+  async saveQuads(count) {
+    this.refused = null;
+    this.making = "quads";
+    this.panel.show();
+    await this.server.save(`/quads/obj?count=${encodeURIComponent(count)}`, `${this.stem}_quads.obj`).catch((error) => this.refuse(error));
+    this.making = "";
+    this.panel.show();
+  }
+
+  setCount(count) {
+    this.act({do: "set", name: "cone_count", value: count});
   }
 
   async open(file) {
@@ -166,6 +185,7 @@ class Studio {
       g: () => this.panel.angleField(vertex)?.select(), ",": turn(-this.panel.step()), ".": turn(this.panel.step()),
       Delete: () => this.remove(vertex), Backspace: () => this.remove(vertex),
     };
+    keys.q = () => this.panel.curve.ask();
     keys.f = () => this.setFollowing(!this.follows);
     if (this.tools.paints) Object.assign(keys, {",": () => this.growBrush(1 / STEP), ".": () => this.growBrush(STEP)});
     if (name === "Escape") this.tools.endLine();
