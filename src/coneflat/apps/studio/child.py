@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ...flattener import Flattener
     from ...input.join import Joined
     from ...result.flattening import Flattening
+    from ...view.quantity import Quantity
 
 #: Polygons from which on the first layout is shown, too: of smaller meshes the last is there as soon.
 EARLY = 20_000
@@ -115,9 +116,22 @@ class Bench:
         result = flattener.flatten(early=show_first if is_large else None, progress=told_on, **chosen)
         result = replace(result, notes=source.notes_of(result.notes))
         told("picture", 1.0)
-        picture = _picture(result, name)
+        head, body = self._coloured(job, result, name)
         self.result = result
-        return picture
+        return head, body
+
+    def _coloured(self, job: Head, result: Flattening, name: str) -> tuple[Head, bytes]:
+        """Return what the page shows of a result, with colours of the user's own; without, if there are none such."""
+        from ...view.own import own_quantity
+
+        if not job.get("color"):
+            return _picture(result, name)
+        try:
+            own = own_quantity(result, job["color"])
+        except ConeflatError as error:
+            head, body = _picture(result, name)
+            return {**head, "missing": str(error)}, body
+        return _picture(result, name, own=own)
 
     def make(self, job: Head, told: Callable[[str, float], None]) -> tuple[Head, bytes]:
         """Return what is asked for beside layouts: a file of the result, quads, or a curve."""
@@ -144,8 +158,13 @@ class Bench:
         return self._source, self._flattener
 
 
-def _picture(result: Flattening, name: str, is_first: bool = False) -> tuple[Head, bytes]:
-    """Return what the page shows of a result; of the first layout no numbers, which will be others."""
+def _picture(
+    result: Flattening, name: str, is_first: bool = False, own: Quantity | None = None
+) -> tuple[Head, bytes]:
+    """Return what the page shows of a result; of the first layout no numbers, which will be others.
+
+    own: numbers that are shown as colours.
+    """
     from ...result.from_uv import shown_rows
     from ...view.page.content import content_of
     from ...view.page.payload import Told, head_and_block
@@ -156,8 +175,9 @@ def _picture(result: Flattening, name: str, is_first: bool = False) -> tuple[Hea
         rows = [(measure, TO_COME, meaning) for measure, _, meaning in shown_rows(result)]
         told = Told(FIRST, rows)
         result = replace(result, notes=())
-    content = content_of(result, MOST_TRIANGLES)
-    head, block = head_and_block(result, content, None, name, "y", "checker", told)
+    content = content_of(result, MOST_TRIANGLES, own)
+    show = "checker" if own is None else "own"
+    head, block = head_and_block(result, content, None, name, "y", show, told)
     cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
     return {"head": head, "found": cones.tolist(), "seconds": result.seconds}, block
 

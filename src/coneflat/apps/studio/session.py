@@ -35,13 +35,18 @@ class Session:
 
     Attributes:
         folder: where projects are, and whatever the page names.
+        color: what numbers are shown as colours, if any.
         version: counts what has happened; who has seen a version need not look again.
         layout: the number of the layout that is shown; 0 for none.
         is_early: whether that is the first one of a change, and another will follow.
     """
 
-    def __init__(self, folder: Path) -> None:
-        """folder: of projects."""
+    def __init__(self, folder: Path, color: str | None = None) -> None:
+        """Args:
+        folder: of projects.
+        color: what numbers are shown as colours, as of `own_quantity`.
+        """
+        self.color = color
         self.folder = folder.resolve()
         self.version = 0
         self.layout = 0
@@ -186,7 +191,7 @@ class Session:
         self._job += 1
         self._busy = {"stage": "", "fraction": 0.0}
         self._tell()
-        self._worker.send({"do": "flatten", "job": self._job, **self._of_mesh()})
+        self._worker.send({"do": "flatten", "job": self._job, "color": self.color, **self._of_mesh()})
 
     def _save(self) -> None:
         """Keep what is chosen, so that nothing is lost whatever happens next."""
@@ -346,6 +351,8 @@ class Session:
             elif "done" in head:
                 self._busy = None
                 self._show(head["done"], body)
+                if "missing" in head["done"] and self._trouble is None:
+                    self._trouble = {"text": head["done"]["missing"], "repair": False}
                 self.is_early, self._last = False, None
             self._tell()
 

@@ -18,7 +18,7 @@ from ...geometry.normals import CREASE_COSINE
 from ...mesh import end_corners
 from ...quality.checker import CELLS
 from ...result.from_uv import shown_rows
-from ..colours import DIVERGING, SEQUENTIAL, as_plain, color_table
+from ..colours import DIVERGING, SEQUENTIAL, TITLES, as_plain, color_table
 from ..figures.camera import fit_camera
 from ..figures.demo import title
 from ..figures.uv_layout import CHART_COLORS
@@ -108,7 +108,11 @@ def head_and_block(
         "sizes": _sizes(result, content),
         "squares": told.squares,
         "crease_cosine": CREASE_COSINE,
-        "scales": {key: as_plain(key, scale) for key, scale in content.scales.items()},
+        "scales": {
+            key: as_plain(content.own_title if key == "own" else TITLES[key], scale)
+            for key, scale in content.scales.items()
+        },
+        "own": None if content.own is None else "faces" if content.own_by_face else "vertices",
         "picture": None if picture is None else picture.kind,
         "show": show,
         "arrays": listed,
@@ -152,6 +156,8 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
     }
     if not np.array_equal(content.vertex_numbers, np.arange(len(content.places))):
         arrays["vertex_numbers"] = content.vertex_numbers.astype(np.int32)
+    if content.own is not None:
+        arrays["own"] = content.own.astype(np.float32)
     if content.left_out:
         arrays["face_numbers"] = content.face_numbers.astype(np.uint32)
     return arrays
