@@ -14,6 +14,23 @@ LONGEST = 20_000
 FEW = 12
 
 
+class Replay:
+    """What makes the same layout without the studio, written once for each change."""
+
+    def __init__(self) -> None:
+        self._of: tuple[str | None, Choices | None] = None, None
+        self._texts: dict[str, str] = {}
+
+    def of(self, mesh: str | None, project: str, choices: Choices) -> dict[str, str]:
+        """Return the command line, and Python; nothing without a mesh."""
+        if mesh is None:
+            return {"command": "", "python": ""}
+        if self._of[0] != mesh or self._of[1] is not choices:
+            command, python = command_line(mesh, project, choices), python_lines(mesh, choices)
+            self._of, self._texts = (mesh, choices), {"command": command, "python": python}
+        return self._texts
+
+
 def command_line(mesh: str, project: str, choices: Choices) -> str:
     """Return a command that flattens a mesh by what was chosen; what was drawn or painted needs the project's file."""
     words = choices.words

@@ -33,10 +33,10 @@ TYPES = {".svg": "image/svg+xml", ".obj": "text/plain", ".json": "application/js
 class StudioServer(uvicorn.Server):
     """Serves a session until it is interrupted; then nobody waits for news any more."""
 
-    def __init__(self, session: Session, token: str, port: int) -> None:
+    def __init__(self, session: Session, token: str, port: int, framed: bool = False) -> None:
         super().__init__(
             uvicorn.Config(
-                studio_app(session, token, port),
+                studio_app(session, token, port, framed=framed),
                 log_level="error",
                 access_log=False,  # It would hold the token.
                 server_header=False,
@@ -80,7 +80,9 @@ class Bell:
             del self._waiting[event]
 
 
-def studio_app(session: Session, token: str, port: int, most_uploaded: int = MOST_UPLOADED) -> ASGIApp:
+def studio_app(
+    session: Session, token: str, port: int, most_uploaded: int = MOST_UPLOADED, framed: bool = False
+) -> ASGIApp:
     """Return the server's application.
 
     Args:
@@ -88,6 +90,7 @@ def studio_app(session: Session, token: str, port: int, most_uploaded: int = MOS
         token: that every request must have.
         port: at which it is served: the only one that requests may name.
         most_uploaded: bytes of a mesh that may be dropped on the page.
+        framed: notebooks of this machine may show the page in a frame.
     """
     bell = Bell()
     session.listen(bell.ring)
@@ -156,7 +159,7 @@ def studio_app(session: Session, token: str, port: int, most_uploaded: int = MOS
             ClientDisconnect: _garbled,
         },
     )
-    return Guard(app, token, port)
+    return Guard(app, token, port, framed)
 
 
 def _number(text: str) -> object:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...errors import MeshFileError, ProjectError, StudioError
+from ...errors import ConeflatError, MeshFileError, ProjectError, StudioError
 from ...options.kinds import as_whole
 from ...text import shown
 from .choices import Choices
@@ -15,7 +15,7 @@ from .frames import Head
 from .history import History
 from .outputs import EXPORTS, MOST_QUADS, QUADS, curve_options
 from .project import Project, hash_of, read_project
-from .replay import command_line, python_lines
+from .replay import Replay
 from .steps import STEPS
 from .worker import Worker
 
@@ -65,7 +65,7 @@ class Session:
         self._questions = 0
         self._answers: dict[int, tuple[Head, bytes]] = {}
         self._curves: dict[tuple[str, str], dict[str, Any]] = {}
-        self._written: tuple[Choices | None, dict[str, str]] = None, {}
+        self._replay = Replay()
         self._changed = threading.Condition(threading.RLock())
         self._listeners: list[Callable[[], None]] = []
         self._worker = Worker(self._hear, self._mourn)
@@ -168,6 +168,24 @@ class Session:
                     raise StudioError(f"the studio does nothing by {shown(dict(action))}") from error
                 self._take(chosen, action.get("stroke"))
 
+    def choose(self, plain: Mapping[str, Any]) -> None:
+        """Choose all anew, as `Choices.as_plain` has it.
+
+        Raises:
+            StudioError: it makes no sense, or there is no mesh.
+            OptionError: options make no sense, or do not go together.
+        """
+        with self._changed:
+            if self._mesh is None:
+                raise StudioError("there is no mesh yet")
+            try:
+                chosen = Choices.from_plain({**Choices().as_plain(), **plain})
+            except ConeflatError:
+                raise
+            except (KeyError, TypeError, ValueError, AttributeError) as error:
+                raise StudioError(f"these are no choices: {shown(dict(plain))}") from error
+            self._take(chosen, None)
+
     def _take(self, chosen: Choices, stroke: object) -> None:
         """Take a step, if it is one."""
         chosen.keywords()
@@ -230,18 +248,8 @@ class Session:
                 "early": self.is_early,
                 "found": self._found,
                 "seconds": sum(self._seconds.values()),
-                **self._replayed(),
+                **self._replay.of(name, project, chosen),
             }
-
-    def _replayed(self) -> dict[str, str]:
-        """Return what makes the same layout without the studio; it is written once for each change."""
-        chosen, mesh = self._history.now, self._mesh
-        if mesh is None or self.project_file is None:
-            return {"command": "", "python": ""}
-        if self._written[0] is not chosen:
-            command = command_line(mesh.name, self.project_file.name, chosen)
-            self._written = chosen, {"command": command, "python": python_lines(mesh.name, chosen)}
-        return self._written[1]
 
     def picture(self) -> tuple[Head, bytes] | None:
         """Return the layout that is shown: numbers and texts, and arrays; None where there is none yet."""
