@@ -20,7 +20,7 @@ from typing import Any
 from same import BASES, DEFORMATIONS, MODELS, deformed
 
 from coneflat.cones import choose
-from coneflat.cones.sparse import aggregation, dense_model, exact_model
+from coneflat.cones.sparse import aggregation, dense_model, exact_model, linear_model
 from coneflat.cones.sparse import search as cone_search
 from coneflat.input.components import prepare
 from coneflat.options import Options
@@ -57,9 +57,9 @@ def variants() -> dict[str, list[Patch]]:
         (exact, "ROUNDS", (4, 100)),
         (exact, "WORTHWHILE", (1e-2, 1e-4)),
         (exact, "CAUTIONS", ((2.0,), (1.0,), (1.0, 2.0, 4.0))),
-        (search, "VERTICES_PER_UNKNOWN", (8, 15, 30)),
-        (search, "LEAST_SIZE", (200, 400, 800)),
-        (search, "MOST_SIZE", (600, 2000)),
+        (linear_model, "VERTICES_PER_UNKNOWN", (8, 15, 30)),
+        (linear_model, "LEAST_SIZE", (200, 400, 800)),
+        (linear_model, "MOST_SIZE", (600, 2000)),
         (aggregation, "WEAK", (0.0,)),
         (aggregation, "LARGEST_AGGREGATE", (4.0, 12.0)),
         (aggregation, "TRIES", (0,)),
@@ -122,7 +122,7 @@ def main() -> None:
     totals: dict[str, list[float]] = {name: [0, 0.0, 0.0, 0] for name in chosen}
     counts: dict[str, dict[str, int]] = {name: {} for name in chosen}
     options = Options(repair=True)
-    green, model = cone_search.GreenOperator, cone_search.coarse_model
+    green, model = linear_model.GreenOperator, linear_model.coarse_model
     for case, given in cases():
         if any(word in case for word in skipped):
             continue
@@ -148,8 +148,8 @@ def main() -> None:
                 return coarse[0]  # noqa: B023
 
             shared: list[Patch] = [
-                (cone_search, "GreenOperator", one_operator),
-                (cone_search, "coarse_model", one_model),
+                (linear_model, "GreenOperator", one_operator),
+                (linear_model, "coarse_model", one_model),
             ]
             with patched(shared):
                 choose.search_on(surface, part.constraints, options, Stages(None))
@@ -157,7 +157,7 @@ def main() -> None:
                 changes_model = any(name.startswith(word) for word in OPENING)
                 sharing = shared[:1] if changes_model else shared
                 for distortion in DISTORTIONS:
-                    surface.search = None
+                    surface.search = surface._linear = None
                     gc.collect()
                     with patched(patches + sharing):
                         start = time.process_time()

@@ -116,10 +116,17 @@ def main(words: list[str]) -> None:
     from playwright.sync_api import sync_playwright
 
     path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
-    print(
-        "| model | triangles | moves | metric, s | first view, s | picture, s | longest, s | processor, s | memory before, "
-        "MB | after, MB |"
+    columns = (
+        "model",
+        "triangles",
+        "moves",
+        "metric, s",
+        "first view, s",
+        "picture, s",
+        "longest, s",
+        "processor, s",
     )
+    print("| " + " | ".join((*columns, "memory before, MB", "after, MB")) + " |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     with sync_playwright() as driver, tempfile.TemporaryDirectory() as folder:
         browser = driver.chromium.launch(

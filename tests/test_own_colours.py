@@ -168,7 +168,7 @@ def test_they_are_shown_in_the_page(browser, ball, tmp_path):
     assert visit.state("show") == "own"
     assert visit.page.inner_text("#scale-title") == "heat"
     assert visit.page.locator("#show option").last.inner_text() == "heat"
-    content = content_of(result, 10**6, own_quantity(result, "heat"))
+    content = content_of(result, 10**6, own=own_quantity(result, "heat"))
     shown = np.array(visit.run("Array.from(coneflat.model.arrays.own)"))
     np.testing.assert_allclose(shown, content.own, rtol=1e-6)
     colours = visit.picture("model")

@@ -23,7 +23,7 @@ class Flattener:
 
     That is the checked mesh, its intrinsic Delaunay triangulation, its Laplacian, factorized, and the Green's functions
     of the cones used last. Results are those of `coneflat.flatten`, to the last bit. Other marked seams, a repair, or
-    other lengths make another mesh of it, and what was kept goes.
+    other lengths make another mesh of it, and what was kept goes. It serves one thread at a time.
 
         flattener = Flattener(vertices, faces)
         for curvature in (1.0, 1.5, 2.0):

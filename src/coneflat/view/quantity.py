@@ -168,12 +168,15 @@ def curvature(result: Flattening, flat: bool) -> Quantity:
     return Quantity(label, np.abs(values), counts, scale, ".1e", result.faces)
 
 
-def missing_angles(result: Flattening, flat: bool) -> FloatArray:
+def missing_angles(result: Flattening, flat: bool, mesh: TriangleMesh | None = None) -> FloatArray:
     """Return (n,) by how much the angles around each vertex miss a full turn, radians; NaN on the boundary.
 
-    flat: those of the metric, before it is laid out: in the plane no angle is ever missing but where it was cut.
+    Args:
+        result: which tells.
+        flat: those of the metric, before it is laid out: in the plane no angle is ever missing but where it was cut.
+        mesh: that of the result, where its borders have been found already.
     """
-    mesh = TriangleMesh(result.vertices, result.faces)
+    mesh = TriangleMesh(result.vertices, result.faces) if mesh is None else mesh
     inside = np.zeros(len(mesh.vertices), dtype=bool)
     inside[mesh.faces] = True
     inside &= ~mesh.is_boundary_vertex

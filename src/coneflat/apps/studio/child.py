@@ -18,11 +18,13 @@ from typing import IO, TYPE_CHECKING, Any
 from ...errors import ConeflatError, NonManifoldError, NonOrientableError
 from ...progress import asking
 from .frames import Head, read_frame, write_frame
+from .known import with_prints
 
 if TYPE_CHECKING:
     from ...flattener import Flattener
     from ...input.join import Joined
     from ...result.flattening import Flattening
+    from ...view.page.content import Model
     from ...view.quantity import Quantity
 
 #: Polygons from which on the first layout is shown, too: of smaller meshes the last is there as soon.
@@ -86,6 +88,7 @@ class Bench:
         self._early_from = early_from
         self._source: Joined | None = None
         self._flattener: Flattener | None = None
+        self._model: Model | None = None
         self._read: tuple[str, str] | None = None
 
     def flatten(
@@ -109,7 +112,7 @@ class Bench:
 
         def show_first(first: Flattening) -> None:
             told_on("first view", furthest)
-            show(*_picture(first, name, is_first=True))
+            show(*self._picture(first, name, is_first=True))
 
         chosen = arguments(source, job["choices"])
         is_large = len(source.mesh.offsets) - 1 >= self._early_from
@@ -125,13 +128,13 @@ class Bench:
         from ...view.own import own_quantity
 
         if not job.get("color"):
-            return _picture(result, name)
+            return self._picture(result, name)
         try:
             own = own_quantity(result, job["color"])
         except ConeflatError as error:
-            head, body = _picture(result, name)
+            head, body = self._picture(result, name)
             return {**head, "missing": str(error)}, body
-        return _picture(result, name, own=own)
+        return self._picture(result, name, own=own)
 
     def make(self, job: Head, told: Callable[[str, float], None]) -> tuple[Head, bytes]:
         """Return what is asked for beside layouts: a file of the result, quads, or a curve."""
@@ -146,40 +149,42 @@ class Bench:
             return {}, quads_of(source, chosen, job["count"], job["ending"], told)
         return curve_of(source, chosen, told), b""
 
+    def _picture(
+        self, result: Flattening, name: str, is_first: bool = False, own: Quantity | None = None
+    ) -> tuple[Head, bytes]:
+        """Return what the page shows of a result; of the first layout no numbers, which will be others.
+
+        own: numbers that are shown as colours.
+        """
+        from ...result.from_uv import shown_rows
+        from ...view.page.content import Model, content_of
+        from ...view.page.payload import Told, head_and_block
+        from ...view.page.webpage import MOST_TRIANGLES
+
+        told = None
+        if is_first:
+            rows = [(measure, TO_COME, meaning) for measure, _, meaning in shown_rows(result)]
+            told = Told(FIRST, rows)
+            result = replace(result, notes=())
+        if self._model is None or not self._model.is_of(result):
+            self._model = Model.of(result)
+        content = content_of(result, MOST_TRIANGLES, self._model, own)
+        show = "checker" if own is None else "own"
+        head, block = head_and_block(result, content, None, name, "y", show, told)
+        cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
+        told_of = {"head": with_prints(head, block), "found": cones.tolist(), "seconds": result.seconds}
+        return told_of, block
+
     def _open(self, mesh: str, sha256: str, told: Callable[[str, float], None]) -> tuple[Joined, Flattener]:
         from ...files.read import read_joined
         from ...flattener import Flattener
 
         if self._source is None or self._flattener is None or self._read != (mesh, sha256):
             told("read", 0.0)
-            self._source = self._flattener = None  # There may not be memory for both.
+            self._source = self._flattener = self._model = None  # There may not be memory for both.
             source = read_joined(Path(mesh))
             self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
         return self._source, self._flattener
-
-
-def _picture(
-    result: Flattening, name: str, is_first: bool = False, own: Quantity | None = None
-) -> tuple[Head, bytes]:
-    """Return what the page shows of a result; of the first layout no numbers, which will be others.
-
-    own: numbers that are shown as colours.
-    """
-    from ...result.from_uv import shown_rows
-    from ...view.page.content import content_of
-    from ...view.page.payload import Told, head_and_block
-    from ...view.page.webpage import MOST_TRIANGLES
-
-    told = None
-    if is_first:
-        rows = [(measure, TO_COME, meaning) for measure, _, meaning in shown_rows(result)]
-        told = Told(FIRST, rows)
-        result = replace(result, notes=())
-    content = content_of(result, MOST_TRIANGLES, own)
-    show = "checker" if own is None else "own"
-    head, block = head_and_block(result, content, None, name, "y", show, told)
-    cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
-    return {"head": head, "found": cones.tolist(), "seconds": result.seconds}, block
 
 
 def arguments(source: Joined, choices: dict[str, Any]) -> dict[str, Any]:

@@ -100,12 +100,13 @@ def studio_app(
 
     async def state(request: Request) -> Response:
         after = request.query_params.get("after", "")
-        if after.isdecimal() and len(after) < 16:
+        if _is_number(after):
             await bell.wait_beyond(session, int(after), LONG_POLL)
         return JSONResponse(await run_sync(session.state))
 
     async def layout(request: Request) -> Response:
-        shown = session.picture()
+        known = request.query_params.get("known", "")
+        shown = await run_sync(session.picture, int(known) if _is_number(known) else 0)
         if shown is None:
             raise StudioError("there is no layout yet")
         head = json.dumps(shown[0]).encode("ascii")
@@ -165,6 +166,11 @@ def studio_app(
 def _number(text: str) -> object:
     """Return the number that a text of a request is, or the text."""
     return int(text) if text.isdecimal() and text.isascii() and len(text) < 16 else text
+
+
+def _is_number(text: str) -> bool:
+    """Whether a request names a number."""
+    return text.isdecimal() and len(text) < 16
 
 
 async def _said(request: Request, error: Exception) -> Response:

@@ -13,6 +13,7 @@ from ...text import shown
 from .choices import Choices
 from .frames import Head
 from .history import History
+from .known import Known
 from .outputs import EXPORTS, MOST_QUADS, QUADS, curve_options
 from .project import Project, hash_of, read_project
 from .replay import Replay
@@ -61,6 +62,7 @@ class Session:
         self._found: list[int] = []
         self._seconds: dict[str, float] = {}
         self._shown: tuple[Head, bytes] | None = None
+        self._known = Known()
         self._last: _Layout | None = None  # of an earlier change, while one on the way is shown
         self._questions = 0
         self._answers: dict[int, tuple[Head, bytes]] = {}
@@ -196,12 +198,11 @@ class Session:
     def _follow(self, before: Choices) -> None:
         """Do what follows from a step: a layout, or no more than that what is chosen is kept and told."""
         if not self._history.now.flattens_like(before):
-            self._flatten()
-            return
+            return self._flatten()
         trouble = self._trouble
         self._save()
         self._trouble = self._trouble or trouble
-        self._tell()
+        return self._tell()
 
     def _flatten(self) -> None:
         assert self._mesh is not None
@@ -251,10 +252,13 @@ class Session:
                 **self._replay.of(name, project, chosen),
             }
 
-    def picture(self) -> tuple[Head, bytes] | None:
-        """Return the layout that is shown: numbers and texts, and arrays; None where there is none yet."""
+    def picture(self, known: int = 0) -> tuple[Head, bytes] | None:
+        """Return the layout that is shown: numbers and texts, and arrays; None where there is none yet.
+
+        known: the number of a picture whose arrays need not be told again.
+        """
         with self._changed:
-            return self._shown
+            return None if self._shown is None else self._known.without(known, self._shown)
 
     def export(self, ending: str) -> bytes:
         """Return the result of what is chosen, as a file.
@@ -267,7 +271,7 @@ class Session:
         return self._asked({"do": "export", "ending": ending})[1]
 
     def quads(self, ending: str, count: object) -> bytes:
-        """Return quads of the mesh, about so many, as a file; a change of what is chosen ends the work on them.
+        """Return quads of the mesh, about so many, as a file; a change ends the work on them.
 
         Raises:
             StudioError: there is no mesh, no such format, or something was changed.
@@ -299,10 +303,10 @@ class Session:
                 raise StudioError("there is no mesh yet")
             if not self._worker.is_alive:  # What it had is gone.
                 self._flatten()
-            self._questions += 1
-            number = -self._questions  # No flattening has such a number.
+            self._questions -= 1  # No flattening has such a number.
+            number = self._questions
             self._answers[number] = ({}, b"")
-            # A result is saved in any case; what takes long is given up for a later flattening.
+            # What takes long is given up for a later flattening.
             stops = {} if job["do"] == "export" else {"after": self._job}
             self._worker.send({**job, **stops, **self._of_mesh(), "job": number})
             self._changed.wait_for(lambda: self._answers[number][0], PATIENCE)
@@ -367,7 +371,7 @@ class Session:
     def _show(self, told: Head, body: bytes) -> None:
         self.layout += 1
         self._found, self._seconds = told["found"], told["seconds"]
-        self._shown = told["head"], body
+        self._shown = self._known.numbered((told["head"], body))
 
     def _go_back(self) -> None:
         """Work no more, and show the last layout that was finished instead of one on the way."""

@@ -34,6 +34,22 @@ function straightened(turn) {
   return [...a, ...b, a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 }
 
+const TILTS = [0, 0.4, 0.8, 1.15], AROUND = 8; // radians; directions of each tilt
+
+/** Return directions around one, all of length 1, the least tilted first. */
+function tilted(direction) {
+  const least = direction.map(Math.abs).indexOf(Math.min(...direction.map(Math.abs)));
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const across = cross(direction, [0, 1, 2].map((k) => Number(k === least)));
+  const side = across.map((value) => value / Math.hypot(...across)), other = cross(direction, side);
+  return TILTS.flatMap((tilt) =>
+    Array.from({length: tilt ? AROUND : 1}, (_, i) => {
+      const [c, s] = [Math.cos((2 * Math.PI * i) / AROUND), Math.sin((2 * Math.PI * i) / AROUND)];
+      return direction.map((value, k) => Math.cos(tilt) * value + Math.sin(tilt) * (c * side[k] + s * other[k]));
+    }),
+  );
+}
+
 class Camera {
   /** points: numbers, three each, that a fitting view shows; turns: whether one may look from elsewhere. */
   constructor(points, turn, turns) {

@@ -76,8 +76,55 @@ class Content:
     own_title: str = ""
 
 
-def content_of(result: Flattening, most: int, own: Quantity | None = None) -> Content:
-    """Return what a page shows, with at most so many triangles; own: numbers of the user's own.
+@dataclass(frozen=True, eq=False)
+class Model:
+    """The surface of a result, whatever its layout: n vertices, v of which have triangles.
+
+    Attributes:
+        mesh: the mesh.
+        used: (v,) the vertices that have triangles.
+        places: (v, 3) these, moved and scaled into the unit ball.
+        centre, radius: where the ball lies in the model's units.
+        curvature: (v,) in units of pi; NaN on the boundary.
+        outward: 1 if triangles run anticlockwise seen from outside, else -1.
+    """
+
+    mesh: TriangleMesh
+    used: IntArray
+    places: FloatArray
+    centre: FloatArray
+    radius: float
+    curvature: FloatArray
+    outward: int
+
+    @classmethod
+    def of(cls, result: Flattening) -> Model:
+        """Return the surface of a result."""
+        mesh = TriangleMesh(result.vertices, result.faces)
+        is_used = np.zeros(len(mesh.vertices), dtype=bool)
+        is_used[mesh.faces] = True
+        used = np.flatnonzero(is_used)
+        places, centre, radius = _into_unit_ball(result.vertices[used])
+        curvature = missing_angles(result, False, mesh)[used] / np.pi
+        number = np.cumsum(is_used) - 1
+        return cls(mesh, used, places, centre, radius, curvature, _outward(places[number[mesh.faces]]))
+
+    def is_of(self, result: Flattening) -> bool:
+        """Return whether it is the surface of a result."""
+        mesh = self.mesh
+        return np.array_equal(mesh.faces, result.faces) and np.array_equal(mesh.vertices, result.vertices)
+
+
+def content_of(
+    result: Flattening, most: int, model: Model | None = None, own: Quantity | None = None
+) -> Content:
+    """Return what a page shows, with at most so many triangles.
+
+    Args:
+        result: what is shown.
+        most: triangles.
+        model: its surface, if something knows it already.
+        own: numbers of the user's own.
 
     Raises:
         ArrayShapeError: the result has no UVs, or no triangles.
@@ -91,18 +138,18 @@ def content_of(result: Flattening, most: int, own: Quantity | None = None) -> Co
             f"there is nothing to show: {len(result.faces):,} triangles, {len(result.uv):,} UV points and "
             f"{len(result.uv_faces):,} triangles of them"
         )
-    split = split_at_seams(result)
-    used, vertex = np.unique(split.own, return_inverse=True)
-    vertex = vertex.reshape(-1)
-    places, centre, radius = _into_unit_ball(result.vertices[used])
-    mesh = TriangleMesh(places, vertex[split.faces])
-    outline, seams = outline_halfedges(mesh, split.faces)
+    split, model = split_at_seams(result), Model.of(result) if model is None else model
+    used, places = model.used, model.places
+    vertex = np.searchsorted(used, split.own)
+    outline, seams = outline_halfedges(model.mesh, split.faces)
     chart = _charts(split.faces, split.uv)
     qc, scale = conformal_distortion(result), stretch(result)
-    curvatures = [missing_angles(result, flat)[used] / np.pi for flat in (False, True)]
+    flat_curvature = missing_angles(result, True, model.mesh)[used] / np.pi
     cone = np.searchsorted(used, result.cones)
 
-    shown, corners = np.arange(len(split.faces)), split.faces
+    # Of all there is, every point is of a triangle, and every vertex has one.
+    shown, faces = np.arange(len(split.faces)), split.faces
+    points, vertices, point_vertex = np.arange(len(split.uv)), np.arange(len(used)), vertex
     if len(shown) > most:
         kept = np.zeros(len(split.uv), dtype=bool)
         for end in end_corners(outline):
@@ -111,12 +158,12 @@ def content_of(result: Flattening, most: int, own: Quantity | None = None) -> Co
         shown, corners = thin(places[vertex], split.uv, split.faces, kept, most)
         # Those at outlines all stay: their third corner is merged with none of the other two.
         outline = 3 * np.searchsorted(shown, outline // 3) + outline % 3
-    points, faces = np.unique(corners, return_inverse=True)
-    vertices, point_vertex = np.unique(vertex[points], return_inverse=True)
+        points, faces = np.unique(corners, return_inverse=True)
+        vertices, point_vertex = np.unique(vertex[points], return_inverse=True)
     return Content(
         places=places[vertices],
-        centre=centre,
-        radius=radius,
+        centre=model.centre,
+        radius=model.radius,
         point_vertex=point_vertex.reshape(-1),
         uv=split.uv[points],
         uv_side=cell_side(split.uv, split.faces, 1.0),
@@ -126,17 +173,17 @@ def content_of(result: Flattening, most: int, own: Quantity | None = None) -> Co
         chart=chart[shown],
         qc=qc.values[shown],
         area_scale=scale.values[shown],
-        curvature=curvatures[0][vertices],
-        flat_curvature=curvatures[1][vertices],
+        curvature=model.curvature[vertices],
+        flat_curvature=flat_curvature[vertices],
         cones=np.searchsorted(vertices, cone),
         cone_curvatures=result.curvatures,
         vertex_numbers=used[vertices]
         if result.vertex_origin is None
         else result.vertex_origin[used[vertices]],
         face_numbers=shown,
-        outward=_outward(places[mesh.faces]),
+        outward=model.outward,
         left_out=len(split.faces) - len(shown),
-        scales=page_scales(qc, scale, curvatures[0], own),
+        scales=page_scales(qc, scale, model.curvature, own),
         own=None if own is None else own.values[shown] if own.corners is None else own.values[used][vertices],
         own_by_face=own is not None and own.corners is None,
         own_title="" if own is None else own.label,

@@ -224,14 +224,16 @@ class Viewer {
     glide(pane.camera, turn, near ? pan : place.slice(0, 2));
   }
 
-  /** Return the least turned view in which a thing's triangle faces the user. */
+  /** Return the least turned view in which a thing's triangle faces the user; tilted where that lies behind others. */
   turnTowards(thing, turn) {
     const [p, q, r] = this.model.shapeOf({kind: "triangle", index: this.triangleAt(thing)}, false)[0];
     const [a, b] = [q, r].map((end) => end.map((x, k) => x - p[k]));
     const out = this.model.head.outward;
     const normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]].map((x) => out * x);
-    const length = Math.hypot(...normal) || 1;
-    const [x, y, z] = turned(turn, normal).map((value) => value / length);
+    const length = Math.hypot(...normal) || 1, facing = normal.map((value) => value / length);
+    const middle = middleOf(this.model.shapeOf(thing, false)[0]);
+    const free = tilted(facing).find((from) => !this.model.isHidden(middle, from, IN_FRONT)) ?? facing;
+    const [x, y, z] = turned(turn, free);
     const side = Math.hypot(x, y);
     const axis = side > 1e-9 ? [y / side, -x / side, 0] : [0, 1, 0];
     return straightened(product(rotation(axis, Math.atan2(side, z)), turn));

@@ -2,6 +2,7 @@
 
 const RING = 11; // pixels
 const SMALL = 14; // pixels: what is smaller gets a ring around it, to be found
+const IN_FRONT = 0.03; // model radii: what is nearer to the user by less hides nothing
 
 class Marks {
   constructor(canvas, model, renderer) {
@@ -75,7 +76,7 @@ class Marks {
     if (!front) return false;
     if (sameThing(front, thing)) return true;
     const other = middleOf(this.model.shapeOf(front, false)[0].map((end) => pane.camera.project(end)));
-    return other[2] < near + 0.03; // model radii
+    return other[2] < near + IN_FRONT;
   }
 }
 

@@ -9,11 +9,11 @@ async function unpackModel(head, text) {
   return modelOf(head, await new Response(stream).arrayBuffer(), 0);
 }
 
-/** Return the model whose arrays lie in a block of bytes from some place on, a multiple of four. */
-function modelOf(head, block, begin) {
+/** Return the model whose arrays lie in a block of bytes from some place on, a multiple of four, or are another's. */
+function modelOf(head, block, begin, other) {
   const arrays = {};
   for (const {name, type, offset, count} of head.arrays) {
-    arrays[name] = new ARRAY_TYPES[type](block, begin + offset, count);
+    arrays[name] = offset === null ? other.arrays[name] : new ARRAY_TYPES[type](block, begin + offset, count);
   }
   return new Model(head, arrays);
 }
@@ -92,6 +92,25 @@ class Model {
     return placesOnScale(this.head.scales[show], this.arrays[show]);
   }
 
+  /** Whether a triangle lies in front of a place, farther than so much, for who looks from a direction. */
+  isHidden(place, from, beyond) {
+    const {places, faces, point_vertex} = this.arrays;
+    for (let corner = 0; corner < faces.length; corner += 3) {
+      const p = 3 * point_vertex[faces[corner]], q = 3 * point_vertex[faces[corner + 1]], r = 3 * point_vertex[faces[corner + 2]];
+      const at = (v, k) => places[v + k] - place[k];
+      // The volumes of the direction with the sides have one sign where it goes through the triangle.
+      const volume = (a, b) =>
+        from[0] * (at(a, 1) * at(b, 2) - at(a, 2) * at(b, 1)) +
+        from[1] * (at(a, 2) * at(b, 0) - at(a, 0) * at(b, 2)) +
+        from[2] * (at(a, 0) * at(b, 1) - at(a, 1) * at(b, 0));
+      const one = volume(q, r), two = volume(r, p), three = volume(p, q), sum = one + two + three;
+      if (!sum || Math.min(one * sum, two * sum, three * sum) < 0) continue;
+      const depth = (v) => at(v, 0) * from[0] + at(v, 1) * from[1] + at(v, 2) * from[2];
+      if ((one * depth(p) + two * depth(q) + three * depth(r)) / sum > beyond) return true;
+    }
+    return false;
+  }
+
   /** The triangle with the largest finite QC distortion. */
   worstTriangle() {
     const qc = this.arrays.qc;
@@ -104,7 +123,8 @@ class Model {
   hasSurfaceOf(other) {
     const mine = this.arrays, its = other.arrays;
     if (mine.faces.length !== its.faces.length || mine.places.length !== its.places.length) return false;
-    for (let i = 0; i < mine.places.length; i++) if (mine.places[i] !== its.places[i]) return false;
+    const areSame = mine.places === its.places;
+    for (let i = 0; i < mine.places.length && !areSame; i++) if (mine.places[i] !== its.places[i]) return false;
     for (let c = 0; c < mine.faces.length; c++) {
       if (mine.point_vertex[mine.faces[c]] !== its.point_vertex[its.faces[c]]) return false;
     }

@@ -85,9 +85,8 @@ def page_of(
     picture = None if texture is None else read_picture(texture)
     if isinstance(most_triangles, bool) or not isinstance(most_triangles, (int, np.integer)):
         raise OptionError(f"most_triangles must be a whole number, not {shown(most_triangles)}")
-    content = content_of(
-        result, most_triangles, own_quantity(result, color) if isinstance(color, str) else color
-    )
+    own = own_quantity(result, color) if isinstance(color, str) else color
+    content = content_of(result, most_triangles, own=own)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
     payload = payload_of(result, content, picture, name, up, show, told)

@@ -18,12 +18,12 @@ class Server {
     return (await this.ask(`/state?after=${after}`)).json();
   }
 
-  /** Return the layout that is shown now. */
-  async layout() {
-    const block = await (await this.ask("/layout")).arrayBuffer();
+  /** Return the layout that is shown now; arrays that a model from here has, too, are taken from that. */
+  async layout(known) {
+    const block = await (await this.ask(`/layout?known=${known?.head.number ?? ""}`)).arrayBuffer();
     const size = new DataView(block).getUint32(0, true);
     const head = JSON.parse(new TextDecoder().decode(new Uint8Array(block, 4, size)));
-    return modelOf(head, block, 4 + size);
+    return modelOf(head, block, 4 + size, known);
   }
 
   /** Do something, after what was asked for before. */

@@ -52,7 +52,7 @@ class Studio {
   async hear() {
     document.body.classList.toggle("empty", !this.news.mesh);
     if (this.news.layout && this.news.layout !== this.layout) {
-      this.take(await this.server.layout());
+      this.take(await this.server.layout(this.viewer?.model));
       this.layout = this.news.layout;
     }
     this.paint.hear();
