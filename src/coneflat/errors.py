@@ -70,6 +70,10 @@ class ConvergenceError(MetricError):
     """The solve ended short of its tolerance."""
 
 
+class TooLargeError(ConeflatError, MemoryError):
+    """The mesh needs more memory than is free."""
+
+
 class GridError(MetricError):
     """No integer grid was found."""
 

@@ -11,11 +11,13 @@ from .cones.choose import Surface
 from .input.arrays import as_input
 from .input.components import Source
 from .input.symmetry import check_symmetry
+from .kept import Last
 from .mesh import TriangleMesh
 from .options import Options, read_options
 from .pipeline import Early, flatten_prepared
 from .progress import Stages
 from .result.flattening import Flattening
+from .solver import fitting_solver
 
 
 class Flattener:
@@ -39,6 +41,7 @@ class Flattener:
     def __init__(self, mesh: Any, faces: ArrayLike | None = None) -> None:
         self._source = Source(as_input(mesh, faces))
         self._surfaces: dict[tuple[int, bool], Surface] = {}
+        self._solver: Last[str] = Last()
         self._solved_by: tuple[str, int] | None = None
 
     def flatten(self, *, early: Early | None = None, **options: Any) -> Flattening:
@@ -57,14 +60,17 @@ class Flattener:
         with stages("check"):
             prepared = self._source.prepared(options)
             check_symmetry(prepared.components, options)
+        # Asked once, as what is kept is no longer free.
+        count = len(prepared.checked.mesh.faces)
+        solver = self._solver.of((count, options.solver), lambda: fitting_solver(count, options.solver))
         # Where anything else factorizes, the last digits are others.
-        solved_by = options.solver, options.threads
+        solved_by = solver, options.threads
         if solved_by != self._solved_by:
             self._surfaces, self._solved_by = {}, solved_by
         meshes = {id(part.mesh) for part in prepared.components}
         self._surfaces = {key: surface for key, surface in self._surfaces.items() if key[0] in meshes}
         try:
-            return flatten_prepared(prepared, self._surface, options, stages, early)
+            return flatten_prepared(prepared, solver, self._surface, options, stages, early)
         finally:
             for surface in self._surfaces.values():
                 surface.search = None

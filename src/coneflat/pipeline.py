@@ -29,7 +29,7 @@ from .options import UNFOLDED, Options, read_options, takes
 from .progress import Stages
 from .result.assemble import assemble
 from .result.flattening import Flattening
-from .solver import solving
+from .solver import fitting_solver, solving
 from .threads import using_threads
 
 #: Takes the first layout that there is.
@@ -54,6 +54,7 @@ def flatten(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatte
         OptionError: an option makes no sense.
         SeamError: every set of seams needs forbidden edges.
         MetricError: the computation found no finite result.
+        TooLargeError: it does not fit into the memory that is free.
     """
     return flatten_as(mesh, faces, read_options(options))
 
@@ -64,23 +65,30 @@ def flatten_as(mesh: Any, faces: ArrayLike | None, options: Options) -> Flatteni
     with stages("check"):
         prepared = prepare(mesh, faces, options)
         check_symmetry(prepared.components, options)
-    return flatten_prepared(prepared, Surface.of, options, stages)
+    solver = fitting_solver(len(prepared.checked.mesh.faces), options.solver)
+    return flatten_prepared(prepared, solver, Surface.of, options, stages)
 
 
 def flatten_prepared(
-    prepared: Prepared, surface_of: SurfaceOf, options: Options, stages: Stages, early: Early | None = None
+    prepared: Prepared,
+    solver: str,
+    surface_of: SurfaceOf,
+    options: Options,
+    stages: Stages,
+    early: Early | None = None,
 ) -> Flattening:
     """Flatten a checked mesh.
 
     Args:
         prepared: the mesh.
+        solver: the back end that fits into memory.
         surface_of: returns what the choice of cones needs of a component.
         options: that have been read.
         stages: the stopwatch.
         early: called with the first layout, one chart for each component, before triangles are relaxed and overlaps
             parted.
     """
-    with using_threads(options.threads), solving(options.solver) as solvers:
+    with using_threads(options.threads), solving(solver) as solvers:
         runs = [flatten_component(part, surface_of, options, stages) for part in prepared.components]
         if early is not None:
             first = []

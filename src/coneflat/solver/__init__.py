@@ -6,6 +6,7 @@ The ladder, best first: MKL PARDISO (pypardiso) for large systems, CHOLMOD witho
 
 from .back_ends import HermitianFactor, available, factorize, solving, used_again
 from .factors import Factor, NotPositiveDefinite
+from .memory import fitting_solver
 
 __all__ = [
     "Factor",
@@ -13,6 +14,7 @@ __all__ = [
     "NotPositiveDefinite",
     "available",
     "factorize",
+    "fitting_solver",
     "solving",
     "used_again",
 ]
