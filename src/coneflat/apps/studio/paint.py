@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -29,13 +29,18 @@ Runs = tuple[tuple[int, int], ...]
 
 @dataclass(frozen=True)
 class Region:
-    """A set of vertices.
+    """A set of vertices; as text, a tenth of what numbers take: every step that can be undone has some.
 
     Attributes:
-        runs: first and last of those that follow each other, ascending; they neither overlap nor touch.
+        text: numbers, and first and last of those that follow each other, ascending: "3-17 20".
     """
 
-    runs: Runs = ()
+    text: str = ""
+
+    @classmethod
+    def of_runs(cls, runs: Iterable[tuple[int, int]]) -> Region:
+        """Return what runs, first and last vertex of each, make together."""
+        return cls(" ".join(str(a) if a == b else f"{a}-{b}" for a, b in _merged(runs)))
 
     @classmethod
     def of_text(cls, text: object) -> Region:
@@ -53,7 +58,7 @@ class Region:
             if int(first) > int(last):
                 raise StudioError(f"a region is written as 3-17 20; {shown(word)} is no part of one")
             runs.append((int(first), int(last)))
-        region = cls(_merged(runs))
+        region = cls.of_runs(runs)
         if region.count > MOST_PAINTED:
             raise StudioError(
                 f"{region.count:,} painted vertices are more than the {MOST_PAINTED:,} that may be"
@@ -61,9 +66,10 @@ class Region:
         return region
 
     @property
-    def text(self) -> str:
-        """The region in words."""
-        return " ".join(str(a) if a == b else f"{a}-{b}" for a, b in self.runs)
+    def runs(self) -> Runs:
+        """First and last of the vertices that follow each other, ascending; they neither overlap nor touch."""
+        ends = (word.partition("-") for word in self.text.split())
+        return tuple((int(first), int(last or first)) for first, _, last in ends)
 
     @property
     def count(self) -> int:
@@ -76,7 +82,7 @@ class Region:
 
     def joined(self, other: Region) -> Region:
         """Return what is in this one or in the other."""
-        return Region(_merged((*self.runs, *other.runs)))
+        return Region.of_runs((*self.runs, *other.runs))
 
     def without(self, other: Region) -> Region:
         """Return what is in this one and not in the other."""
@@ -95,10 +101,10 @@ class Region:
                 at += 1
             if begin <= last:
                 left.append((begin, last))
-        return Region(tuple(left))
+        return Region.of_runs(left)
 
     def __bool__(self) -> bool:
-        return bool(self.runs)
+        return bool(self.text)
 
 
 def region_of(vertices: IntArray) -> Region:
@@ -109,10 +115,10 @@ def region_of(vertices: IntArray) -> Region:
         return Region()
     breaks = np.flatnonzero(np.diff(vertices) > 1)
     first, last = np.append(vertices[0], vertices[breaks + 1]), np.append(vertices[breaks], vertices[-1])
-    return Region(tuple(zip(first.tolist(), last.tolist(), strict=True)))
+    return Region.of_runs(zip(first.tolist(), last.tolist(), strict=True))
 
 
-def _merged(runs: Runs | list[tuple[int, int]]) -> Runs:
+def _merged(runs: Iterable[tuple[int, int]]) -> Runs:
     merged: list[tuple[int, int]] = []
     for first, last in sorted(runs):
         if merged and first <= merged[-1][1] + 1:
@@ -159,9 +165,7 @@ class Paint:
         known = {each: region.without(where) for each, region in self.importance}
         if weight != 1:
             known[weight] = known.get(weight, Region()).joined(where)
-        return replace(
-            self, importance=tuple(sorted((each, region) for each, region in known.items() if region))
-        )
+        return replace(self, importance=tuple((each, known[each]) for each in sorted(known) if known[each]))
 
     def erased(self, where: Region) -> Paint:
         """Return paint with nothing at some vertices."""

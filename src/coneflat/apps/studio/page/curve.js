@@ -107,6 +107,7 @@ class ConeCurve {
 
   /** The number of cones that there are and the distortion of so many; null where that is off the curve. */
   current() {
+    if (this.studio.choices.by_hand) return null; // Those that were moved have another distortion.
     const {counts, distortions} = this.found, count = this.studio.coneRows().length, at = counts.findLastIndex((one) => one <= count);
     return at < 0 || count > counts[counts.length - 1] ? null : [count, distortions[at]];
   }

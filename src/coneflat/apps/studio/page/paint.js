@@ -200,6 +200,7 @@ class Stroke {
   }
 
   stop() {
+    if (!matchMedia("(hover: hover)").matches) this.brush.at = null; // A finger that is lifted is nowhere.
     if (!this.studio.paint.preview?.sent) this.studio.paint.forget();
   }
 }
