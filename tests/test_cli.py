@@ -272,8 +272,8 @@ def test_marked_seams(tmp_path):
         done = run("flatten", "box.obj", "-q", "--seams", "pairs.txt", cwd=tmp_path)
         assert done.returncode == 2
         assert message in done.stderr
-    done = run("flatten", "box.obj", "-q", "--seams", "pairs.txt", "--seams", "input", cwd=tmp_path)
-    assert "--seams input is one choice" in done.stderr
+    done = run("flatten", "box.obj", "-q", "--seams", "input", "--seams", "input", cwd=tmp_path)
+    assert "--seams input is given twice" in done.stderr
     done = run("flatten", "box.obj", "-q", "--seams", "input", cwd=tmp_path)
     assert "no UV coordinates" in done.stderr
 

@@ -212,3 +212,73 @@ def test_no_vertex_is_allowed():
     vertices, faces = shapes.hill()
     assert len(find_cones(vertices, faces, allowed_cones=[]).vertices) == 0
     assert len(find_cones(vertices, faces, cone_count=2.0).vertices) == 2
+
+
+class TestRegions:
+    """Vertices between which no seam runs, and weights of some vertices."""
+
+    def seams(self, result):
+        mesh = TriangleMesh(result.vertices, result.faces)
+        sides = mesh.edge_halfedges[~mesh.is_boundary_edge]
+        ends = [
+            result.uv_faces.reshape(-1)[np.stack([3 * (h // 3) + (h + k) % 3 for k in (1, 2)], axis=-1)]
+            for h in sides.T
+        ]
+        apart = np.any(ends[0] != ends[1][:, ::-1], axis=1)
+        return mesh.edges[~mesh.is_boundary_edge][apart]
+
+    @pytest.mark.parametrize("charts", ["one", "atlas"])
+    def test_no_seam_runs_within_and_no_cone_lies_there(self, ball, charts):
+        vertices, faces, region = ball
+        plain = flatten(vertices, faces, cone_count=9, charts=charts)
+        assert region[plain.cones].any()
+        assert region[self.seams(plain)].all(axis=1).any()
+        whole = flatten(vertices, faces, cone_count=9, charts=charts, seamless=np.flatnonzero(region))
+        assert not region[self.seams(whole)].all(axis=1).any()
+        mesh = TriangleMesh(vertices, faces)
+        inner = np.setdiff1d(np.flatnonzero(region), mesh.edges[region[mesh.edges].sum(axis=1) == 1])
+        assert len(inner)
+        assert not np.isin(whole.cones, inner).any()
+
+    def test_a_belt_keeps_cones_on_its_larger_side(self, ball):
+        vertices, faces, _ = ball
+        belt = np.abs(vertices[:, 2] - 0.5) < 0.4
+        result = flatten(vertices, faces, cone_count=6, seamless=np.flatnonzero(belt))
+        assert (vertices[result.cones, 2] < 0.5).all()
+        assert not belt[self.seams(result)].all(axis=1).any()
+
+    def test_a_cone_that_is_given_within_is_refused(self, ball):
+        vertices, faces, region = ball
+        top = int(np.argmax(vertices[:, 2]))
+        with pytest.raises(errors.SeamError, match="forbidden as seams"):
+            flatten(vertices, faces, cones=[top, 3, 40], seamless=np.flatnonzero(region))
+        with pytest.raises(errors.OptionError, match="a seamless vertex, 100000, is no vertex"):
+            flatten(vertices, faces, seamless=[100000])
+
+    def test_what_must_be_cut_all_the_same_is_noted(self):
+        # A ramp of two turns lies over itself in the plane, unless it is cut.
+        plan, faces = shapes.grid(80, 4)
+        turn, radius = 4 * np.pi * plan[:, 0], 1 + 0.5 * plan[:, 1]
+        ramp = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0.1 * turn], axis=1)
+        result = flatten(ramp, faces, cones="none", charts="atlas", seamless=range(len(ramp)))
+        assert len(result.seams)
+        message = f"Cut all the same: {len(result.seams)} edges forbidden as seams"
+        assert any(note.startswith(message) for note in result.notes)
+        assert not flatten(ramp, faces, cones="none", charts="one", seamless=range(len(ramp))).notes
+
+    def test_weights_of_some(self, ball):
+        vertices, faces, important = ball
+        some = dict.fromkeys(np.flatnonzero(important).tolist(), 100.0)
+        whole = flatten(vertices, faces, cone_count=5, weights=np.where(important, 100.0, 1.0))
+        np.testing.assert_array_equal(flatten(vertices, faces, cone_count=5, weights=some).uv, whole.uv)
+        with pytest.raises(errors.OptionError, match="weights: 100000 is no vertex"):
+            flatten(vertices, faces, weights={100000: 2.0})
+        with pytest.raises(errors.OptionError, match="that of vertex 3 must be a number"):
+            flatten(vertices, faces, weights={3: "x"})
+
+    def test_weights_beside_angles_of_some(self, ball):
+        vertices, faces, important = ball
+        cones = {3: np.pi / 2, 40: None, 200: None, 300: None, 500: None}
+        plain = flatten(vertices, faces, cones=cones)
+        careful = flatten(vertices, faces, cones=cones, weights=np.where(important, 100.0, 1.0))
+        assert spread(careful, important) < spread(plain, important)

@@ -163,7 +163,10 @@ class TestCommand:
 
     @pytest.mark.parametrize("kind", KINDS)
     def test_of_a_mesh(self, run, tmp_path, kind):
-        code, out, _ = run("ball.obj", "--kind", kind, "--dpi", "50")
+        vertices = coneflat.read_mesh(tmp_path / "ball.obj").vertices
+        np.save(tmp_path / "x.npy", vertices[:, 0])
+        own = ["--color", "x.npy"] if kind == "color" else []
+        code, out, _ = run("ball.obj", "--kind", kind, "--dpi", "50", *own)
         assert code == 0
         assert re.fullmatch(rf"wrote ball_{kind}\.png\ntime .*, draw \S+\n", out)
         assert (tmp_path / f"ball_{kind}.png").stat().st_size > 2000
@@ -192,7 +195,7 @@ class TestCommand:
             (("ball.obj", "--kind", "curve", "--color-charts"), "takes no --color-charts"),
             (
                 ("ball.obj", "--kind", "curve", "--again"),
-                "only layout, checker, quality, cones, curvature do",
+                "only layout, checker, quality, color, cones, curvature do",
             ),
             (("ball.obj", "--kind", "cones", "--eye", "1,2"), "three numbers"),
             (("ball.obj", "--kind", "cones", "--eye", "1,x,2"), "'1,x,2' is no direction"),

@@ -316,6 +316,37 @@ def test_seams_of_a_ply_are_kept(tmp_path, monkeypatch):
     np.testing.assert_allclose(*middles, atol=1e-12)
 
 
+def test_seams_of_a_file_and_others(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    first = coneflat.flatten(*shapes.sphere(2), charts="one")
+    first.save("first.ply")
+    joined = read_joined(tmp_path / "first.ply").mesh
+    kept = coneflat.flatten(joined, charts="one", seams="input")
+    mesh = coneflat.TriangleMesh(kept.vertices, kept.faces)
+    on_seams = np.unique(kept.seams)
+    beside = mesh.edges[np.isin(mesh.edges, on_seams).sum(axis=1) == 1][:1]
+    vertices = kept.vertex_origin if kept.vertex_origin is not None else np.arange(len(kept.vertices))
+    (tmp_path / "more.txt").write_text(" ".join(str(v) for v in vertices[beside[0]]))
+    done = run(
+        "flatten",
+        "first.ply",
+        "-q",
+        "-o",
+        "b.npz",
+        "--charts",
+        "one",
+        "--seams",
+        "input",
+        "--seams",
+        "more.txt",
+    )
+    assert done.exit_code == 0, done.output
+    both = coneflat.read_flattening("b.npz")
+    found = {tuple(edge) for edge in np.sort(both.seams).tolist()}
+    assert {tuple(edge) for edge in np.sort(kept.seams).tolist()} < found
+    assert tuple(np.sort(beside[0])) in found
+
+
 @pytest.mark.parametrize("command", ["view", "figure"])
 def test_uvs_beyond_what_can_be_shown_are_refused_in_a_line(command, tmp_path):
     path = tmp_path / "far.obj"

@@ -57,6 +57,10 @@ def browser_path() -> str | None:
     return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
 
 
+#: What is painted in the picture of the studio, and where: parts of the pane's width and height.
+PAINTED = (("importance", 0.3, 0.42), ("no_cone", 0.62, 0.62), ("no_seam", 0.47, 0.75))
+
+
 def take_screenshots(result: coneflat.Flattening) -> None:
     """Show a flattening in the viewer, in four ways."""
     with tempfile.TemporaryDirectory() as folder:
@@ -70,7 +74,7 @@ def take_screenshot_of_quads(quads: coneflat.QuadMesh, name: str) -> None:
 
 
 def take_screenshot_of_studio(mesh: Path) -> None:
-    """Show the studio at work on a mesh: a cone is picked that has an angle of the user's."""
+    """Show the studio at work on a mesh: a cone has an angle of the user's, and places are painted."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver, listening(0) as listener:
         session, port = Session(Path(folder)), listener.getsockname()[1]
         server = StudioServer(session, "token", port)
@@ -89,10 +93,19 @@ def take_screenshot_of_studio(mesh: Path) -> None:
         page.evaluate("studio.setAngle(studio.selectedNumber(), 180)")
         page.wait_for_timeout(500)
         session.wait_until_idle()
+        page.wait_for_timeout(500)
+        for layer, right, down in PAINTED:
+            page.evaluate(
+                f"studio.setTool('{layer}'); studio.brush.radius = 34;"
+                f"(({{width, height}}) => studio.brush.dab(coneflat.panes[0], {right} * width, {down} * height))"
+                "(coneflat.panes[0]); studio.brush.at = null"
+            )
+            page.wait_for_timeout(300)
+            session.wait_until_idle()
         page.wait_for_timeout(2500)  # Drawn finely once nothing moves.
         page.evaluate("studio.took = 0; studio.panel.showWork()")
         with Image.open(BytesIO(page.screenshot())) as picture:
-            save_small(picture.quantize(64).convert("RGB"), "studio", dither=False)
+            save_small(picture.convert("RGB").quantize(128, kmeans=2).convert("RGB"), "studio", dither=False)
         browser.close()
         server.should_exit = True
         serving.join()

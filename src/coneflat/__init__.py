@@ -76,6 +76,7 @@ _HOMES = {
     "overlap_regions": "atlas",
     "pack_charts": "atlas",
     "Packed": "atlas",
+    "studio": "apps.studio.notebook",
     "make_figure": "view",
     "save_figure": "view",
     "draw_layout": "view",
@@ -158,12 +159,14 @@ __all__ = [
     "sample_path",
     "save_figure",
     "scaled_lengths",
+    "studio",
     "unfold",
     "visible_share",
 ]
 
 if TYPE_CHECKING:
     from . import errors
+    from .apps.studio.notebook import studio
     from .atlas import Packed, overlap_regions, pack_charts
     from .cones import ConeSolution, cones_at, cones_with_curvature, greedy_cones
     from .cones.sparse import ConeSearch, SparseCones

@@ -14,6 +14,7 @@ from ..input.components import Component, seam_costs
 from ..input.symmetry import Symmetry
 from ..mesh import TriangleMesh
 from ..options import Options
+from ..text import plural
 from .chart_seams import Layout, Seams
 from .glue import glue_charts
 from .mirrored import mirror_charts, split_alike
@@ -120,12 +121,26 @@ def without_overlaps(laid_out: LaidOut, part: Component, options: Options) -> La
     symmetry = use.symmetry if use is not None and use.seams and mesh is part.mesh else None
     costs = cut_costs(laid_out, part, options)
     charts = injective_charts(mesh, laid_out.points, laid_out.corners, costs, symmetry)
+    edges = Seams(mesh, charts).edges
     return replace(
         laid_out,
         points=charts.points,
         corners=charts.corners,
         chart=charts.chart,
-        seams=mesh.edges[Seams(mesh, charts).edges],
+        seams=mesh.edges[edges],
+        notes=(*laid_out.notes, *_forbidden_cuts(laid_out, part, edges)),
+    )
+
+
+def _forbidden_cuts(laid_out: LaidOut, part: Component, edges: IntArray) -> tuple[str, ...]:
+    """Return a note if some edges (k,) of a layout's mesh that are cut must not be."""
+    origin = edges if laid_out.cuts is None else laid_out.cuts.edge_origin[edges]
+    is_forbidden = part.is_forbidden.ravel()[part.mesh.edge_halfedges[:, 0]]
+    count = int(is_forbidden[np.unique(origin[origin >= 0])].sum())
+    if not count:
+        return ()
+    return (
+        f"Cut all the same: {plural(count, 'edge')} forbidden as seams, or charts would overlap themselves.",
     )
 
 

@@ -56,15 +56,20 @@ def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
         MeshFileError: the file cannot be written.
     """
     path = check_quads_output(path)
+    with atomic_write(path) as stream:
+        write_quads_stream(mesh, stream, path.suffix.lower())
+    return path
+
+
+def write_quads_stream(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
+    """Write a mesh of quads to a binary stream; ending: one of `QUAD_FORMATS`, see `write_quads`."""
     writers: dict[str, Callable[[QuadMesh, IO[bytes]], None]] = {
         ".obj": _write_obj,
         ".ply": _write_ply,
         ".glb": write_quads_glb,
         ".npz": _write_npz,
     }
-    with atomic_write(path) as stream:
-        writers[path.suffix.lower()](mesh, stream)
-    return path
+    writers[ending](mesh, stream)
 
 
 def _write_obj(mesh: QuadMesh, stream: IO[bytes]) -> None:

@@ -19,7 +19,7 @@ from ..seams import CutMesh, edge_costs, open_along
 from ..text import list_some, plural
 from .arrays import InputMesh, as_input
 from .constraints import Constraints, locate_constraints
-from .marked_edges import effective_marks, marked_edges, named_edges
+from .marked_edges import edges_within, effective_marks, marked_edges, named_edges, out_of_reach
 from .numbering import at_unit_size, lengths_of_input, turn_corners
 from .validation import CheckedMesh, check_mesh
 
@@ -107,6 +107,7 @@ class Source:
         forbidden = np.zeros(len(checked.mesh.edges), dtype=bool)
         if options.forbidden_seams is not None:
             forbidden[named_edges(checked, np.asarray(options.forbidden_seams))] = True
+        forbidden |= edges_within(checked, options.seamless, len(np.asarray(given.vertices)))
         marked = np.empty(0, dtype=np.int64)
         if options.marks_seams:
             marked, alone = effective_marks(checked.mesh, marked_edges(checked, options, given, forbidden))
@@ -116,6 +117,7 @@ class Source:
             constraints = constraints.with_marks(checked.mesh.edges[marked])
         parts = self._parts.of((metric, marked.tobytes()), lambda: _parts(checked.mesh, marked, lengths))
         seen = self._visibility(checked, options) if options.hide_seams else None
+        is_forbidden = forbidden[checked.mesh.halfedge_edges].reshape(-1, 3)
         components = tuple(
             Component(
                 mesh,
@@ -123,9 +125,9 @@ class Source:
                 faces,
                 own_lengths,
                 is_diagonal[faces],
-                forbidden[checked.mesh.halfedge_edges].reshape(-1, 3)[faces],
+                is_forbidden[faces],
                 None if seen is None else seen[vertices],
-                constraints.within(vertices),
+                _within_reach(constraints.within(vertices), mesh, is_forbidden[faces]),
             )
             for mesh, vertices, faces, own_lengths in parts
         )
@@ -167,6 +169,11 @@ def _parts(mesh: TriangleMesh, marked: IntArray, lengths: FloatArray) -> tuple[P
         (part, opened.origin[vertices], faces, lengths[faces])
         for part, vertices, faces in opened.mesh.split_components()
     )
+
+
+def _within_reach(constraints: Constraints, mesh: TriangleMesh, is_forbidden: BoolArray) -> Constraints:
+    """Return constraints of a component that forbid cones where no seam gets."""
+    return constraints.without(out_of_reach(mesh, is_forbidden)) if is_forbidden.any() else constraints
 
 
 def _own_lengths(given: InputMesh, checked: CheckedMesh, options: Options) -> FloatArray | None:

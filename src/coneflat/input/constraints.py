@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import OptionError
 from ..geometry.operators import at_unit_scale
 from ..options import Options
+from ..options.kinds import as_number, as_whole
 from .arrays import InputMesh
 from .mesh_file import COLOURS
 from .validation import CheckedMesh
@@ -167,11 +169,24 @@ def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) 
     return VertexCurvatures(found, curvatures)
 
 
+def _weights_of_some(noun: str, weights: Mapping[Any, Any], count: int) -> FloatArray:
+    """Return (n,) the weights of the vertices that a map has, and 1 of the others."""
+    values = np.ones(count)
+    for vertex, weight in weights.items():
+        at = as_whole(f"a vertex of {noun}", vertex)
+        if not 0 <= at < count:
+            raise OptionError(f"{noun}: {at} is no vertex: these are numbered from 0 to {count - 1}")
+        values[at] = as_number(f"{noun}: that of vertex {at}", weight)
+    return values
+
+
 def _weights(noun: str, weights: object, given: InputMesh) -> FloatArray:
     """Return (n,) the importance of each vertex of the input."""
     count = len(np.asarray(given.vertices))
     if isinstance(weights, str):
         weights = _property(weights, given)
+    if isinstance(weights, Mapping):
+        weights = _weights_of_some(noun, weights, count)
     try:
         numbers = np.asarray(weights)
     except (TypeError, ValueError, OverflowError) as error:

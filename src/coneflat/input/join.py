@@ -86,14 +86,21 @@ class Joined:
                         f"vertices {first} and {second} lie at the same place and have become one: name one of them, "
                         "or add --no-weld"
                     )
-        for name in ("required_cones", "forbidden_cones", "allowed_cones"):
+        for name in ("required_cones", "forbidden_cones", "allowed_cones", "seamless"):
             if found.get(name) is not None:
                 found[name] = tuple(dict.fromkeys(self._used(v) for v in found[name]))
+        if isinstance(found.get("weights"), Mapping):
+            found["weights"] = {self._used(v): weight for v, weight in found["weights"].items()}
         for name in ("seams", "forbidden_seams"):
-            if isinstance(found.get(name), np.ndarray):
-                pairs = found[name]
-                found[name] = np.array([self._used(v) for v in pairs.ravel()]).reshape(pairs.shape)
+            given = found.get(name)
+            if isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], str):
+                found[name] = (given[0], self._used_pairs(np.asarray(given[1])))
+            elif isinstance(given, np.ndarray):
+                found[name] = self._used_pairs(given)
         return found
+
+    def _used_pairs(self, pairs: IntArray) -> IntArray:
+        return np.array([self._used(v) for v in pairs.ravel().tolist()], dtype=np.int64).reshape(pairs.shape)
 
     def _used(self, vertex: int) -> int:
         """Return the vertex that is used for one; numbers of none stay, for others to refuse."""

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
 
 from .._arrays import BoolArray, IntArray
 from ..errors import OptionError
 from ..geometry.charts import point_seams
 from ..geometry.normals import dihedral_angles
-from ..mesh import TriangleMesh
+from ..geometry.ties import tie_key
+from ..mesh import TriangleMesh, label_components
 from ..options import Options
 from ..text import list_some, plural
 from .arrays import InputMesh
 from .numbering import turn_corners
 from .validation import CheckedMesh
+
+# Of a vertex: what its key adds to the size of a place.
+TIE_BREAK = 1e-6
 
 
 def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh, forbidden: BoolArray) -> BoolArray:
@@ -26,13 +33,14 @@ def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh, forbi
     """
     mesh = checked.mesh
     marked = np.zeros(len(mesh.edges), dtype=bool)
-    if isinstance(options.seams, str):
+    word, pairs = _word_and_pairs(options.seams)
+    if word is not None:
         marked |= _seams_of_input(checked, given)
     if options.sharp_angle is not None:
         marked |= np.abs(dihedral_angles(mesh)) > options.sharp_angle
     marked &= ~forbidden
-    if options.seams is not None and not isinstance(options.seams, str):
-        named = named_edges(checked, np.asarray(options.seams))
+    if pairs is not None:
+        named = named_edges(checked, pairs)
         both = named[forbidden[named]]
         if len(both):
             pair = checked.vertex_origin[mesh.edges[both[0]]]
@@ -41,6 +49,13 @@ def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh, forbi
             )
         marked[named] = True
     return marked & ~mesh.is_boundary_edge
+
+
+def _word_and_pairs(seams: Any) -> tuple[str | None, IntArray | None]:
+    """Return the word and the pairs of vertices that the option `seams` consists of."""
+    if isinstance(seams, tuple):
+        return seams
+    return (seams, None) if isinstance(seams, str) else (None, seams)
 
 
 def effective_marks(mesh: TriangleMesh, marked: BoolArray) -> tuple[IntArray, IntArray]:
@@ -74,6 +89,38 @@ def named_edges(checked: CheckedMesh, pairs: IntArray) -> IntArray:
             f"{list_some(names, len(missing))}"
         )
     return np.flatnonzero(np.isin(keys, wanted))
+
+
+def edges_within(checked: CheckedMesh, vertices: Iterable[int], count: int) -> BoolArray:
+    """Return (e,) True for edges between two of some vertices of the input, which has `count`.
+
+    Raises:
+        OptionError: one of them is no vertex.
+    """
+    inside = np.zeros(count, dtype=bool)
+    numbers = np.fromiter(vertices, dtype=np.int64)
+    for vertex in numbers[(numbers < 0) | (numbers >= count)]:
+        raise OptionError(
+            f"a seamless vertex, {vertex}, is no vertex: these are numbered from 0 to {count - 1}"
+        )
+    inside[numbers] = True
+    ends: BoolArray = inside[checked.vertex_origin][checked.mesh.edges]
+    return ends[:, 0] & ends[:, 1]
+
+
+def out_of_reach(mesh: TriangleMesh, is_forbidden: BoolArray) -> IntArray:
+    """Return the vertices of a connected mesh to which no seam gets from most of the others, or from the boundary.
+
+    is_forbidden: (m, 3) sides that are not cut.
+    """
+    barred = is_forbidden.ravel()[mesh.edge_halfedges[:, 0]] & ~mesh.is_boundary_edge
+    ways = mesh.edges[~barred]
+    number, label = label_components(len(mesh.vertices), ways[:, 0], ways[:, 1])
+    # Of places that are equally large, one that does not depend on numbers.
+    sizes = np.bincount(label, weights=1 + TIE_BREAK * tie_key(mesh.vertices), minlength=number)
+    if mesh.is_boundary_vertex.any():
+        sizes[np.bincount(label[mesh.is_boundary_vertex], minlength=number) == 0] = 0
+    return np.flatnonzero(label != np.argmax(sizes))
 
 
 def _seams_of_input(checked: CheckedMesh, given: InputMesh) -> BoolArray:

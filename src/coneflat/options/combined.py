@@ -94,8 +94,13 @@ class Options(RunOptions, AtlasOptions, SymmetryOptions, SeamOptions, MetricOpti
     def _check_pursuit(self) -> None:
         """Check the options that only a pursuit takes, and those of whole quanta."""
         if not self.searches_cones and self.asks_for_pursuit:
-            given = next(name for name in ASKING if self._is_set(name))
-            raise OptionError(f"{given} is an option of cones 'pursuit', not of cones {self.cone_choice!r}")
+            # Cones without curvatures beside others with such have the least area distortion by weight.
+            is_fitted = any(k is None for k in self.named_cones.values())
+            given = [name for name in ASKING if self._is_set(name) and not (name == "weights" and is_fitted)]
+            if given:
+                raise OptionError(
+                    f"{given[0]} is an option of cones 'pursuit', not of cones {self.cone_choice!r}"
+                )
         if self.boundary_kind == "straight" and not self.searches_cones:
             raise OptionError("a straight boundary gets its corners from the search: use cones 'pursuit'")
         if self.quality is not None and not self.quality > 1:

@@ -116,11 +116,12 @@ class ConeBounds:
     positive_only: bool = option(
         False, Flag(), "No cones of negative curvature, which are saddles.", only="pursuit"
     )
-    weights: ArrayLike | str | None = option(
+    weights: ArrayLike | Mapping[int, float] | str | None = option(
         None,
         Weights(),
-        "Importance of each vertex, from which distortion keeps off: numbers, the name of a property in the file, or "
-        "color, where grey vertices are 1 and those of a pure colour 100.",
+        "Importance of each vertex, from which distortion keeps off: numbers, or a map of vertices to theirs, where "
+        "others are 1; the name of a property in the file; or color, where grey vertices are 1, those of a pure "
+        "colour 100.",
         only="pursuit",
     )
     required_cones: Iterable[int] = option(
@@ -249,11 +250,11 @@ class MetricOptions:
 class SeamOptions:
     """Seams."""
 
-    seams: ArrayLike | str | None = option(
+    seams: ArrayLike | str | tuple[str, ArrayLike] | None = option(
         None,
         Edges(("input",)),
-        "Edges that are cut in any case, pairs of vertices, or input: the seams of the file's own UVs. They act like a "
-        "boundary. An edge that no other meets is no cut.",
+        "Edges that are cut in any case, pairs of vertices, or input: the seams of the file's own UVs, or both, as "
+        '("input", pairs). They act like a boundary. An edge that no other meets is no cut.',
         one_mesh=True,
     )
     forbidden_seams: ArrayLike | None = option(
@@ -261,6 +262,13 @@ class SeamOptions:
         Edges(),
         "Edges, pairs of vertices, that the first cut must not use, not for sharp edges or seams of the file either; "
         "what is cut later so that nothing overlaps avoids them where it can.",
+        one_mesh=True,
+    )
+    seamless: Iterable[int] = option(
+        (),
+        Vertices(),
+        "Vertices of regions without seams: an edge between two of them is one of forbidden_seams, and no search puts "
+        "a cone where no seam gets.",
         one_mesh=True,
     )
     sharp_angle: float | None = option(

@@ -205,13 +205,15 @@ class WordOrVertices(Kind):
 
 @dataclass(frozen=True)
 class Edges(Kind):
-    """Edges as (k, 2) pairs of vertices, or a word; None for none."""
+    """Edges as (k, 2) pairs of vertices, a word, or a word and such pairs; None for none."""
 
     words: tuple[str, ...] = ()
 
-    def parse(self, name: str, value: Any) -> str | IntArray | None:
+    def parse(self, name: str, value: Any) -> str | IntArray | tuple[str, IntArray] | None:
         if isinstance(value, str) and self.words:
             return Choice(self.words).parse(name, value)
+        if self.words and isinstance(value, (tuple, list)) and len(value) == 2 and isinstance(value[0], str):
+            return Choice(self.words).parse(name, value[0]), _pairs(name.replace("_", " "), value[1])
         return None if value is None else _pairs(name.replace("_", " "), value)
 
     @property
@@ -221,11 +223,11 @@ class Edges(Kind):
 
 @dataclass(frozen=True)
 class Weights(Kind):
-    """A number for each vertex, or the name of a property in the file; checked with the mesh."""
+    """A number for each vertex, or for some; or the name of a property in the file; checked with the mesh."""
 
     @property
     def bounds(self) -> str:
-        return "(n,) numbers from 0, or the name of a property"
+        return "(n,) numbers from 0, some vertices with theirs, or the name of a property"
 
 
 @dataclass(frozen=True)

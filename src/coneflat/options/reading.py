@@ -99,7 +99,9 @@ def settings(options: Options) -> dict[str, Any]:
             values[name] = "given"
         if not declaration.flag:
             continue
-        if hasattr(value, "tolist"):
+        if isinstance(value, tuple) and name == "seams":
+            value = [value[0], value[1].tolist()]
+        elif hasattr(value, "tolist"):
             value = value.tolist() if "seams" in name else "given"
         elif name in ("weights", "seam_weights") and not isinstance(value, (str, type(None))):
             value = "given"

@@ -179,6 +179,7 @@ class Flattening:
         up: str = "y",
         show: str | None = None,
         most_triangles: int | None = None,
+        color: str | None = None,
     ) -> Path:
         """Write an interactive page, one HTML file that loads nothing from anywhere, and return its path.
 
@@ -192,9 +193,11 @@ class Flattening:
             show: what the colours show first: "checker", "picture", "charts", "qc", "area", "curvature" (of the
                 model), "flat" (the curvature left) or "plain".
             most_triangles: a mesh with more is thinned for display; by default half a million.
+            color: numbers of your own, shown first: a property of the vertices in the mesh's file, or a file .npy or
+                FILE.npz:NAME with one for each vertex or triangle.
 
         Raises:
-            OptionError: `up` or `show` is none of these.
+            OptionError: `up` or `show` is none of these; there are no such numbers.
             ArrayShapeError, MeshError: there are no UVs, or the mesh cannot be thinned to so few triangles.
             UnknownFormatError, MeshFileError: a file cannot be read or written.
         """
@@ -203,7 +206,9 @@ class Flattening:
         if path is not None:
             check_page(path)
         most = MOST_TRIANGLES if most_triangles is None else most_triangles
-        page = write_page(page_of(self, texture=texture, up=up, show=show, most_triangles=most), path)
+        page = write_page(
+            page_of(self, texture=texture, up=up, show=show, most_triangles=most, color=color), path
+        )
         if path is None:
             open_page(page)
         return page

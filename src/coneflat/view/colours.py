@@ -53,13 +53,20 @@ EXTREME = 99.9
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def page_scales(qc: Quantity, stretch: Quantity, curvature: FloatArray) -> dict[str, ColorScale]:
+def page_scales(
+    qc: Quantity, stretch: Quantity, curvature: FloatArray, own: Quantity | None = None
+) -> dict[str, ColorScale]:
     """Return the scale of each colour map of a page; both curvatures have that of the model.
 
-    curvature: on the model, in units of pi.
+    Args:
+        qc, stretch: distortion.
+        curvature: on the model, in units of pi.
+        own: of the user.
     """
     before = _curvature_scale(curvature)
+    more = {} if own is None else {"own": replace(own.scale, colors=_table(own.scale))}
     return {
+        **more,
         "qc": replace(qc.scale, colors="sequential"),
         "area": replace(stretch.scale, colors="diverging"),
         "curvature": before,
@@ -67,12 +74,17 @@ def page_scales(qc: Quantity, stretch: Quantity, curvature: FloatArray) -> dict[
     }
 
 
-def as_plain(name: str, scale: ColorScale) -> dict[str, Any]:
+def _table(scale: ColorScale) -> str:
+    """Return which of a page's tables stands for a colour map of matplotlib."""
+    return "diverging" if scale.low < 0 < scale.high else "sequential"
+
+
+def as_plain(title: str, scale: ColorScale) -> dict[str, Any]:
     """Return what the page's scripts know of a scale: its ticks are places from 0 to 1."""
     places = scale.position(np.array([value for value, _ in scale.ticks])).tolist()
     ticks = [(place, label) for place, (_, label) in zip(places, scale.ticks, strict=True)]
     return {
-        "title": TITLES[name],
+        "title": title,
         "kind": scale.kind,
         "low": scale.low,
         "high": scale.high,

@@ -9,20 +9,21 @@ import click
 from click.core import ParameterSource
 
 from ...errors import OptionError
-from .shared import Eye, again_option, checking, input_options, up_option, verbosity_options
+from .shared import Eye, again_option, checking, color_option, input_options, up_option, verbosity_options
 
 if TYPE_CHECKING:
     from ...grid import QuadMesh
     from .console import Console
 
-KINDS = ("layout", "checker", "quality", "cones", "curvature", "curve", "quads")
+KINDS = ("layout", "checker", "quality", "cones", "curvature", "color", "curve", "quads")
 
-_VIEWS = ("checker", "quality", "cones", "curvature")
+_VIEWS = ("checker", "quality", "color", "cones", "curvature")
 #: The kinds that an option means something for.
 _TAKEN_BY = {
     "eye": (*_VIEWS, "quads"),
     "up": (*_VIEWS, "quads"),
-    "colors": ("quality", "curvature"),
+    "colors": ("quality", "color", "curvature"),
+    "color": ("color",),
     "cells": ("checker",),
     "color_charts": ("layout",),
     "most": ("curve",),
@@ -39,8 +40,8 @@ _TAKEN_BY = {
     default="layout",
     show_default=True,
     help="layout: the charts in the unit square.  checker: the model with a checkerboard.  quality: distortion of "
-    "angles and scale.  cones: cones and seams on the model.  curvature: before and after.  curve: distortion "
-    "against the number of cones.  quads: the model made into quads.",
+    "angles and scale.  color: numbers of your own.  cones: cones and seams on the model.  curvature: before "
+    "and after.  curve: distortion against the number of cones.  quads: the model made into quads.",
 )
 @click.option(
     "-o",
@@ -59,7 +60,8 @@ _TAKEN_BY = {
 @up_option
 @click.option("--size", type=float, nargs=2, metavar="WIDTH HEIGHT", help="Inches.  [default: what it needs]")
 @click.option("--dpi", type=float, default=300.0, show_default=True, help="Dots per inch of pictures.")
-@click.option("--colors", metavar="NAME", help="Of quality and curvature: a colour map of matplotlib.")
+@color_option
+@click.option("--colors", metavar="NAME", help="Of quality, color and curvature: a colour map of matplotlib.")
 @click.option(
     "--cells",
     type=float,
@@ -86,6 +88,7 @@ def figure(
     eye: tuple[Any, ...],
     most: int,
     quads: int | None,
+    color: str | None,
     again: bool,
     repair: bool,
     weld: bool | None,
@@ -99,13 +102,19 @@ def figure(
       coneflat figure bunny.obj --kind layout -o bunny.svg
       coneflat figure horse.ply --kind checker --up z --eye right-back --eye left-front
       coneflat figure hand.obj --kind quads --quads 3000
+      coneflat figure scan.ply --color quality
       coneflat flatten horse.ply -o horse.npz --distortion 0.1 && coneflat figure horse.npz --kind quality
     """
     from ...curve import cone_curve
     from ...view import Look, check_figure_target, make_figure, new_figure, save_figure
+    from ...view.own import own_quantity
     from .console import Console
-    from .run import FLATTENED, READ, open_result
+    from .run import FLATTENED, READ, archive_of, open_result
 
+    if color is not None and context.get_parameter_source("kind") is ParameterSource.DEFAULT:
+        kind = "color"
+    if color is None and kind == "color":
+        raise click.UsageError("--kind color needs --color", context)
     _check_combinations(context, kind)
     # What can fail at the end is looked at before the work.
     new_figure(1, 1)
@@ -131,6 +140,8 @@ def figure(
             console.say(f"note: {note}" for note in notes)
         else:
             shown = open_result(mesh, console, again=again, repair=repair, weld=weld)
+            if color is not None:
+                look["own"] = own_quantity(shown, color, archive_of(mesh))
             console.say(f"note: {note}" for note in shown.notes)
         with console.stage("draw", FLATTENED):
             save_figure(make_figure(shown, kind, **look), output)

@@ -220,9 +220,13 @@ def _edges(flag: str, kind: Edges, texts: Sequence[str]) -> Any:
     import numpy as np
 
     words = [text for text in texts if text in kind.words]
-    if words and len(texts) > 1:
-        raise OptionError(f"{flag} {words[0]} is one choice, and {texts[0]}, {texts[1]} are two")
-    return words[0] if words else np.concatenate([read_pairs(text) for text in texts])
+    files = [text for text in texts if text not in kind.words]
+    if len(words) > 1:
+        raise OptionError(f"{flag} {words[0]} is given twice")
+    pairs = np.concatenate([read_pairs(text) for text in files]) if files else None
+    if words and pairs is not None:
+        return words[0], pairs
+    return words[0] if words else pairs
 
 
 def check_combinations(context: click.Context) -> None:

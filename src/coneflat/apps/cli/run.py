@@ -113,6 +113,11 @@ def open_result(
     return flatten_joined(source, console, {"charts": "atlas", **checking(repair)})
 
 
+def archive_of(file: Path) -> Path | None:
+    """Return the file if it is a result's archive, which may have arrays more."""
+    return file if file.suffix.lower() == ".npz" else None
+
+
 def flatten_file(
     mesh: Path, console: Console, options: Mapping[str, Any], weld: bool | None = None
 ) -> Flattening:

@@ -64,6 +64,13 @@ def input_options(command: Command) -> Command:
     return command
 
 
+color_option = click.option(
+    "--color",
+    metavar="NAME|FILE",
+    help="Numbers of your own, as colours with a scale: a property of the vertices of a .ply, an array of a result "
+    ".npz, or FILE.npy, FILE.npz:NAME; one for each vertex or triangle.",
+)
+
 again_option = click.option(
     "--again", is_flag=True, help="Flatten a mesh that has UVs, too, instead of showing these."
 )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .shared import QUIET, VERBOSE, verbosity_options
+from .shared import QUIET, VERBOSE, color_option, verbosity_options
 
 
 @click.command(short_help="Flatten by hand and eye, live in the browser.")
@@ -19,8 +19,9 @@ from .shared import QUIET, VERBOSE, verbosity_options
     help="Port of this machine at which the page is.",
 )
 @click.option("--no-open", is_flag=True, help="Print the page's address, and open no browser.")
+@color_option
 @verbosity_options
-def studio(file: Path | None, port: int, no_open: bool, verbosity: str | None) -> None:
+def studio(file: Path | None, port: int, no_open: bool, color: str | None, verbosity: str | None) -> None:
     """Move cones and draw seams on a mesh, and see at once what comes of it.
 
     The page is at an address of this machine that nobody else can use; it is printed first. What is chosen is kept in
@@ -40,4 +41,5 @@ def studio(file: Path | None, port: int, no_open: bool, verbosity: str | None) -
         if verbosity != QUIET or no_open:
             click.echo(line)
 
-    run_studio(file, port, opens=not no_open, say=say, tell=click.echo if verbosity == VERBOSE else None)
+    tell = click.echo if verbosity == VERBOSE else None
+    run_studio(file, port, opens=not no_open, say=say, tell=tell, color=color)

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .shared import again_option, input_options, up_option, verbosity_options
+from .shared import again_option, color_option, input_options, up_option, verbosity_options
 
 
 @click.command(short_help="Show a mesh and its layout in the browser.")
@@ -26,6 +26,7 @@ from .shared import again_option, input_options, up_option, verbosity_options
     type=click.Choice(["checker", "picture", "charts", "qc", "area", "curvature", "flat", "plain"]),
     help="What the page shows first.  [default: checker, or picture with --texture]",
 )
+@color_option
 @up_option
 @again_option
 @input_options
@@ -42,6 +43,7 @@ def view(
     output: Path | None,
     texture: Path | None,
     show: str | None,
+    color: str | None,
     up: str,
     again: bool,
     repair: bool,
@@ -60,15 +62,17 @@ def view(
       coneflat view horse.ply
       coneflat view horse_uv.obj --show qc
       coneflat view horse.npz -o horse.html --show qc
+      coneflat view scan.ply --color quality
       coneflat view hand.obj -o hand.html --texture leather.jpg
       coneflat quads hand.obj -o hand.npz && coneflat view hand.npz
     """
     from ...files.quads import holds_quads, read_quads
     from ...files.texture import read_picture
+    from ...view.own import own_quantity
     from ...view.page.quads import page_of_quads
     from ...view.page.webpage import check_page, open_page, page_of, write_page
     from .console import Console
-    from .run import FLATTENED, open_result
+    from .run import FLATTENED, archive_of, open_result
 
     # What can fail at the end is looked at before the work.
     page = check_page(Path(f"{file.stem}_view.html") if output is None else output)
@@ -84,6 +88,8 @@ def view(
         }
         result = None
         if holds_quads(file):
+            if color is not None:
+                raise click.UsageError("quads are shown without colours of your own: leave out --color")
             with console.stage("read", 0.0):
                 quads = read_quads(file)
             with console.stage("page", FLATTENED):
@@ -91,6 +97,8 @@ def view(
         else:
             result = open_result(file, console, again=again, repair=repair, weld=weld)
             with console.stage("page", FLATTENED):
+                if color is not None:
+                    look["color"] = own_quantity(result, color, archive_of(file))
                 text = page_of(result, **look)
         write_page(text, page)
         console.finish([page], result)

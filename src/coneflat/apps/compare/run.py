@@ -30,6 +30,7 @@ SHARED = (
     "seams",
     "sharp_angle",
     "forbidden_seams",
+    "seamless",
     "creases",
     "hide_seams",
     "seam_weights",
@@ -40,7 +41,7 @@ SHARED = (
     "up",
 )
 # Those of them that name vertices of the input.
-NAMING = ("seams", "forbidden_seams", "seam_weights")
+NAMING = ("seams", "forbidden_seams", "seamless", "seam_weights")
 # The stages that lead from cones and cut to a layout.
 TIMED = ("metric", "layout")
 # Seconds: what takes less is done again, and the shorter time counts, since code is loaded when it is first needed.

@@ -12,11 +12,10 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from ...errors import ConeflatError, NonManifoldError, NonOrientableError, StudioError
+from ...errors import ConeflatError, NonManifoldError, NonOrientableError
 from ...progress import asking
 from .frames import Head, read_frame, write_frame
 from .known import with_prints
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from ...input.join import Joined
     from ...result.flattening import Flattening
     from ...view.page.content import Model
+    from ...view.quantity import Quantity
 
 #: Polygons from which on the first layout is shown, too: of smaller meshes the last is there as soon.
 EARLY = 20_000
@@ -119,29 +119,43 @@ class Bench:
         result = flattener.flatten(early=show_first if is_large else None, progress=told_on, **chosen)
         result = replace(result, notes=source.notes_of(result.notes))
         told("picture", 1.0)
-        picture = self._picture(result, name)
+        head, body = self._coloured(job, result, name)
         self.result = result
-        return picture
+        return head, body
 
-    def export(self, ending: str) -> bytes:
-        """Return the result as a file.
+    def _coloured(self, job: Head, result: Flattening, name: str) -> tuple[Head, bytes]:
+        """Return what the page shows of a result, with colours of the user's own; without, if there are none such."""
+        from ...view.own import own_quantity
 
-        Raises:
-            StudioError: there is no result.
+        if not job.get("color"):
+            return self._picture(result, name)
+        try:
+            own = own_quantity(result, job["color"])
+        except ConeflatError as error:
+            head, body = self._picture(result, name)
+            return {**head, "missing": str(error)}, body
+        return self._picture(result, name, own=own)
+
+    def make(self, job: Head, told: Callable[[str, float], None]) -> tuple[Head, bytes]:
+        """Return what is asked for beside layouts: a file of the result, quads, or a curve."""
+        from .choices import Choices
+        from .outputs import curve_of, quads_of, saved
+
+        if job["do"] == "export":
+            return {}, saved(self.result, job["ending"])
+        source, _ = self._open(job["mesh"], job["sha256"], told)
+        chosen = Choices.from_plain(job["choices"])
+        if job["do"] == "quads":
+            return {}, quads_of(source, chosen, job["count"], job["ending"], told)
+        return curve_of(source, chosen, told), b""
+
+    def _picture(
+        self, result: Flattening, name: str, is_first: bool = False, own: Quantity | None = None
+    ) -> tuple[Head, bytes]:
+        """Return what the page shows of a result; of the first layout no numbers, which will be others.
+
+        own: numbers that are shown as colours.
         """
-        from ...files.write import write_stream
-        from .outlines import layout_svg
-
-        if self.result is None:
-            raise StudioError("there is nothing to save: the last change could not be flattened")
-        if ending == ".svg":
-            return layout_svg(self.result).encode("utf-8")
-        stream = BytesIO()
-        write_stream(self.result, stream, ending)
-        return stream.getvalue()
-
-    def _picture(self, result: Flattening, name: str, is_first: bool = False) -> tuple[Head, bytes]:
-        """Return what the page shows of a result; of the first layout no numbers, which will be others."""
         from ...result.from_uv import shown_rows
         from ...view.page.content import Model, content_of
         from ...view.page.payload import Told, head_and_block
@@ -154,8 +168,9 @@ class Bench:
             result = replace(result, notes=())
         if self._model is None or not self._model.is_of(result):
             self._model = Model.of(result)
-        content = content_of(result, MOST_TRIANGLES, self._model)
-        head, block = head_and_block(result, content, None, name, "y", "checker", told)
+        content = content_of(result, MOST_TRIANGLES, self._model, own)
+        show = "checker" if own is None else "own"
+        head, block = head_and_block(result, content, None, name, "y", show, told)
         cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
         told_of = {"head": with_prints(head, block), "found": cones.tolist(), "seconds": result.seconds}
         return told_of, block
@@ -185,24 +200,23 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
     while (job := jobs.next()) is not None:
         number = job["job"]
 
-        def ask(number: int = number) -> None:
-            if jobs.is_stale(number):
+        def ask(wanted: int = job.get("after") or number) -> None:
+            if jobs.is_stale(wanted):
                 raise Superseded
 
         def told(stage: str, fraction: float, number: int = number) -> None:
-            ask(number)
+            ask()
             write_frame(answers, {"job": number, "stage": stage, "fraction": fraction})
 
         def show(head: Head, body: bytes, number: int = number) -> None:
-            ask(number)
+            ask()
             write_frame(answers, {"job": number, "early": head}, body)
 
         try:
-            if job["do"] == "flatten":
-                with asking(ask):
-                    head, body = bench.flatten(job, told, show)
-            else:
-                head, body = {}, bench.export(job["ending"])
+            with asking(ask):
+                head, body = (
+                    bench.flatten(job, told, show) if job["do"] == "flatten" else bench.make(job, told)
+                )
             write_frame(answers, {"job": number, "done": head}, body)
         except Superseded:
             write_frame(answers, {"job": number, "given_up": True})

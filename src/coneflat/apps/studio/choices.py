@@ -5,26 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
-
-import numpy as np
 
 from ...errors import OptionError, StudioError
 from ...options import Options, declarations, read_options
 from ...options.kinds import Flag, as_number, as_whole
 from ...text import shown
+from .meaning import CORNERS, edges_of, meaning
+from .paint import Paint, Region
 
 #: Options that are chosen as they are; cones and seams are chosen one by one.
 PLAIN = (
-    "distortion", "cone_count", "boundary", "stretch", "charts", "sharp_angle", "creases", "hide_seams", "resolution",
-    "padding", "repair",
+    "distortion", "cone_count", "boundary", "stretch", "charts", "seams", "sharp_angle", "creases", "hide_seams",
+    "symmetric", "mirrored", "resolution", "padding", "repair",
 )  # fmt: skip
 #: Those of them that say how many cones a search is to find.
 NUMBERS = ("distortion", "cone_count")
-#: Boundaries that need no corners to be named, nor a search for them.
-BOUNDARIES = ("free", "lengths", "disk", "straight")
+#: What the boundary may become; a rectangle has four corners, which are picked.
+BOUNDARIES = ("free", "lengths", "disk", "straight", "rectangle")
+#: What the file's unit of length may be; "" is not known. It changes nothing but the lengths that are shown.
+UNITS = ("", "mm", "cm", "m", "inch")
 
 Path = tuple[int, ...]
 
@@ -59,6 +62,9 @@ class Choices:
         cones: those placed or locked, by vertex.
         cuts: paths along edges, as vertices, that are cut.
         kept: paths along edges that must not be cut.
+        paint: what is painted.
+        corners: vertices on the boundary, of a rectangle, ascending.
+        units: the file's unit of length, and that in which lengths are shown, of `UNITS`.
     """
 
     options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
@@ -66,6 +72,9 @@ class Choices:
     cones: tuple[Cone, ...] = ()
     cuts: tuple[Path, ...] = ()
     kept: tuple[Path, ...] = ()
+    paint: Paint = field(default_factory=Paint)
+    corners: Path = ()
+    units: tuple[str, str] = ("", "")
 
     # Options.
 
@@ -79,8 +88,13 @@ class Choices:
             raise OptionError(f"the studio sets no option {shown(name)}: it has {', '.join(PLAIN)}")
         if name == "boundary" and value not in BOUNDARIES:
             raise OptionError(f"unknown boundary {shown(value)}: choose from {', '.join(BOUNDARIES)}")
+        if name == "seams" and value not in (None, "input"):
+            raise OptionError(f"seams are drawn, or those of the file, 'input', not {shown(value)}")
         kept, declared = dict(self.options), declarations(Options)[name]
-        value = declared[1].kind.parse(name, value)
+        if value != "rectangle":
+            value = declared[1].kind.parse(name, value)
+        if name == "symmetric" and value == "off":
+            kept.pop("mirrored", None)
         for other in NUMBERS if name in NUMBERS else (name,):
             kept.pop(other, None)
         if value != declared[0].default or isinstance(declared[1].kind, Flag):
@@ -174,42 +188,62 @@ class Choices:
             StudioError: none does.
         """
         edge = frozenset((one, two))
-        cuts = tuple(path for path in self.cuts if edge not in _edges(path))
-        kept = tuple(path for path in self.kept if edge not in _edges(path))
+        cuts = tuple(path for path in self.cuts if edge not in edges_of(path))
+        kept = tuple(path for path in self.kept if edge not in edges_of(path))
         if len(cuts) + len(kept) == len(self.cuts) + len(self.kept):
             raise StudioError(f"no path was drawn along the edge {one}-{two}")
         return replace(self, cuts=cuts, kept=kept)
 
+    # What is painted, corners, units.
+
+    def painted(self, layer: object, where: Region, weight: object = None) -> Choices:
+        """Return choices after a stroke of a brush; see `Paint.stroked`."""
+        return replace(self, paint=self.paint.stroked(layer, where, weight))
+
+    def cornered(self, vertex: int) -> Choices:
+        """Return choices with another corner of a rectangle, or without the one that is at a vertex.
+
+        Raises:
+            StudioError: there are four already.
+        """
+        corners = {*self.corners} ^ {vertex}
+        if len(corners) > CORNERS:
+            raise StudioError(f"a rectangle has {CORNERS} corners: pick one of them to take it away first")
+        return replace(self, corners=tuple(sorted(corners)))
+
+    def measured_in(self, of_file: object, as_shown: object) -> Choices:
+        """Return choices with other units.
+
+        Raises:
+            StudioError: they are none, or lengths of unknown unit are to be shown in one.
+        """
+        for unit in (of_file, as_shown):
+            if unit not in UNITS:
+                raise StudioError(f"unknown unit {shown(unit)}: choose from {', '.join(UNITS[1:])}")
+        if as_shown and not of_file:
+            raise StudioError(f"say what the file's unit is before lengths are shown in {as_shown}")
+        return replace(self, units=(str(of_file), str(as_shown)))
+
+    def flattens_like(self, other: Choices) -> bool:
+        """Whether these choices mean the same layout as others."""
+        return replace(self, units=other.units) == other
+
     # What they mean.
 
-    def keywords(self) -> dict[str, Any]:
-        """Return the keyword arguments of `coneflat.flatten` that they mean.
+    @cached_property
+    def words(self) -> Mapping[str, Any]:
+        """The keyword arguments of `coneflat.flatten` that they mean.
 
         Raises:
             OptionError: they do not go together.
         """
-        words = {
-            name: value for name, value in self.options.items() if not (self.by_hand and name in NUMBERS)
-        }
-        if self.by_hand:
-            words |= self._cones_by_hand()
-        elif self.cones:
-            words["required_cones"] = [cone.vertex for cone in self.cones]
-        for name, paths in (("seams", self.cuts), ("forbidden_seams", self.kept)):
-            if paths:
-                edges = {tuple(sorted(edge)) for path in paths for edge in _edges(path)}
-                words[name] = np.array(sorted(edges), dtype=np.int64)
+        words = meaning(self)
         read_options(words)
-        return words
+        return MappingProxyType(words)
 
-    def _cones_by_hand(self) -> dict[str, Any]:
-        vertices = [cone.vertex for cone in self.cones]
-        if not vertices:
-            return {"cones": "none"}
-        if any(cone.angle is not None for cone in self.cones):
-            return {"cones": {cone.vertex: cone.curvature for cone in self.cones}}
-        # A search that has nothing to choose finds the angles of the least area distortion.
-        return {"required_cones": vertices, "allowed_cones": vertices}
+    def keywords(self) -> dict[str, Any]:
+        """Return `words`, to be changed."""
+        return dict(self.words)
 
     def as_plain(self) -> dict[str, Any]:
         """Return them as JSON holds them."""
@@ -221,6 +255,9 @@ class Choices:
             ],
             "cuts": [list(path) for path in self.cuts],
             "kept": [list(path) for path in self.kept],
+            **({"paint": self.paint.as_plain()} if self.paint else {}),
+            **({"corners": list(self.corners)} if self.corners else {}),
+            **({"units": list(self.units)} if any(self.units) else {}),
         }
 
     @classmethod
@@ -248,6 +285,10 @@ class Choices:
             chosen = chosen.cut(tuple(path))
         for path in plain["kept"]:
             chosen = chosen.keep_whole(tuple(path))
+        chosen = replace(chosen, paint=Paint.from_plain(plain.get("paint", {})))
+        for vertex in dict.fromkeys(plain.get("corners", ())):
+            chosen = chosen.cornered(as_whole("a corner", vertex))
+        chosen = chosen.measured_in(*plain.get("units", ("", "")))
         chosen.keywords()
         return chosen
 
@@ -271,7 +312,3 @@ def _checked(path: Iterable[Any]) -> Path:
     if len(vertices) < 2 or any(a == b for a, b in pairwise(vertices)):
         raise StudioError(f"a path leads from one vertex to others, not along {shown(list(vertices))}")
     return vertices
-
-
-def _edges(path: Path) -> set[frozenset[int]]:
-    return {frozenset(edge) for edge in pairwise(path)}

@@ -18,16 +18,30 @@ _HEADERS = (
     (b"cache-control", b"no-store"),
     (b"referrer-policy", b"no-referrer"),
     (b"x-content-type-options", b"nosniff"),
-    (b"x-frame-options", b"DENY"),
     (b"cross-origin-resource-policy", b"same-origin"),
     (b"cross-origin-opener-policy", b"same-origin"),
+)
+#: In no frame; or in those of notebooks on this machine, Jupyter's and VS Code's.
+_ALONE = ((b"x-frame-options", b"DENY"), (b"content-security-policy", b"frame-ancestors 'none'"))
+_FRAMED = (
+    (
+        b"content-security-policy",
+        b"frame-ancestors http://localhost:* http://127.0.0.1:* vscode-webview: vscode-file:",
+    ),
 )
 
 
 class Guard:
     """Refuses requests by others, before anything looks at them."""
 
-    def __init__(self, app: ASGIApp, token: str, port: int) -> None:
+    def __init__(self, app: ASGIApp, token: str, port: int, framed: bool = False) -> None:
+        """Args:
+        app: what answers.
+        token: that every request must have.
+        port: the only one that requests may name.
+        framed: notebooks of this machine may show the page in a frame.
+        """
+        self._headers = (*_HEADERS, *(_FRAMED if framed else _ALONE))
         self._app, self._token = app, token
         self._hosts = {f"{host}:{port}" for host in HOSTS} | (set(HOSTS) if port == 80 else set())
 
@@ -44,7 +58,7 @@ class Guard:
 
         async def send_guarded(message: Message) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = [*message.get("headers", ()), *_HEADERS]
+                message["headers"] = [*message.get("headers", ()), *self._headers]
             await send(message)
 
         await self._app(scope, receive, send_guarded)
@@ -70,6 +84,11 @@ class Guard:
 
 async def _refuse(send: Send, reason: str) -> None:
     text = reason.encode()
-    headers = [(b"content-type", b"text/plain"), (b"content-length", str(len(text)).encode()), *_HEADERS]
+    headers = [
+        (b"content-type", b"text/plain"),
+        (b"content-length", str(len(text)).encode()),
+        *_HEADERS,
+        *_ALONE,
+    ]
     await send({"type": "http.response.start", "status": 403, "headers": headers})
     await send({"type": "http.response.body", "body": text})

@@ -6,14 +6,35 @@ import shlex
 from typing import Any
 
 from .choices import Choices
+from .paint import region_of
 
-WIDTH = 100
+#: Letters that may stand in the panel.
+LONGEST = 20_000
+#: Numbers that are written one by one.
+FEW = 12
+
+
+class Replay:
+    """What makes the same layout without the studio, written once for each change."""
+
+    def __init__(self) -> None:
+        self._of: tuple[str | None, Choices | None] = None, None
+        self._texts: dict[str, str] = {}
+
+    def of(self, mesh: str | None, project: str, choices: Choices) -> dict[str, str]:
+        """Return the command line, and Python; nothing without a mesh."""
+        if mesh is None:
+            return {"command": "", "python": ""}
+        if self._of[0] != mesh or self._of[1] is not choices:
+            command, python = command_line(mesh, project, choices), python_lines(mesh, choices)
+            self._of, self._texts = (mesh, choices), {"command": command, "python": python}
+        return self._texts
 
 
 def command_line(mesh: str, project: str, choices: Choices) -> str:
-    """Return a command that flattens a mesh by what was chosen; drawn seams need the project's file."""
-    words = choices.keywords()
-    if "seams" in words or "forbidden_seams" in words:
+    """Return a command that flattens a mesh by what was chosen; what was drawn or painted needs the project's file."""
+    words = choices.words
+    if choices.cuts or choices.kept or choices.paint:
         return shlex.join(["coneflat", "flatten", "--project", project])
     parts = ["coneflat", "flatten", mesh]
     for name, value in words.items():
@@ -31,7 +52,9 @@ def command_line(mesh: str, project: str, choices: Choices) -> str:
 
 def python_lines(mesh: str, choices: Choices) -> str:
     """Return Python that flattens a mesh by what was chosen."""
-    given = [f"    {name}={_written(value)}," for name, value in choices.keywords().items()]
+    given = [f"    {name}={_written(value)}," for name, value in choices.words.items()]
+    if sum(map(len, given)) > LONGEST:
+        return "# What was drawn or painted is too much to be written here; the project's file has it."
     call = "\n".join([f"result = coneflat.flatten(\n    {mesh!r},", *given, ")"])
     return f"import coneflat\n\n{call}"
 
@@ -41,4 +64,28 @@ def _cone(vertex: int, curvature: float | None) -> str:
 
 
 def _written(value: Any) -> str:
-    return repr(value.tolist() if hasattr(value, "tolist") else value)
+    if hasattr(value, "tolist"):
+        return repr(value.tolist())
+    if isinstance(value, tuple):
+        return f"({', '.join(_written(each) for each in value)})"
+    if isinstance(value, list) and len(value) > FEW:
+        return f"[{_ranges(value)}]"
+    if isinstance(value, dict) and len(value) > FEW:
+        # Those that have one value are together.
+        groups: dict[Any, list[int]] = {}
+        for vertex, each in value.items():
+            groups.setdefault(each, []).append(vertex)
+        if len(groups) <= FEW:
+            parts = (
+                f"**dict.fromkeys([{_ranges(sorted(group))}], {each!r})" for each, group in groups.items()
+            )
+            return f"{{{', '.join(parts)}}}"
+    return repr(value)
+
+
+def _ranges(vertices: list[int]) -> str:
+    """Return vertices, ascending, as they stand in brackets: those that follow each other as a range."""
+    import numpy as np
+
+    runs = region_of(np.array(vertices)).runs
+    return ", ".join(str(a) if a == b else f"*range({a}, {b + 1})" for a, b in runs)

@@ -23,6 +23,7 @@ def run_studio(
     opens: bool,
     say: Callable[[str], None],
     tell: Callable[[str], None] | None = None,
+    color: str | None = None,
 ) -> None:
     """Serve a session until it is interrupted.
 
@@ -32,6 +33,7 @@ def run_studio(
         opens: show the page in the browser.
         say: is told the page's address first.
         tell: is told of every layout and every failure, if anybody wants to know.
+        color: what numbers of the user's own are shown as colours.
 
     Raises:
         OptionError: the extra `studio` is not installed.
@@ -47,7 +49,7 @@ def run_studio(
     from .session import Session
 
     is_project = file is not None and file.suffix.lower() == ".json"
-    session = Session(file.parent if file is not None and is_project else Path())
+    session = Session(file.parent if file is not None and is_project else Path(), color)
     with listening(port) as listener:
         port = listener.getsockname()[1]
         token = secrets.token_urlsafe(24)

@@ -27,16 +27,16 @@ from .session import Session
 
 MOST_UPLOADED = 512 * 1024 * 1024  # bytes of a mesh
 LONG_POLL = 20.0  # seconds that a question for news waits for some
-TYPES = {".svg": "image/svg+xml", ".obj": "text/plain"}
+TYPES = {".svg": "image/svg+xml", ".obj": "text/plain", ".json": "application/json", ".png": "image/png"}
 
 
 class StudioServer(uvicorn.Server):
     """Serves a session until it is interrupted; then nobody waits for news any more."""
 
-    def __init__(self, session: Session, token: str, port: int) -> None:
+    def __init__(self, session: Session, token: str, port: int, framed: bool = False) -> None:
         super().__init__(
             uvicorn.Config(
-                studio_app(session, token, port),
+                studio_app(session, token, port, framed=framed),
                 log_level="error",
                 access_log=False,  # It would hold the token.
                 server_header=False,
@@ -80,7 +80,9 @@ class Bell:
             del self._waiting[event]
 
 
-def studio_app(session: Session, token: str, port: int, most_uploaded: int = MOST_UPLOADED) -> ASGIApp:
+def studio_app(
+    session: Session, token: str, port: int, most_uploaded: int = MOST_UPLOADED, framed: bool = False
+) -> ASGIApp:
     """Return the server's application.
 
     Args:
@@ -88,6 +90,7 @@ def studio_app(session: Session, token: str, port: int, most_uploaded: int = MOS
         token: that every request must have.
         port: at which it is served: the only one that requests may name.
         most_uploaded: bytes of a mesh that may be dropped on the page.
+        framed: notebooks of this machine may show the page in a frame.
     """
     bell = Bell()
     session.listen(bell.ring)
@@ -123,6 +126,14 @@ def studio_app(session: Session, token: str, port: int, most_uploaded: int = MOS
         content = await run_sync(session.export, ending)
         return Response(content, media_type=TYPES.get(ending, "application/octet-stream"))
 
+    async def quads(request: Request) -> Response:
+        ending = f".{request.path_params['ending']}"
+        content = await run_sync(session.quads, ending, _number(request.query_params.get("count", "")))
+        return Response(content, media_type=TYPES.get(ending, "application/octet-stream"))
+
+    async def curve(request: Request) -> Response:
+        return JSONResponse(await run_sync(session.curve))
+
     async def upload(request: Request) -> Response:
         path = session.file_named(request.query_params.get("name", ""))
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
@@ -138,6 +149,8 @@ def studio_app(session: Session, token: str, port: int, most_uploaded: int = MOS
             Route("/layout", layout),
             Route("/act", act, methods=["POST"]),
             Route("/export/{ending}", export, methods=["POST"]),
+            Route("/quads/{ending}", quads, methods=["POST"]),
+            Route("/curve", curve, methods=["POST"]),
             Route("/mesh", upload, methods=["POST"]),
         ],
         exception_handlers={
@@ -147,7 +160,12 @@ def studio_app(session: Session, token: str, port: int, most_uploaded: int = MOS
             ClientDisconnect: _garbled,
         },
     )
-    return Guard(app, token, port)
+    return Guard(app, token, port, framed)
+
+
+def _number(text: str) -> object:
+    """Return the number that a text of a request is, or the text."""
+    return int(text) if text.isdecimal() and text.isascii() and len(text) < 16 else text
 
 
 def _is_number(text: str) -> bool:

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import math
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...errors import MeshFileError, ProjectError, StudioError
-from ...options.kinds import as_number, as_whole
+from ...errors import ConeflatError, MeshFileError, ProjectError, StudioError
+from ...options.kinds import as_whole
 from ...text import shown
 from .choices import Choices
 from .frames import Head
 from .history import History
 from .known import Known
+from .outputs import EXPORTS, MOST_QUADS, QUADS, curve_options
 from .project import Project, hash_of, read_project
-from .replay import command_line, python_lines
+from .replay import Replay
+from .steps import STEPS
 from .worker import Worker
 
-#: What a result can be saved as.
-EXPORTS = (".obj", ".ply", ".glb", ".npz", ".svg")
 PATIENCE = 600.0  # seconds that saving waits for the flattening before it
 
 
@@ -37,13 +36,18 @@ class Session:
 
     Attributes:
         folder: where projects are, and whatever the page names.
+        color: what numbers are shown as colours, if any.
         version: counts what has happened; who has seen a version need not look again.
         layout: the number of the layout that is shown; 0 for none.
         is_early: whether that is the first one of a change, and another will follow.
     """
 
-    def __init__(self, folder: Path) -> None:
-        """folder: of projects."""
+    def __init__(self, folder: Path, color: str | None = None) -> None:
+        """Args:
+        folder: of projects.
+        color: what numbers are shown as colours, as of `own_quantity`.
+        """
+        self.color = color
         self.folder = folder.resolve()
         self.version = 0
         self.layout = 0
@@ -60,7 +64,10 @@ class Session:
         self._shown: tuple[Head, bytes] | None = None
         self._known = Known()
         self._last: _Layout | None = None  # of an earlier change, while one on the way is shown
+        self._questions = 0
         self._answers: dict[int, tuple[Head, bytes]] = {}
+        self._curves: dict[tuple[str, str], dict[str, Any]] = {}
+        self._replay = Replay()
         self._changed = threading.Condition(threading.RLock())
         self._listeners: list[Callable[[], None]] = []
         self._worker = Worker(self._hear, self._mourn)
@@ -139,7 +146,8 @@ class Session:
         Args:
             action: what to `do`: "set" an option (`name`, `value`), take the cones by "hand", "add", "move", "remove",
                 "angle" or "lock" a cone (`vertex`; `to`, `degrees`, `locked`), "cut" or "keep" a `path`, "erase" an
-                `edge`, "undo", "redo", or "again". Steps of the same `stroke` are undone together.
+                `edge`, "paint" a `layer` (`where`; `weight`), take or leave a "corner" (`vertex`), show lengths in
+                "units" (`of_file`, `shown`), "undo", "redo", or "again". Steps of one `stroke` are undone together.
 
         Raises:
             StudioError: it makes no sense, or cannot be done.
@@ -152,16 +160,49 @@ class Session:
             if kind == "again":
                 self._flatten()
             elif kind in ("undo", "redo"):
+                before = history.now
                 if history.undo() if kind == "undo" else history.redo():
-                    self._flatten()
+                    self._follow(before)
             else:
                 try:
-                    chosen = _STEPS[str(kind)](history.now, action, self._found)
+                    chosen = STEPS[str(kind)](history.now, action, self._found)
                 except (KeyError, TypeError) as error:
                     raise StudioError(f"the studio does nothing by {shown(dict(action))}") from error
-                chosen.keywords()
-                if history.change(chosen, action.get("stroke")):
-                    self._flatten()
+                self._take(chosen, action.get("stroke"))
+
+    def choose(self, plain: Mapping[str, Any]) -> None:
+        """Choose all anew, as `Choices.as_plain` has it.
+
+        Raises:
+            StudioError: it makes no sense, or there is no mesh.
+            OptionError: options make no sense, or do not go together.
+        """
+        with self._changed:
+            if self._mesh is None:
+                raise StudioError("there is no mesh yet")
+            try:
+                chosen = Choices.from_plain({**Choices().as_plain(), **plain})
+            except ConeflatError:
+                raise
+            except (KeyError, TypeError, ValueError, AttributeError) as error:
+                raise StudioError(f"these are no choices: {shown(dict(plain))}") from error
+            self._take(chosen, None)
+
+    def _take(self, chosen: Choices, stroke: object) -> None:
+        """Take a step, if it is one."""
+        chosen.keywords()
+        before = self._history.now
+        if self._history.change(chosen, stroke):
+            self._follow(before)
+
+    def _follow(self, before: Choices) -> None:
+        """Do what follows from a step: a layout, or no more than that what is chosen is kept and told."""
+        if not self._history.now.flattens_like(before):
+            return self._flatten()
+        trouble = self._trouble
+        self._save()
+        self._trouble = self._trouble or trouble
+        return self._tell()
 
     def _flatten(self) -> None:
         assert self._mesh is not None
@@ -169,15 +210,7 @@ class Session:
         self._job += 1
         self._busy = {"stage": "", "fraction": 0.0}
         self._tell()
-        self._worker.send(
-            {
-                "do": "flatten",
-                "job": self._job,
-                "mesh": str(self._mesh),
-                "sha256": self._sha256,
-                "choices": self._history.now.as_plain(),
-            }
-        )
+        self._worker.send({"do": "flatten", "job": self._job, "color": self.color, **self._of_mesh()})
 
     def _save(self) -> None:
         """Keep what is chosen, so that nothing is lost whatever happens next."""
@@ -216,8 +249,7 @@ class Session:
                 "early": self.is_early,
                 "found": self._found,
                 "seconds": sum(self._seconds.values()),
-                "command": "" if name is None else command_line(name, project, chosen),
-                "python": "" if name is None else python_lines(name, chosen),
+                **self._replay.of(name, project, chosen),
             }
 
     def picture(self, known: int = 0) -> tuple[Head, bytes] | None:
@@ -236,21 +268,58 @@ class Session:
         """
         if ending not in EXPORTS:
             raise StudioError(f"{shown(ending)} is no format that results are saved as: {', '.join(EXPORTS)}")
+        return self._asked({"do": "export", "ending": ending})[1]
+
+    def quads(self, ending: str, count: object) -> bytes:
+        """Return quads of the mesh, about so many, as a file; a change ends the work on them.
+
+        Raises:
+            StudioError: there is no mesh, no such format, or something was changed.
+            OptionError: the number makes no sense.
+        """
+        if ending not in QUADS:
+            raise StudioError(f"{shown(ending)} is no format that quads are saved as: {', '.join(QUADS)}")
+        number = as_whole("the number of quads", count)
+        if not 1 <= number <= MOST_QUADS:
+            raise StudioError(f"the number of quads must be from 1 to {MOST_QUADS:,}, not {number:,}")
+        return self._asked({"do": "quads", "ending": ending, "count": number})[1]
+
+    def curve(self) -> dict[str, Any]:
+        """Return the distortion for each number of cones, as `curve_of` does; a change ends the work on it.
+
+        Raises:
+            StudioError: there is no mesh, or something was changed.
+        """
+        with self._changed:
+            key = self._sha256, repr(curve_options(self._history.now))
+            if key not in self._curves:
+                self._curves[key] = self._asked({"do": "curve"})[0]
+            return self._curves[key]
+
+    def _asked(self, job: Head) -> tuple[Head, bytes]:
+        """Return what the worker makes of a job beside the flattenings."""
         with self._changed:
             if self._mesh is None:
                 raise StudioError("there is no mesh yet")
             if not self._worker.is_alive:  # What it had is gone.
                 self._flatten()
-            # A number of its own, which no flattening has.
-            job = -1 - len(self._answers)
-            self._answers[job] = ({}, b"")
-            self._worker.send({"do": "export", "job": job, "ending": ending})
-            self._changed.wait_for(lambda: self._answers[job][0], PATIENCE)
-            head, body = self._answers[job]
-            del self._answers[job]
+            self._questions -= 1  # No flattening has such a number.
+            number = self._questions
+            self._answers[number] = ({}, b"")
+            # What takes long is given up for a later flattening.
+            stops = {} if job["do"] == "export" else {"after": self._job}
+            self._worker.send({**job, **stops, **self._of_mesh(), "job": number})
+            self._changed.wait_for(lambda: self._answers[number][0], PATIENCE)
+            head, body = self._answers[number]
+            del self._answers[number]
+        if "given_up" in head:
+            raise StudioError("something was changed meanwhile: ask again")
         if "done" not in head:
-            raise StudioError(head.get("error", "saving took too long"))
-        return body
+            raise StudioError(head.get("error", "this took too long"))
+        return head["done"], body
+
+    def _of_mesh(self) -> Head:
+        return {"mesh": str(self._mesh), "sha256": self._sha256, "choices": self._history.now.as_plain()}
 
     def listen(self, listener: Callable[[], None]) -> None:
         """Call a function, from any thread, whenever something has happened."""
@@ -294,6 +363,8 @@ class Session:
             elif "done" in head:
                 self._busy = None
                 self._show(head["done"], body)
+                if "missing" in head["done"] and self._trouble is None:
+                    self._trouble = {"text": head["done"]["missing"], "repair": False}
                 self.is_early, self._last = False, None
             self._tell()
 
@@ -327,31 +398,3 @@ class Session:
         self._changed.notify_all()
         for listener in self._listeners:
             listener()
-
-
-def _step(change: Callable[..., Choices]) -> Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]:
-    """Return a step that makes the cones that were found the user's before it changes them."""
-    return lambda chosen, action, found: change(chosen.placed(found), action)
-
-
-def _angle(action: Mapping[str, Any]) -> float | None:
-    degrees = action.get("degrees")
-    return None if degrees is None else math.radians(as_number("an angle", degrees))
-
-
-def _vertex(action: Mapping[str, Any], name: str = "vertex") -> int:
-    return as_whole("a vertex", action[name])
-
-
-_STEPS: dict[str, Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]] = {
-    "set": lambda chosen, action, found: chosen.with_option(action["name"], action["value"]),
-    "hand": _step(lambda chosen, action: chosen),
-    "add": _step(lambda chosen, action: chosen.added(_vertex(action), _angle(action))),
-    "move": _step(lambda chosen, action: chosen.moved(_vertex(action), _vertex(action, "to"))),
-    "remove": _step(lambda chosen, action: chosen.removed(_vertex(action))),
-    "angle": _step(lambda chosen, action: chosen.angled(_vertex(action), _angle(action))),
-    "lock": lambda chosen, action, found: chosen.locked(_vertex(action), action["locked"] is True),
-    "cut": lambda chosen, action, found: chosen.cut(tuple(action["path"])),
-    "keep": lambda chosen, action, found: chosen.keep_whole(tuple(action["path"])),
-    "erase": lambda chosen, action, found: chosen.erased(*(as_whole("a vertex", v) for v in action["edge"])),
-}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from ...errors import OptionError
 from ...files.atomic import as_path, atomic_write, check_target, known_ending
@@ -65,9 +65,15 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
         UnknownFormatError: the ending is none of these.
         MeshFileError: the file cannot be written.
     """
+    ending = known_ending(check_figure_target(path), FIGURE_FORMATS, "figures are written as")
+    with atomic_write(path, "wb") as stream:
+        write_figure(figure, stream, ending)
+    return as_path(path)
+
+
+def write_figure(figure: Figure, stream: IO[bytes], ending: str) -> None:
+    """Write a figure to a binary stream; ending: one of `FIGURE_FORMATS`."""
     from matplotlib import rc_context
 
-    ending = known_ending(check_figure_target(path), FIGURE_FORMATS, "figures are written as")
-    with rc_context(_SETTINGS), atomic_write(path, "wb") as stream:
+    with rc_context(_SETTINGS):
         figure.savefig(stream, format=ending[1:], dpi=figure.dpi, metadata=_METADATA[ending])
-    return as_path(path)

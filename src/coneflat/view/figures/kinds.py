@@ -13,16 +13,17 @@ from ... import text
 from ...curve import ConeCurve
 from ...errors import OptionError
 from ...quality.checker import CELLS, check_cells
-from ..quantity import check_color_map, conformal_distortion, curvature, stretch
+from ..quantity import Quantity, check_color_map, conformal_distortion, curvature, stretch
 from .camera import Eye, eye_direction, view_aspect
 from .compose import Panel, Row, check_pixels, compose
 from .cone_curve import draw_cone_curve
 from .cone_marks import mark_handles
-from .model import DOTS_PER_INCH, draw_checker, draw_cones, draw_curvature, draw_quality
+from .model import DOTS_PER_INCH, draw_checker, draw_cones, draw_curvature, draw_quality, draw_quantity
 from .quads import draw_quads, irregular_handles
-from .uv_layout import draw_layout, layout_aspect
+from .uv_layout import draw_layout, fill_layout, layout_aspect
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from ...grid import QuadMesh
@@ -40,9 +41,10 @@ class Look:
         dpi: dots per inch of the pictures.
         eyes: directions from the model to the eye, one for each view, see `draw_checker`.
         up: the model's upward axis, "x", "y" or "z".
-        colors: a colour map of matplotlib for quality and curvature; None for their own.
+        colors: a colour map of matplotlib for quality, color and curvature; None for their own.
         cells: of the checkerboard, in a row that is as long as the root of the area.
         color_charts: give the charts of the layout different colours.
+        own: numbers to be shown as colours, of the kind "color".
         distortion: of the curve: the area distortion that is wanted.
         title: to be written above all.
 
@@ -57,6 +59,7 @@ class Look:
     colors: str | None = None
     cells: float = CELLS
     color_charts: bool = False
+    own: Quantity | None = None
     distortion: float = 0.2
     title: str = ""
 
@@ -95,11 +98,13 @@ def make_figure(shown: Flattening | ConeCurve | QuadMesh, kind: str, **look: Any
     Args:
         shown: the flattening; of the kind "curve" a `ConeCurve`, of the kind "quads" a `QuadMesh`.
         kind: "layout": the charts in the unit square with cones. "checker": the model with a checkerboard through
-            its UVs. "quality": distortion of angles and of scale on the model and in the layout. "cones": the model
-            with cones and seams. "curvature": angles missing around vertices, before and after. "curve": area
-            distortion against the number of cones. "quads": the edges of quads, and their irregular vertices.
+            its UVs. "quality": distortion of angles and of scale on the model and in the layout. "color": `own` numbers
+            there. "cones": the model with cones and seams. "curvature": angles missing around vertices, before and
+            after. "curve": area distortion against the number of cones. "quads": the edges of quads, and their
+            irregular vertices.
         look: `size` in inches, `dpi`, `eyes` to see the model from and its axis `up`, `colors`, `cells` of the
-            checkerboard, `color_charts`, `distortion` wanted, `title`: the attributes of `coneflat.view.Look`.
+            checkerboard, `color_charts`, `own` numbers, `distortion` wanted, `title`: the attributes of
+            `coneflat.view.Look`.
 
     Raises:
         OptionError: an option makes no sense, or matplotlib is not installed.
@@ -151,6 +156,21 @@ def _quality(result: Flattening, look: Look) -> _Rows:
     return rows, []
 
 
+def _color(result: Flattening, look: Look) -> _Rows:
+    if look.own is None:
+        raise OptionError("a figure of the kind 'color' shows numbers: give `own`")
+    own = look.own.recolored(look.colors)
+
+    def on_model(result: Flattening, axes: Axes, **more: Any) -> None:
+        draw_quantity(axes, result, own, **more)
+
+    def in_layout(axes: Axes) -> None:
+        fill_layout(axes, result, own, look.dpi)
+
+    layout = Panel(layout_aspect(result, crop=True), in_layout)
+    return [Row([*look.views(result, on_model), layout], [own])], []
+
+
 def _curvature(result: Flattening, look: Look) -> _Rows:
     rows = []
     for flat, label in ((False, "On the model"), (True, "After flattening")):
@@ -177,6 +197,7 @@ _ROWS: dict[str, Callable[[Any, Look], _Rows]] = {
     "quality": _quality,
     "cones": _cones,
     "curvature": _curvature,
+    "color": _color,
     "curve": _curve,
     "quads": _quads,
 }

@@ -15,7 +15,7 @@ from ...geometry.planar import signed_double_areas
 from ...mesh import TriangleMesh, end_corners, label_faces
 from ...quality.checker import cell_side
 from ..colours import page_scales
-from ..quantity import ColorScale, conformal_distortion, missing_angles, stretch
+from ..quantity import ColorScale, Quantity, conformal_distortion, missing_angles, stretch
 from .thin import sides, thin
 
 if TYPE_CHECKING:
@@ -46,6 +46,8 @@ class Content:
         outward: 1 if triangles run anticlockwise seen from outside, else -1.
         left_out: how many triangles are not shown.
         scales: the scale of each colour map.
+        own: numbers of the user's own at vertices, or at triangles if `own_by_face`; NaN where there is none.
+        own_title: what they are called.
     """
 
     places: FloatArray
@@ -69,6 +71,9 @@ class Content:
     outward: int
     left_out: int
     scales: dict[str, ColorScale]
+    own: FloatArray | None = None
+    own_by_face: bool = False
+    own_title: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,13 +115,16 @@ class Model:
         return np.array_equal(mesh.faces, result.faces) and np.array_equal(mesh.vertices, result.vertices)
 
 
-def content_of(result: Flattening, most: int, model: Model | None = None) -> Content:
+def content_of(
+    result: Flattening, most: int, model: Model | None = None, own: Quantity | None = None
+) -> Content:
     """Return what a page shows, with at most so many triangles.
 
     Args:
         result: what is shown.
         most: triangles.
         model: its surface, if something knows it already.
+        own: numbers of the user's own.
 
     Raises:
         ArrayShapeError: the result has no UVs, or no triangles.
@@ -175,7 +183,10 @@ def content_of(result: Flattening, most: int, model: Model | None = None) -> Con
         face_numbers=shown,
         outward=model.outward,
         left_out=len(split.faces) - len(shown),
-        scales=page_scales(qc, scale, model.curvature),
+        scales=page_scales(qc, scale, model.curvature, own),
+        own=None if own is None else own.values[shown] if own.corners is None else own.values[used][vertices],
+        own_by_face=own is not None and own.corners is None,
+        own_title="" if own is None else own.label,
     )
 
 

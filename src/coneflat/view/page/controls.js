@@ -20,8 +20,8 @@ class Controls {
     const shown = this.viewer.model.triangleCount;
     const thinned = head.left_out ? `  ·  drawn with ${grouped(shown)} of ${grouped(head.triangles)} triangles` : "";
     this.part("title").textContent = this.part("title").title = head.title + thinned;
-    this.part("show").replaceChildren(...SHOWS.map(([key, name]) => new Option(name, key)));
-    this.part("key-shows").textContent = `show: ${SHOWS.map(([, name], i) => `${i + 1} ${name.toLowerCase()}`).join(", ")}`;
+    this.part("show").replaceChildren(...showsOf(this.viewer.model).map(([key, name]) => new Option(name, key)));
+    this.part("key-shows").textContent = `show: ${showsOf(this.viewer.model).map(([key, name], i) => `${i + 1} ${key === "own" ? name : name.toLowerCase()}`).join(", ")}`;
     this.part("table").replaceChildren(...this.reportParts(head, shown));
   }
 
@@ -133,8 +133,8 @@ class Controls {
       const [right, down] = arrows[event.key];
       does = () => (camera.turns && !event.shiftKey ? camera.rotate(0.1 * right, 0.1 * down) : camera.move(far * right, far * down));
     }
-    const number = Number(event.key) - 1;
-    if (SHOWS[number]) does = () => state.set({show: SHOWS[number][0]});
+    const shows = showsOf(this.viewer.model), number = Number(event.key) - 1;
+    if (shows[number]) does = () => state.set({show: shows[number][0]});
     if (!does) return;
     event.preventDefault();
     does();

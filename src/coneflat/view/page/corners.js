@@ -80,7 +80,7 @@ function cornerValues(model, show) {
     const tints = model.arrays.tints.length / 3;
     for (let c = 0; c < out.length; c++) out[c] = ((chart[(c / 3) | 0] % tints) + 0.5) / tints;
   } else if (model.head.scales[show]) {
-    const tones = model.tones(show), byFace = show === "qc" || show === "area";
+    const tones = model.tones(show), byFace = model.isByFace(show);
     for (let c = 0; c < out.length; c++) out[c] = tones[byFace ? (c / 3) | 0 : point_vertex[faces[c]]];
     if (!byFace) fillUndefined(out);
   }

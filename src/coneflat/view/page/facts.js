@@ -29,7 +29,10 @@ function triangleFacts(model, index, show) {
   const {qc, area, chart, faces, point_vertex} = model.arrays;
   const vertices = [0, 1, 2].map((k) => point_vertex[faces[3 * index + k]]);
   const facts = [`Triangle ${grouped(model.triangleNumber(index))}`];
-  if (show === "curvature" || show === "flat") {
+  if (show === "own") {
+    const values = model.isByFace("own") ? [model.arrays.own[index]] : vertices.map((v) => model.arrays.own[v]);
+    facts.push(`${model.head.scales.own.title} ${values.map((value) => (Number.isFinite(value) ? Number(value.toPrecision(5)) : "undefined")).join(", ")}`);
+  } else if (show === "curvature" || show === "flat") {
     const values = model.arrays[show];
     facts.push(`curvature at its corners ${vertices.map((v) => signed(values[v])).join(", ")}, in π`);
   } else {
@@ -66,9 +69,8 @@ function placeOfThing(model, thing, show) {
   const scale = model.head.scales[show];
   if (!scale || !thing || thing.kind !== "triangle") return null;
   const values = model.arrays[show];
-  const perFace = show === "qc" || show === "area";
   const corners = [0, 1, 2].map((k) => model.vertexAt(3 * thing.index + k));
-  const chosen = perFace ? [values[thing.index]] : corners.map((v) => values[v]);
+  const chosen = model.isByFace(show) ? [values[thing.index]] : corners.map((v) => values[v]);
   const places = placesOnScale(scale, chosen).filter((place) => place >= 0);
   return places.length ? places.reduce((sum, place) => sum + place, 0) / places.length : null;
 }

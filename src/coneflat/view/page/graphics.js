@@ -71,6 +71,21 @@ class Shape {
     this.gl.deleteVertexArray(this.handle);
   }
 
+  /** Give it an attribute more, or another one in place of that which it has. */
+  put(location, {array, size, type = this.gl.FLOAT, normalised = false}) {
+    const gl = this.gl;
+    if (this.buffers[location]) {
+      this.refill(location, array);
+      return;
+    }
+    gl.bindVertexArray(this.handle);
+    gl.bindBuffer(gl.ARRAY_BUFFER, (this.buffers[location] = gl.createBuffer()));
+    gl.bufferData(gl.ARRAY_BUFFER, array, gl.DYNAMIC_DRAW);
+    gl.enableVertexAttribArray(location);
+    gl.vertexAttribPointer(location, size, type, normalised, 0, 0);
+    gl.bindVertexArray(null);
+  }
+
   refill(location, array) {
     this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.buffers[location]);
     this.gl.bufferData(this.gl.ARRAY_BUFFER, array, this.gl.STATIC_DRAW);

@@ -110,7 +110,7 @@ class Viewer {
   note(names) {
     if (names.has("dark")) this.readColours();
     if (names.has("hovered") || names.has("picked")) this.remark();
-    if (["show", "squares", "seams", "cones", "edges", "dark"].some((name) => names.has(name))) this.redraw();
+    if (["show", "squares", "seams", "cones", "edges", "dark", "marked"].some((name) => names.has(name))) this.redraw();
   }
 
   /** What is drawn over the views has changed. */

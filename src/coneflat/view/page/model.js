@@ -82,6 +82,11 @@ class Model {
     return this.arrays.face_numbers ? this.arrays.face_numbers[triangle] : triangle;
   }
 
+  /** Whether a colour map has a value for each triangle, not for each vertex. */
+  isByFace(show) {
+    return show === "qc" || show === "area" || (show === "own" && this.head.own === "faces");
+  }
+
   /** Where the values of a colour map lie on its scale: of each triangle, or of each vertex. */
   tones(show) {
     return placesOnScale(this.head.scales[show], this.arrays[show]);

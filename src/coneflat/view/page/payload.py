@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...files.texture import Texture
+from ...geometry import double_areas, edge_lengths
 from ...geometry.normals import CREASE_COSINE
+from ...mesh import end_corners
 from ...quality.checker import CELLS
 from ...result.from_uv import shown_rows
-from ..colours import DIVERGING, SEQUENTIAL, as_plain, color_table
+from ..colours import DIVERGING, SEQUENTIAL, TITLES, as_plain, color_table
 from ..figures.camera import fit_camera
 from ..figures.demo import title
 from ..figures.uv_layout import CHART_COLORS
@@ -102,14 +104,36 @@ def head_and_block(
         "uv_low": low.tolist(),
         "uv_high": high.tolist(),
         "uv_side": content.uv_side,
+        "radius": content.radius,
+        "sizes": _sizes(result, content),
         "squares": told.squares,
         "crease_cosine": CREASE_COSINE,
-        "scales": {key: as_plain(key, scale) for key, scale in content.scales.items()},
+        "scales": {
+            key: as_plain(content.own_title if key == "own" else TITLES[key], scale)
+            for key, scale in content.scales.items()
+        },
+        "own": None if content.own is None else "faces" if content.own_by_face else "vertices",
         "picture": None if picture is None else picture.kind,
         "show": show,
         "arrays": listed,
     }
     return head, block
+
+
+def _sizes(result: Flattening, content: Content) -> dict[str, float]:
+    """Return the area of a model and the lengths of its seams and its boundary, in radii of the ball it is shown in."""
+    area = (
+        double_areas(edge_lengths((result.vertices - content.centre) / content.radius, result.faces)).sum()
+        / 2
+    )
+    ends = [content.point_vertex[content.faces.reshape(-1)[end]] for end in end_corners(content.outline)]
+    lengths = np.linalg.norm(content.places[ends[1]] - content.places[ends[0]], axis=1)
+    seams = slice(0, 2 * content.seams, 2)  # each has two sides
+    return {
+        "area": float(area),
+        "seams": float(lengths[seams].sum()),
+        "boundary": float(lengths[2 * content.seams :].sum()),
+    }
 
 
 def _arrays(content: Content) -> dict[str, NDArray[Any]]:
@@ -132,6 +156,8 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
     }
     if not np.array_equal(content.vertex_numbers, np.arange(len(content.places))):
         arrays["vertex_numbers"] = content.vertex_numbers.astype(np.int32)
+    if content.own is not None:
+        arrays["own"] = content.own.astype(np.float32)
     if content.left_out:
         arrays["face_numbers"] = content.face_numbers.astype(np.uint32)
     return arrays

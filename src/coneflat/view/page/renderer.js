@@ -62,6 +62,14 @@ class Renderer {
       {array: cornerNormals(model, places), size: 4, type: gl.INT_2_10_10_10_REV, normalised: true},
       {array: new Float32Array(3 * model.triangleCount), size: 1},
     ]);
+    if (this.look.marks?.length !== 12 * model.triangleCount) this.look.marks = null;
+    this.setMarks(this.look.marks);
+  }
+
+  /** Lay marks over the surface: at each corner four bytes, of which three say how much of what; null for none. */
+  setMarks(marks) {
+    this.look.marks = marks;
+    if (marks) this.surface.put(4, {array: marks, size: 4, type: this.gl.UNSIGNED_BYTE, normalised: true});
   }
 
   prepareLayout() {
@@ -169,6 +177,8 @@ class Renderer {
       edges: state.get("edges") ? 0.9 : 0,
       outward: this.model.head.outward,
       contrast: scale ? MAP_CONTRAST : 1,
+      marked: this.look.marks ? (state.get("marked") ?? 1) : 0,
+      hatch: pixel,
     });
     this.surface.draw();
     gl.enable(gl.BLEND);

@@ -31,6 +31,7 @@ layout(location = 0) in vec3 place;
 layout(location = 1) in vec2 uv;
 layout(location = 2) in vec4 normal;
 layout(location = 3) in float value;
+layout(location = 4) in vec4 marks;
 uniform bool inPlane;
 uniform vec3 plane;  // the middle of the layout, and its unit
 ${VIEW_UNIFORMS}
@@ -39,6 +40,7 @@ flat out uint id;
 #else
 out vec3 facing;
 out vec3 corner;
+out vec3 mark;
 out vec2 at;
 out float tone;
 #endif
@@ -52,6 +54,7 @@ void main() {
   facing = turn * normal.xyz;
   at = uv;
   tone = value;
+  mark = marks.rgb;
 #endif
 }
 `;
@@ -63,6 +66,7 @@ void main() { write(); }
 #else
 in vec3 facing;
 in vec3 corner;
+in vec3 mark;
 in vec2 at;
 in float tone;
 out vec4 colour;
@@ -70,7 +74,8 @@ uniform bool inPlane;
 uniform bool board, pictured, tinted;
 uniform sampler2D table, picture;
 uniform vec3 paint, dark, undefinedPaint;
-uniform float cell, edges, outward, contrast;
+uniform float cell, edges, outward, contrast, marked;
+uniform float hatch;  // pixels of the target per pixel
 
 const vec3 KEY_LIGHT = vec3(-0.4478, 0.6469, 0.6170);  // over the left shoulder, as in drawings
 
@@ -91,6 +96,18 @@ float edgeShare() {
   return edges * (1.0 - crowded) * (1.0 - min(off.x, min(off.y, off.z)));
 }
 
+// Marks differ in colour and, for those who see few colours, in pattern: lines that rise, lines that fall, even colour.
+vec3 withMarks(vec3 base) {
+  vec3 width = max(fwidth(mark), vec3(1e-4));
+  vec3 on = smoothstep(0.5 - width, 0.5 + width, mark) * marked;
+  vec2 p = gl_FragCoord.xy / hatch;
+  vec2 line = abs(fract(vec2(p.x - p.y, p.x + p.y) / 11.0) - 0.5) * 11.0;
+  vec2 hatched = 0.22 + 0.7 * (1.0 - smoothstep(1.0, 2.0, line));
+  base = mix(base, vec3(0.73, 0.36, 0.62), on.b * (0.3 + 0.5 * clamp(2.0 * mark.b - 1.0, 0.0, 1.0)));
+  base = mix(base, vec3(0.90, 0.56, 0.0), on.r * hatched.x);
+  return mix(base, vec3(0.0, 0.40, 0.72), on.g * hatched.y);
+}
+
 void main() {
   vec3 base = paint;
   if (tinted) base = tone < 0.0 ? undefinedPaint : texture(table, vec2(tone, 0.5)).rgb;
@@ -99,6 +116,7 @@ void main() {
     base = mix(base, texel.rgb, texel.a);
   }
   if (board) base *= mix(dark, vec3(1.0), lightShare());
+  if (marked > 0.0) base = withMarks(base);
   if (edges > 0.0) base *= 1.0 - 0.65 * edgeShare();
   if (!inPlane) {
     vec3 n = normalize(gl_FrontFacing ? facing : -facing);

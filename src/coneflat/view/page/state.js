@@ -10,7 +10,14 @@ const SHOWS = [
   ["curvature", "Curvature before"],
   ["flat", "Curvature after"],
   ["plain", "Plain"],
+  ["own", "Own values"],
 ];
+
+/** What of these a model has: values of the user's own by their name. */
+function showsOf(model) {
+  const own = model.head.scales.own;
+  return SHOWS.filter(([key]) => key !== "own" || own).map(([key, name]) => [key, key === "own" ? own.title : name]);
+}
 
 /** Named values; listeners hear which of them changed. */
 class State {

@@ -19,11 +19,13 @@ from ...errors import OptionError
 from ...files.atomic import as_path, atomic_write, check_target, known_ending
 from ...files.texture import read_picture
 from ...text import shown
+from ..own import own_quantity
 from .content import content_of
 from .payload import Told, payload_of
 
 if TYPE_CHECKING:
     from ...result.flattening import Flattening
+    from ..quantity import Quantity
 
 SHOWS = ("checker", "picture", "charts", "qc", "area", "curvature", "flat", "plain")
 """What a page can show first."""
@@ -55,6 +57,7 @@ def page_of(
     show: str | None = None,
     most_triangles: int = MOST_TRIANGLES,
     told: Told | None = None,
+    color: Quantity | str | None = None,
 ) -> str:
     """Return the page as text.
 
@@ -65,6 +68,7 @@ def page_of(
         up: the model's upward axis in the first view, "x", "y" or "z".
         show: what the colours show first: "checker", "picture", "charts", "qc", "area", "curvature" (of the model),
             "flat" (the curvature left) or "plain"; by default the picture, if there is one, or the checkerboard.
+        color: numbers of the user's own, or their name, see `own_quantity`; they are shown first then, or as "own".
         most_triangles: a mesh with more is thinned for display.
         told: what it says; by default the key numbers and the report.
 
@@ -75,13 +79,14 @@ def page_of(
         MeshFileError: the texture cannot be read.
     """
     if show is None:
-        show = "checker" if texture is None else "picture"
-    if show not in SHOWS:
+        show = "own" if color is not None else "checker" if texture is None else "picture"
+    if show not in SHOWS and (show != "own" or color is None):
         raise OptionError(f"unknown show {show!r}: choose from {', '.join(SHOWS)}")
     picture = None if texture is None else read_picture(texture)
     if isinstance(most_triangles, bool) or not isinstance(most_triangles, (int, np.integer)):
         raise OptionError(f"most_triangles must be a whole number, not {shown(most_triangles)}")
-    content = content_of(result, most_triangles)
+    own = own_quantity(result, color) if isinstance(color, str) else color
+    content = content_of(result, most_triangles, own=own)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
     payload = payload_of(result, content, picture, name, up, show, told)

@@ -1,5 +1,8 @@
 // Shortest paths along the edges of a surface.
 
+// As in `seams/costs.py`: radians of bending from which on an edge is sharp at all, and fully; and what it costs then.
+const [SMOOTH, SHARP, CHEAPEST] = [Math.PI / 9, Math.PI / 3, 0.1];
+
 class EdgeGraph {
   constructor(model) {
     this.model = model;
@@ -16,6 +19,18 @@ class EdgeGraph {
     }
     [this.start, this.ends] = [start, ends];
     this.from = -1;
+    this.sharpness = null;
+  }
+
+  /** Whether paths follow sharp edges, which then cost less than their lengths. */
+  follow(sharp) {
+    this.sharpness = sharp ? (this.found ??= sharpEdges(this.model)) : null;
+    this.from = -1;
+  }
+
+  cost(one, two) {
+    const share = this.sharpness?.get(one < two ? one * this.start.length + two : two * this.start.length + one) ?? 0;
+    return this.length(one, two) * CHEAPEST ** share;
   }
 
   length(one, two) {
@@ -45,7 +60,7 @@ class EdgeGraph {
       const [far, vertex] = heap.pop();
       if (far > this.far[vertex]) continue;
       for (let k = this.start[vertex]; k < this.start[vertex + 1]; k++) {
-        const other = this.ends[k], sum = far + this.length(vertex, other);
+        const other = this.ends[k], sum = far + this.cost(vertex, other);
         if (sum >= this.far[other]) continue;
         this.far[other] = sum;
         this.before[other] = vertex;
@@ -53,6 +68,25 @@ class EdgeGraph {
       }
     }
   }
+}
+
+/** How sharp edges are, 0 to 1, of those that are: by the smaller vertex times their number plus one, plus the other. */
+function sharpEdges(model) {
+  const {faces, places} = model.arrays, base = places.length / 3 + 1;
+  const normals = faceNormals(cornerPlaces(model)), sides = new Map(), found = new Map();
+  for (let c = 0; c < faces.length; c++) {
+    const face = Math.floor(c / 3), one = model.vertexAt(c), two = model.vertexAt(3 * face + ((c + 1) % 3));
+    const key = one < two ? one * base + two : two * base + one, other = sides.get(key);
+    if (other === undefined) {
+      sides.set(key, face);
+      continue;
+    }
+    const [a, b] = [face, other].map((f) => normals.subarray(3 * f, 3 * f + 3));
+    const cosine = (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) / (Math.hypot(...a) * Math.hypot(...b) || 1);
+    const share = (Math.acos(Math.min(Math.max(cosine, -1), 1)) - SMOOTH) / (SHARP - SMOOTH);
+    if (share > 0) found.set(key, Math.min(share, 1));
+  }
+  return found;
 }
 
 /** A binary heap, the least key first. */

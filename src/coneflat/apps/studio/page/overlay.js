@@ -16,6 +16,8 @@ class Overlay {
       this.path(pen, pane, tools.preview, PATH_COLOURS[tools.mode], []);
       if (tools.from !== null) this.ring(pen, pane, tools.from, PATH_COLOURS[tools.mode], 6);
     }
+    this.studio.brush.draw(pen, pane);
+    for (const vertex of this.studio.verticesOf(this.studio.cornersShown())) this.diamond(pen, pane, vertex);
     for (const cone of choices.cones) {
       const [vertex] = this.studio.verticesOf([cone.vertex]);
       if (vertex === undefined) continue;
@@ -46,6 +48,15 @@ class Overlay {
       const path = new Path2D();
       path.arc(x, y, radius, 0, 2 * Math.PI);
       this.stroke(pen, path, colour, 2.5);
+    }
+  }
+
+  diamond(pen, pane, vertex) {
+    for (const [x, y] of this.places(pane, vertex)) {
+      const path = new Path2D(`M${x - 9} ${y}L${x} ${y - 9}L${x + 9} ${y}L${x} ${y + 9}Z`);
+      pen.fillStyle = "#ffffff";
+      pen.fill(path);
+      this.stroke(pen, path, "#6a3fb5", 2.5);
     }
   }
 

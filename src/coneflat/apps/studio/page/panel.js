@@ -7,6 +7,7 @@ class Panel {
     this.studio = studio;
     this.part = (id) => document.getElementById(id);
     this.snap = 0;
+    this.curve = new ConeCurve(studio);
     this.fill();
     this.connect();
   }
@@ -15,9 +16,15 @@ class Panel {
     this.part("tools").append(
       ...TOOLS.map(([key, name, letter]) => button(name, `${name} (${letter})`, () => this.studio.setTool(key), {className: "toggle", id: `tool-${key}`})),
     );
+    this.part("brushes").append(
+      ...BRUSHES.map(([key, name, letter]) => button(name, `${name} (${letter})`, () => this.studio.setTool(key), {className: `toggle brush ${key}`, id: `tool-${key}`})),
+    );
     this.part("exports").append(
       ...["obj", "ply", "glb", "npz", "svg"].map((ending) => button(ending.toUpperCase(), `Save as .${ending}`, () => this.studio.save(ending), {id: `save-${ending}`})),
+      button("Picture", "Save the layout as a picture, .png", () => this.studio.save("png"), {id: "save-png"}),
+      button("Report", "Save the report, .json", () => this.studio.save("json"), {id: "save-json"}),
     );
+    for (const id of ["unit", "shown-in"]) this.part(id).replaceChildren(...UNITS.map(([key, name]) => new Option(key || id === "unit" ? name : "the same", key)));
   }
 
   connect() {
@@ -34,7 +41,17 @@ class Panel {
     this.slider("distortion", (value) => ({do: "set", name: "distortion", value: Number((10 ** value).toPrecision(3))}));
     this.slider("stretch", (value) => ({do: "set", name: "stretch", value}));
     this.slider("hide", (value) => ({do: "set", name: "hide_seams", value}));
-    for (const name of ["boundary", "charts"]) this.part(name).addEventListener("change", (event) => set(name, event.target.value));
+    this.slider("creases", (value) => ({do: "set", name: "creases", value}));
+    for (const name of ["boundary", "charts", "symmetric"]) this.part(name).addEventListener("change", (event) => set(name, event.target.value));
+    this.part("boundary").addEventListener("change", (event) => event.target.value === "rectangle" && studio.setTool("corner"));
+    for (const name of ["resolution", "padding"]) this.part(name).addEventListener("change", (event) => set(name, Number(event.target.value)));
+    this.part("mirrored").addEventListener("change", (event) => set("mirrored", event.target.checked ? "overlap" : "apart"));
+    this.part("own-seams").addEventListener("change", (event) => set("seams", event.target.checked ? "input" : null));
+    this.part("follow").addEventListener("change", (event) => studio.setFollowing(event.target.checked));
+    this.part("save-quads").addEventListener("click", () => studio.saveQuads(this.part("quad-count").value));
+    this.part("brush-size").addEventListener("input", (event) => studio.growBrush(Number(event.target.value) / studio.brush.radius));
+    this.part("brush-weight").addEventListener("change", (event) => (studio.brush.weight = Number(event.target.value)));
+    for (const id of ["unit", "shown-in"]) this.part(id).addEventListener("change", () => this.measureIn(id));
     this.part("sharp").addEventListener("change", (event) => {
       set("sharp_angle", event.target.value ? (Number(event.target.value) * Math.PI) / 180 : null);
     });
@@ -55,6 +72,11 @@ class Panel {
     };
     this.part(id).addEventListener("input", (event) => send(event, false));
     this.part(id).addEventListener("change", (event) => send(event, true));
+  }
+
+  measureIn(changed) {
+    const of_file = this.part("unit").value, shown = of_file ? this.part("shown-in").value : "";
+    this.studio.act({do: "units", of_file, shown});
   }
 
   placeBy(kind) {
@@ -79,7 +101,7 @@ class Panel {
     const {news, choices, tools} = this.studio, {options} = choices;
     this.part("undo").disabled = !news?.undo;
     this.part("redo").disabled = !news?.redo;
-    for (const [key, , , hint] of TOOLS) {
+    for (const [key, , , hint] of [...TOOLS, ...BRUSHES]) {
       this.part(`tool-${key}`).setAttribute("aria-pressed", String(tools.mode === key));
       if (tools.mode === key) this.part("hint").textContent = hint;
     }
@@ -93,18 +115,32 @@ class Panel {
     this.value("sharp", options.sharp_angle == null ? "" : Number(((options.sharp_angle * 180) / Math.PI).toFixed(2)));
     this.value("hide", options.hide_seams ?? 0);
     this.part("hide-value").textContent = options.hide_seams ?? 0;
+    this.value("creases", options.creases ?? 0);
+    this.part("creases-value").textContent = options.creases ?? 0;
+    this.part("own-seams").checked = options.seams === "input";
     this.value("boundary", options.boundary ?? "free");
-    this.part("boundary").closest("label").hidden = !this.studio.hasBoundary();
+    this.part("boundary").closest("label").hidden = this.part("tool-corner").hidden = !this.studio.hasBoundary();
+    this.value("symmetric", options.symmetric ?? "off");
+    this.part("mirrored").checked = options.mirrored === "overlap";
+    this.part("mirrored").closest("label").hidden = (options.symmetric ?? "off") === "off";
+    this.value("resolution", options.resolution ?? 1024);
+    this.value("padding", options.padding ?? 2);
     this.value("stretch", options.stretch ?? 0);
     this.value("charts", options.charts ?? "atlas");
     for (const saving of this.part("exports").children) saving.disabled = !this.studio.viewer;
+    this.part("save-quads").disabled = !this.studio.viewer || this.studio.making === "quads";
+    this.part("save-quads").textContent = this.studio.making === "quads" ? "Making quads…" : "Quads, OBJ";
+    this.curve.show();
     this.part("command").textContent = news?.command ?? "";
     this.part("python").textContent = news?.python ?? "";
     this.part("kept-in").textContent = news?.project ? `Kept in ${news.project}.` : "";
     this.showWork();
     this.showRefusal();
+    this.showTool();
+    this.showCorners();
     this.showCones();
     this.showPaths();
+    showSizes(this.studio);
   }
 
   /** Show a value, unless the user is just changing it. */
@@ -127,6 +163,29 @@ class Panel {
     this.part("refusal-text").textContent = trouble.text[0].toUpperCase() + trouble.text.slice(1) + ".";
     this.part("repair").hidden = !trouble.repair;
     this.part("again").hidden = Boolean(trouble.repair) || Boolean(this.studio.refused);
+  }
+
+  /** Show what the tool can be set to. */
+  showTool() {
+    const {tools, brush, paint} = this.studio;
+    this.part("brush-size").closest("label").hidden = !tools.paints;
+    this.part("brush-weight").closest("label").hidden = tools.mode !== "importance";
+    this.part("follow").closest("label").hidden = !tools.draws;
+    this.part("follow").checked = this.studio.follows;
+    this.part("brush-size").value = brush.radius;
+    this.part("brush-weight").value = brush.weight;
+    this.part("brush-size-value").textContent = brush.radius;
+    for (const [layer] of BRUSHES.slice(0, -1)) {
+      const count = paint.count(layer);
+      this.part(`tool-${layer}`).title = count ? `${grouped(count)} vertices are painted` : "";
+      this.part(`tool-${layer}`).dataset.painted = String(count > 0);
+    }
+  }
+
+  showCorners() {
+    const {choices} = this.studio, {boundary} = choices.options, left = 4 - (choices.corners ?? []).length;
+    this.part("corners-left").hidden = boundary !== "rectangle" || !left;
+    this.part("corners-left").textContent = `Click ${left === 4 ? "its four corners" : left === 1 ? "one more corner" : `${left} more corners`} with the tool Corner.`;
   }
 
   showCones() {

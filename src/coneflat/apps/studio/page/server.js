@@ -33,10 +33,16 @@ class Server {
     return sent;
   }
 
-  /** Hand the result to the browser as a file. */
-  async save(ending, name) {
+  /** Return how distortion falls with more cones: {counts, distortions, knee}. */
+  async curve() {
     await this.queue;
-    const content = await (await this.ask(`/export/${ending}`, {method: "POST"})).blob();
+    return (await this.ask("/curve", {method: "POST"})).json();
+  }
+
+  /** Hand what is at a path, the result or quads, to the browser as a file. */
+  async save(path, name) {
+    await this.queue;
+    const content = await (await this.ask(path, {method: "POST"})).blob();
     const link = Object.assign(document.createElement("a"), {href: URL.createObjectURL(content), download: name});
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 60_000);

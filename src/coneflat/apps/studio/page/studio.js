@@ -1,8 +1,10 @@
 // The studio at work: hears from the server what is so, and shows it.
 
 const DISTORTION = 0.2; // where none is chosen, as in `coneflat.flatten`
+const FAINT = 0.45; // how strongly paint is shown while nobody paints
 const RETRY = 1500; // milliseconds before the server is asked again that did not answer
-const NOTHING = {options: {}, by_hand: false, cones: [], cuts: [], kept: []};
+const NOTHING = {options: {}, by_hand: false, cones: [], cuts: [], kept: []}; // and perhaps paint, corners, units
+const STEP = 1.25; // by which a key makes the brush larger
 
 class Studio {
   constructor() {
@@ -13,6 +15,10 @@ class Studio {
     this.took = this.sight = 0; // milliseconds from the last change to its picture, and to the first view of it
     this.selected = null; // the vertex of the cone that is picked, whatever number it has
     this.tools = new Tools(this);
+    this.paint = new Paint(this);
+    this.brush = new Brush(this);
+    this.making = ""; // what is made beside layouts
+    this.follows = true; // Paths follow sharp edges.
     this.overlay = new Overlay(this);
     this.panel = new Panel(this);
     document.addEventListener("keydown", (event) => this.key(event), {capture: true});
@@ -49,6 +55,7 @@ class Studio {
       this.take(await this.server.layout(this.viewer?.model));
       this.layout = this.news.layout;
     }
+    this.paint.hear();
     this.panel.show();
     this.viewer?.remark();
     if (!this.news.busy) document.documentElement.dataset.ready ??= String(Math.round(performance.now()));
@@ -58,13 +65,14 @@ class Studio {
   /** Show a layout. */
   take(model) {
     const isSame = this.viewer && model.hasSurfaceOf(this.viewer.model);
-    if (!isSame) this.edges = this.byNumber = null;
+    if (!isSame) this.edges = this.byNumber = this.boundary = null;
     this.points = null;
     this.repicking = true; // A pick that ends because things have other numbers now is no letting go.
     if (this.viewer) this.viewer.takeModel(model);
     else {
       this.viewer = window.coneflat = new Viewer(model, null);
       this.viewer.tool = this.tools;
+      this.viewer.state.set({marked: FAINT});
       this.viewer.marks.overlay = (pen, pane) => this.overlay.draw(pen, pane);
       this.viewer.state.listen((names) => names.has("picked") && this.notePick());
     }
@@ -103,6 +111,7 @@ class Studio {
 
   refuse(error) {
     this.refused = {text: error instanceof Refusal ? error.message : "the studio does not answer"};
+    this.paint.forget();
     this.panel.show();
   }
 
@@ -110,9 +119,27 @@ class Studio {
     return this.pending > 0 || Boolean(this.news?.busy);
   }
 
+  get stem() {
+    return this.news.mesh.replace(/\.[^.]*$/, "");
+  }
+
   async save(ending) {
-    const stem = this.news.mesh.replace(/\.[^.]*$/, "");
-    await this.server.save(ending, `${stem}_uv.${ending}`).catch((error) => this.refuse(error));
+    const name = {json: "report", png: "layout"}[ending] ?? "uv";
+    await this.server.save(`/export/${ending}`, `${this.stem}_${name}.${ending}`).catch((error) => this.refuse(error));
+  }
+
+  /** Make quads of the mesh, about so many, and hand them to the browser. */
+  async saveQuads(count) {
+    this.refused = null;
+    this.making = "quads";
+    this.panel.show();
+    await this.server.save(`/quads/obj?count=${encodeURIComponent(count)}`, `${this.stem}_quads.obj`).catch((error) => this.refuse(error));
+    this.making = "";
+    this.panel.show();
+  }
+
+  setCount(count) {
+    this.act({do: "set", name: "cone_count", value: count});
   }
 
   async open(file) {
@@ -129,11 +156,12 @@ class Studio {
   }
 
   setTool(mode) {
-    if (["cut", "keep"].includes(mode) && this.viewer?.model.head.left_out) {
-      this.refuse(new Refusal("on a mesh that is thinned for display there are no edges to draw along"));
+    if (!["look", "cone"].includes(mode) && this.viewer?.model.head.left_out) {
+      this.refuse(new Refusal("a mesh that is thinned for display has too few vertices here to draw or paint on"));
       return;
     }
     this.tools.set(mode);
+    this.viewer?.state.set({marked: this.tools.paints ? 1 : FAINT});
     this.panel.show();
     this.viewer?.remark();
   }
@@ -148,7 +176,7 @@ class Studio {
     const control = event.ctrlKey || event.metaKey;
     if (event.altKey || (control && !["z", "y"].includes(name))) return;
     if (control) return this.obey(event, () => this.act({do: name === "z" && !event.shiftKey ? "undo" : "redo"}));
-    const tool = TOOLS.find(([, , letter]) => letter === name);
+    const tool = [...TOOLS, ...BRUSHES].find(([, , letter]) => letter === name);
     const vertex = this.selectedNumber(), row = this.coneRows().find((one) => one.vertex === vertex);
     const turn = (step) => () => row && this.setAngle(vertex, Math.max(this.panel.step(), this.panel.snapped(row.degrees + step)));
     const keys = {
@@ -157,6 +185,9 @@ class Studio {
       g: () => this.panel.angleField(vertex)?.select(), ",": turn(-this.panel.step()), ".": turn(this.panel.step()),
       Delete: () => this.remove(vertex), Backspace: () => this.remove(vertex),
     };
+    keys.q = () => this.panel.curve.ask();
+    keys.f = () => this.setFollowing(!this.follows);
+    if (this.tools.paints) Object.assign(keys, {",": () => this.growBrush(1 / STEP), ".": () => this.growBrush(STEP)});
     if (name === "Escape") this.tools.endLine();
     const does = tool ? () => this.setTool(tool[0]) : keys[name];
     if (does) this.obey(event, does);
@@ -283,7 +314,39 @@ class Studio {
   }
 
   graph() {
-    return (this.edges ??= new EdgeGraph(this.viewer.model));
+    if (!this.edges) {
+      this.edges = new EdgeGraph(this.viewer.model);
+      this.edges.follow(this.follows);
+    }
+    return this.edges;
+  }
+
+  setFollowing(follows) {
+    this.follows = follows;
+    this.edges?.follow(follows);
+    this.panel.show();
+  }
+
+  growBrush(factor) {
+    this.brush.grow(factor);
+    this.panel.show();
+  }
+
+  /** The vertices on the boundary. */
+  boundaryVertices() {
+    if (!this.boundary) {
+      const {model} = this.viewer, ends = new Set();
+      for (let i = 2 * model.seamCount; i < model.arrays.outline.length; i++) {
+        for (const corner of model.outlineCorners(i)) ends.add(model.vertexAt(corner));
+      }
+      this.boundary = [...ends].filter((vertex) => this.numberOf(vertex) >= 0);
+    }
+    return this.boundary;
+  }
+
+  /** The corners of a rectangle, where they mean something. */
+  cornersShown() {
+    return this.tools.mode === "corner" || this.choices.options.boundary === "rectangle" ? this.choices.corners ?? [] : [];
   }
 }
 

@@ -6,7 +6,9 @@ const TOOLS = [
   ["cone", "Cone", "a", "Click puts a cone there; drag one to move it."],
   ["cut", "Cut", "x", "Click from point to point: the shortest path between them is cut. Esc ends the line."],
   ["keep", "Keep whole", "k", "Click from point to point: no seam runs along the path between them. Esc ends the line."],
+  ["corner", "Corner", "o", "Click four points of the boundary: the corners of a rectangle. A click on one takes it away."],
 ];
+const NEAR = 12; // pixels within which a click means what is there
 
 const BARE = {get: () => false}; // A state in which nothing but triangles is drawn, or picked.
 
@@ -31,6 +33,10 @@ class Tools {
     this.preview = [];
   }
 
+  get paints() {
+    return BRUSHES.some(([layer]) => layer === this.mode);
+  }
+
   get draws() {
     return this.mode === "cut" || this.mode === "keep";
   }
@@ -45,9 +51,42 @@ class Tools {
     return model.vertexAt(3 * thing.index + far.indexOf(Math.min(...far)));
   }
 
+  cornersAt(pane, x, y) {
+    const {model, renderer} = this.studio.viewer;
+    const thing = renderer.pick(pane, x, y, BARE);
+    return thing?.kind === "triangle" ? [0, 1, 2].map((k) => model.vertexAt(3 * thing.index + k)) : [];
+  }
+
+  /** The place of a pixel on the model, which is seen in parallel. */
+  placeAt(pane, x, y) {
+    const {model} = this.studio.viewer, places = this.cornersAt(pane, x, y).map((vertex) => model.place(vertex));
+    const [a, b, c] = places.map((place) => pane.camera.project(place));
+    const area = (p, q, r) => (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+    const whole = area(a, b, c), at = [x, y];
+    const shares = Math.abs(whole) > 1e-9 ? [area(at, b, c), area(a, at, c), area(a, b, at)].map((part) => part / whole) : [1 / 3, 1 / 3, 1 / 3];
+    return [0, 1, 2].map((k) => shares.reduce((sum, share, i) => sum + share * places[i][k], 0));
+  }
+
+  /** The vertex of the boundary that a click means; null where there is none. */
+  boundaryVertexAt(pane, x, y) {
+    const {studio} = this, {model} = studio.viewer, boundary = studio.boundaryVertices();
+    const off = (vertex) => Math.min(...studio.overlay.places(pane, vertex).map(([px, py]) => Math.hypot(px - x, py - y)));
+    const picked = studio.verticesOf(studio.choices.corners ?? []).find((vertex) => off(vertex) <= NEAR);
+    if (picked !== undefined) return picked;
+    const nearest = this.vertexAt(pane, x, y);
+    if (nearest === null || pane.inPlane) return leastOf(boundary, off);
+    // Seen through the model there may be others at this pixel.
+    const [px, py, pz] = model.place(nearest);
+    return leastOf(boundary, (vertex) => Math.hypot(...model.place(vertex).map((value, k) => value - [px, py, pz][k])));
+  }
+
   // What the viewer tells.
 
   hover(pane, x, y) {
+    if (this.paints) {
+      this.studio.brush.at = {pane, x, y};
+      this.studio.viewer.remark();
+    }
     if (this.from === null) return;
     const vertex = this.vertexAt(pane, x, y);
     this.preview = vertex === null ? [] : this.studio.graph().path(this.from, vertex);
@@ -59,6 +98,8 @@ class Tools {
     if (this.mode === "look" || (this.mode === "cone" && thing?.kind === "cone")) return false;
     const vertex = this.vertexAt(pane, x, y);
     if (vertex !== null && this.draws) this.drawTo(vertex);
+    if (vertex !== null && this.paints) this.studio.brush.dab(pane, x, y);
+    if (this.mode === "corner") this.corner(pane, x, y);
     if (vertex !== null && this.mode === "cone") {
       this.studio.select(vertex);
       this.studio.act({do: "add", vertex: this.studio.numberOf(vertex)});
@@ -74,13 +115,30 @@ class Tools {
     this.studio.viewer.remark();
   }
 
+  corner(pane, x, y) {
+    const vertex = this.boundaryVertexAt(pane, x, y);
+    if (vertex === null) this.studio.refuse(new Refusal("this model has no boundary to pick corners of"));
+    else this.studio.act({do: "corner", vertex: this.studio.numberOf(vertex)});
+  }
+
   grab(pane, x, y) {
     const {viewer} = this.studio;
-    if (this.draws) return null;
+    if (this.paints) return this.vertexAt(pane, x, y) === null ? null : new Stroke(this.studio.brush, pane, x, y);
+    if (this.draws || this.mode === "corner") return null;
     const thing = viewer.renderer.pick(pane, x, y, viewer.state);
     if (thing?.kind !== "cone") return null;
     return new Drag(this, pane, viewer.model.arrays.cones[thing.index]);
   }
+}
+
+/** The value for which a function is least; null of none. */
+function leastOf(values, function_) {
+  let best = null, least = Infinity;
+  for (const value of values) {
+    const now = function_(value);
+    if (now < least) [best, least] = [value, now];
+  }
+  return best;
 }
 
 /** A cone on its way along the surface. What follows from it is shown as often as it is there. */

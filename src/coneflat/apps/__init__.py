@@ -1,0 +1,1 @@
+"""What is made of the package: the command line, batches, comparisons, the studio."""

@@ -1,0 +1,126 @@
+// Distortion over the number of cones: how far it falls with more of them, and where one is.
+
+const INSETS = {left: 34, right: 8, top: 8, bottom: 20}; // pixels
+
+class ConeCurve {
+  constructor(studio) {
+    this.studio = studio;
+    this.part = (id) => document.getElementById(id);
+    this.found = null; // {counts, distortions, knee, key}
+    this.asking = false;
+    this.part("curve-ask").addEventListener("click", () => this.ask());
+    this.part("curve").addEventListener("click", (event) => this.pick(event));
+    new ResizeObserver(() => this.draw()).observe(this.part("curve"));
+  }
+
+  /** What a curve depends on: other changes leave it as it is. */
+  key() {
+    const {choices, news} = this.studio, {paint = {}, options} = choices;
+    const locked = choices.cones.filter((cone) => cone.locked).map((cone) => cone.vertex);
+    return JSON.stringify([news?.mesh, locked, paint.no_cone, paint.importance, options.repair]);
+  }
+
+  async ask() {
+    const {studio} = this, key = this.key();
+    if (this.asking || !studio.viewer) return;
+    studio.refused = null;
+    this.asking = true;
+    studio.panel.show();
+    try {
+      this.found = {...(await studio.server.curve()), key};
+    } catch (error) {
+      studio.refuse(error);
+    }
+    this.asking = false;
+    studio.panel.show();
+  }
+
+  show() {
+    const isKnown = this.found?.key === this.key() && this.found.counts.length > 1;
+    this.part("curve").hidden = !isKnown;
+    this.part("curve-ask").hidden = isKnown;
+    this.part("curve-ask").disabled = this.asking || !this.studio.viewer;
+    this.part("curve-ask").textContent = this.asking ? "Comparing numbers of cones…" : "Compare numbers of cones";
+    if (isKnown) this.draw();
+  }
+
+  /** Where a number of cones and a distortion lie, in pixels. */
+  places() {
+    const {width, height} = this.part("curve").getBoundingClientRect(), {counts, distortions} = this.found;
+    const last = counts[counts.length - 1], first = counts[0], most = Math.max(...distortions) * 1.04;
+    const across = width - INSETS.left - INSETS.right, down = height - INSETS.top - INSETS.bottom;
+    return {
+      width, height, most, first, last,
+      x: (count) => INSETS.left + (across * (count - first)) / (last - first),
+      y: (value) => INSETS.top + down * (1 - Math.min(value / most, 1)),
+    };
+  }
+
+  draw() {
+    const canvas = this.part("curve");
+    if (canvas.hidden || !this.found) return;
+    const {counts, distortions, knee} = this.found, at = this.places(), pixel = Math.min(devicePixelRatio || 1, 2);
+    if (!at.width) return;
+    sizeCanvas(canvas, at.width * pixel, at.height * pixel);
+    const pen = canvas.getContext("2d"), style = getComputedStyle(document.documentElement);
+    const colour = (name) => style.getPropertyValue(`--${name}`).trim();
+    pen.setTransform(pixel, 0, 0, pixel, 0, 0);
+    pen.clearRect(0, 0, at.width, at.height);
+    pen.font = "11px system-ui, sans-serif";
+    pen.fillStyle = colour("faint");
+    pen.strokeStyle = colour("line");
+    pen.lineWidth = 1;
+    for (const value of ticksUpTo(at.most)) {
+      pen.beginPath();
+      pen.moveTo(INSETS.left, Math.round(at.y(value)) + 0.5);
+      pen.lineTo(at.width - INSETS.right, Math.round(at.y(value)) + 0.5);
+      pen.stroke();
+      pen.textAlign = "right";
+      pen.fillText(Number(value.toPrecision(3)), INSETS.left - 5, at.y(value) + 4);
+    }
+    pen.textAlign = "left";
+    pen.fillText(at.first, at.x(at.first), at.height - 5);
+    pen.textAlign = "right";
+    pen.fillText(`${at.last} cones`, at.width - INSETS.right, at.height - 5);
+    const line = new Path2D();
+    counts.forEach((count, i) => (i ? line.lineTo(at.x(count), at.y(distortions[i])) : line.moveTo(at.x(count), at.y(distortions[i]))));
+    pen.strokeStyle = colour("pressed");
+    pen.lineWidth = 2;
+    pen.stroke(line);
+    this.dot(pen, at.x(knee), at.y(distortions[counts.indexOf(knee)]), 3.5, colour("pane"), colour("pressed"));
+    const now = this.current();
+    if (now) this.dot(pen, at.x(now[0]), at.y(now[1]), 4.5, colour("accent"), colour("accent"));
+    const told = now ? `; now ${now[0]} with ${now[1].toPrecision(2)}` : "";
+    const label = `Distortion from ${distortions[0].toPrecision(2)} with ${at.first} cones to ${distortions[distortions.length - 1].toPrecision(2)} with ${at.last}; most is gained up to ${knee}${told}`;
+    canvas.setAttribute("aria-label", label);
+    canvas.title = `${label}. Click to choose a number.`;
+  }
+
+  dot(pen, x, y, radius, fill, line) {
+    pen.beginPath();
+    pen.arc(x, y, radius, 0, 2 * Math.PI);
+    pen.fillStyle = fill;
+    pen.strokeStyle = line;
+    pen.fill();
+    pen.stroke();
+  }
+
+  /** The number of cones that there are and the distortion of so many; null where that is off the curve. */
+  current() {
+    if (this.studio.choices.by_hand) return null; // Those that were moved have another distortion.
+    const {counts, distortions} = this.found, count = this.studio.coneRows().length, at = counts.findLastIndex((one) => one <= count);
+    return at < 0 || count > counts[counts.length - 1] ? null : [count, distortions[at]];
+  }
+
+  pick(event) {
+    const at = this.places(), {counts} = this.found, x = event.clientX - this.part("curve").getBoundingClientRect().left;
+    this.studio.setCount(leastOf(counts, (count) => Math.abs(at.x(count) - x)));
+  }
+}
+
+/** Round numbers from 0 to a largest one, three to five of them. */
+function ticksUpTo(most) {
+  const rough = most / 4, power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 2.5, 5, 10].find((factor) => factor * power >= rough) * power;
+  return Array.from({length: Math.floor(most / step) + 1}, (_, k) => k * step);
+}

@@ -1,0 +1,206 @@
+// What is painted on the surface, and the brush that paints.
+
+// [layer, name, letter, hint]
+const BRUSHES = [
+  ["no_cone", "No cones", "p", "Paint where searches are to put no cone."],
+  ["no_seam", "No seams", "b", "Paint where no seam is to run."],
+  ["importance", "Important", "i", "Paint what is to be distorted less than the rest."],
+  ["erase", "Erase", "e", "Wipe off what is painted."],
+];
+const RADII = {least: 4, most: 150}; // pixels
+const SAMPLES_A_RADIUS = 2; // of a stroke
+const MOST_WEIGHT = 1000; // from which on an importance has its full colour
+
+/** Numbers in few words: "3-17 20". */
+function regionText(numbers) {
+  const sorted = Float64Array.from(numbers).sort(), words = [];
+  for (let i = 0, j; i < sorted.length; i = j) {
+    for (j = i + 1; j < sorted.length && sorted[j] <= sorted[j - 1] + 1; ) j++;
+    words.push(sorted[j - 1] === sorted[i] ? `${sorted[i]}` : `${sorted[i]}-${sorted[j - 1]}`);
+  }
+  return words.join(" ");
+}
+
+/** The numbers that such words mean. */
+function* regionNumbers(text) {
+  for (const word of text.split(" ").filter(Boolean)) {
+    const [first, last = first] = word.split("-").map(Number);
+    for (let number = first; number <= last; number++) yield number;
+  }
+}
+
+/** What is painted, as the graphics card takes it. */
+class Paint {
+  constructor(studio) {
+    this.studio = studio;
+    this.shown = this.preview = null; // {layer, weight, vertices}: of the stroke that is not yet chosen
+  }
+
+  /** Show what is chosen, where that has changed, and a stroke. */
+  show() {
+    const {viewer, choices} = this.studio;
+    if (!viewer) return;
+    const key = JSON.stringify(choices.paint ?? {});
+    if (this.shown?.model === viewer.model && this.shown.key === key && this.shown.preview === this.preview?.vertices.size) return;
+    this.shown = {model: viewer.model, key, preview: this.preview?.vertices.size};
+    viewer.renderer.setMarks(this.isBare() ? null : this.marks());
+    viewer.redraw();
+  }
+
+  /** What is chosen may have changed. */
+  hear() {
+    if (this.preview?.sent) this.preview = null;
+    this.show();
+  }
+
+  /** Show no more than what is chosen. */
+  forget() {
+    this.preview = null;
+    this.show();
+  }
+
+  isBare() {
+    return !Object.keys(this.studio.choices.paint ?? {}).length && !this.preview;
+  }
+
+  marks() {
+    const {viewer, choices} = this.studio, {arrays} = viewer.model, paint = choices.paint ?? {};
+    const looks = new Uint8Array(arrays.places.length);
+    const set = (vertices, layer, weight) => {
+      const [channel, value] = {no_cone: [0, 255], no_seam: [1, 255], importance: [2, toneOf(weight)]}[layer] ?? [];
+      for (const vertex of vertices) {
+        if (layer === "erase") looks.fill(0, 3 * vertex, 3 * vertex + 3);
+        else looks[3 * vertex + channel] = value;
+      }
+    };
+    const chosen = (text) => this.studio.verticesOf([...regionNumbers(text)]);
+    for (const flag of ["no_cone", "no_seam"]) if (paint[flag]) set(chosen(paint[flag]), flag);
+    for (const [weight, text] of Object.entries(paint.importance ?? {})) set(chosen(text), "importance", Number(weight));
+    if (this.preview) set(this.preview.vertices, this.preview.layer, this.preview.weight);
+    const out = new Uint8Array(4 * arrays.faces.length);
+    for (let c = 0; c < arrays.faces.length; c++) {
+      const vertex = 3 * arrays.point_vertex[arrays.faces[c]];
+      for (let k = 0; k < 3; k++) out[4 * c + k] = looks[vertex + k];
+    }
+    return out;
+  }
+
+  /** How many vertices are painted with a layer. */
+  count(layer) {
+    const paint = this.studio.choices.paint ?? {};
+    const texts = layer === "importance" ? Object.values(paint.importance ?? {}) : [paint[layer] ?? ""];
+    let sum = 0;
+    for (const word of texts.join(" ").split(" ").filter(Boolean)) {
+      const [first, last = first] = word.split("-").map(Number);
+      sum += last - first + 1;
+    }
+    return sum;
+  }
+}
+
+/** The tone of an importance, a byte: more than half, so that its place is seen. */
+function toneOf(weight) {
+  return weight === 1 ? 0 : Math.round(255 * (0.6 + 0.4 * Math.min(Math.max(Math.log(weight) / Math.log(MOST_WEIGHT), 0), 1)));
+}
+
+class Brush {
+  constructor(studio) {
+    this.studio = studio;
+    this.radius = 28; // pixels
+    this.weight = 10;
+    this.at = null; // {pane, x, y}: where it is
+  }
+
+  grow(factor) {
+    this.radius = Math.min(Math.max(Math.round(this.radius * factor), RADII.least), RADII.most);
+    this.studio.viewer?.remark();
+  }
+
+  /** The vertices under the brush: those that hang together with what is in its middle, or those in the plane. */
+  verticesAt(pane, x, y) {
+    const {tools, viewer} = this.studio, {model} = viewer;
+    const nearest = tools.vertexAt(pane, x, y);
+    if (nearest === null) return [];
+    const far = this.radius / pane.camera.scale;
+    const found = pane.inPlane ? this.inPlane(pane, x, y, far) : this.around(tools.placeAt(pane, x, y), tools.cornersAt(pane, x, y), far);
+    found.add(nearest);
+    return [...found].filter((vertex) => model.vertexNumber(vertex) >= 0);
+  }
+
+  inPlane(pane, x, y, far) {
+    const {camera} = pane, {model} = this.studio.viewer, {point_vertex} = model.arrays, found = new Set();
+    const middle = [camera.pan[0] + (x - pane.width / 2) / camera.scale, camera.pan[1] - (y - pane.height / 2) / camera.scale];
+    for (let point = 0; point < point_vertex.length; point++) {
+      const [u, v] = model.flatPlace(point);
+      if (Math.hypot(u - middle[0], v - middle[1]) <= far) found.add(point_vertex[point]);
+    }
+    return found;
+  }
+
+  around(middle, corners, far) {
+    const graph = this.studio.graph(), {places} = this.studio.viewer.model.arrays;
+    const isNear = (v) => Math.hypot(places[3 * v] - middle[0], places[3 * v + 1] - middle[1], places[3 * v + 2] - middle[2]) <= far;
+    const found = new Set(corners.filter(isNear)), waiting = [...found];
+    while (waiting.length) {
+      const vertex = waiting.pop();
+      for (let k = graph.start[vertex]; k < graph.start[vertex + 1]; k++) {
+        const other = graph.ends[k];
+        if (found.has(other) || !isNear(other)) continue;
+        found.add(other);
+        waiting.push(other);
+      }
+    }
+    return found;
+  }
+
+  /** Paint once, with a click. */
+  dab(pane, x, y) {
+    const stroke = new Stroke(this, pane, x, y);
+    stroke.drop();
+    stroke.stop();
+  }
+
+  draw(pen, pane) {
+    if (!this.studio.tools.paints || this.at?.pane !== pane) return;
+    const path = new Path2D();
+    path.arc(this.at.x, this.at.y, this.radius, 0, 2 * Math.PI);
+    this.studio.overlay.stroke(pen, path, "#20262c", 1.6);
+  }
+}
+
+/** A stroke of the brush: seen at once, and chosen when it ends. */
+class Stroke {
+  constructor(brush, pane, x, y) {
+    Object.assign(this, {brush, pane, studio: brush.studio, layer: brush.studio.tools.mode});
+    this.vertices = new Set();
+    this.last = [x, y];
+    this.add(x, y);
+  }
+
+  add(x, y) {
+    for (const vertex of this.brush.verticesAt(this.pane, x, y)) this.vertices.add(vertex);
+    this.brush.at = {pane: this.pane, x, y};
+    this.studio.paint.preview = {layer: this.layer, weight: this.brush.weight, vertices: this.vertices};
+    this.studio.paint.show();
+    this.studio.viewer.remark();
+  }
+
+  move(x, y) {
+    const [a, b] = this.last, steps = Math.ceil((SAMPLES_A_RADIUS * Math.hypot(x - a, y - b)) / this.brush.radius) || 1;
+    for (let k = 1; k <= steps; k++) this.add(a + ((x - a) * k) / steps, b + ((y - b) * k) / steps);
+    this.last = [x, y];
+  }
+
+  drop() {
+    const {studio, brush, layer} = this;
+    const where = regionText([...this.vertices].map((vertex) => studio.numberOf(vertex)));
+    if (!where) return;
+    studio.paint.preview.sent = true;
+    studio.act({do: "paint", layer, where, ...(layer === "importance" ? {weight: brush.weight} : {})});
+  }
+
+  stop() {
+    if (!matchMedia("(hover: hover)").matches) this.brush.at = null; // A finger that is lifted is nowhere.
+    if (!this.studio.paint.preview?.sent) this.studio.paint.forget();
+  }
+}
