@@ -8,7 +8,7 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray, dots
 from ..flat import LaidOut
-from ..geometry.overlap import find_overlaps
+from ..geometry.overlap import overlaps_of_mesh
 from ..geometry.planar import signed_double_areas
 from ..input.components import Component, seam_costs
 from ..input.symmetry import Symmetry
@@ -54,8 +54,9 @@ def injective_charts(
         symmetry: of mesh and layout; charts are split alike on both sides then, if that takes few more of them.
     """
     whole = Layout(points, corners, np.zeros(len(corners), dtype=np.int64))
-    areas = signed_double_areas(points[corners])
-    pairs = find_overlaps(points, corners).pairs
+    places = points[corners]
+    areas = signed_double_areas(places)
+    pairs = overlaps_of_mesh(mesh.edge_halfedges, places).pairs
     # What an inverted triangle covers is not to be had apart from its neighbours.
     pairs = pairs[(areas[pairs] > 0).all(axis=1)]
     if not len(pairs):

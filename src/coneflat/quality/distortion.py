@@ -14,7 +14,7 @@ from ..compiled import compiled
 from ..errors import ArrayShapeError
 from ..geometry.charts import both_sides, joined_edges, label_charts
 from ..geometry.lengths import check_lengths
-from ..geometry.overlap import Overlaps, find_overlaps
+from ..geometry.overlap import Overlaps, overlaps_of_mesh
 from ..geometry.straight import place_triangles
 from ..mesh import TriangleMesh
 from ..threads import meanwhile
@@ -118,7 +118,7 @@ def measure(
         LengthError: the lengths are no metric.
     """
     _check_shapes(mesh, corner_uv, prescribed)
-    find = partial(find_overlaps, corner_uv) if overlaps is None else lambda: overlaps
+    find = partial(overlaps_of_mesh, mesh.edge_halfedges, corner_uv) if overlaps is None else lambda: overlaps
     with meanwhile(find, len(corner_uv)) as finding:
         own = None if lengths is None else check_lengths(mesh, lengths, flat=True)
         measured = measure_map(mesh, corner_uv, curvature_error, cones, own)
