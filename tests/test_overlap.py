@@ -421,7 +421,7 @@ def test_inside_a_layout_that_covers_the_plane_once_nothing_may_overlap():
     mesh = TriangleMesh(np.stack([u, v, 0 * u], axis=1), faces)
     corners = mesh.vertices[:, :2][faces]
     upright = np.ones(len(faces), dtype=np.int64)
-    is_open = open_sides(mesh.edge_halfedges, corners, upright < 0)
+    is_open = open_sides(mesh.edge_halfedges, corners, upright - 1)
     np.testing.assert_array_equal(
         np.flatnonzero(is_open), np.sort(mesh.edge_halfedges[mesh.is_boundary_edge, 0])
     )

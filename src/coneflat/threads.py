@@ -6,7 +6,11 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import copy_context
-from typing import TypeVar
+from functools import cache
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 Result = TypeVar("Result")
 
@@ -58,8 +62,14 @@ def one_blas_thread() -> Iterator[None]:
     The dense matrices here are small: its threads gain nothing on them, and while they wait for more to do they take
     the cores from everything else, which then takes a third longer. PARDISO keeps its threads.
     """
+    with _openblas().limit(limits=1):
+        yield
+
+
+@cache
+def _openblas() -> ThreadpoolController:
+    """Return what sets the threads of OpenBLAS; to look for its libraries takes 6 ms."""
     import scipy.linalg  # noqa: F401 - comes with a library of its own, which must be there to be told
     from threadpoolctl import ThreadpoolController
 
-    with ThreadpoolController().select(internal_api="openblas").limit(limits=1):
-        yield
+    return ThreadpoolController().select(internal_api="openblas")

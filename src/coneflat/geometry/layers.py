@@ -23,16 +23,16 @@ FINENESS, MOST_CELLS = 1.5, 2048
 FEW, MOST_ROWS = 2000, 20
 
 
-def open_sides(edge_halfedges: IntArray, corners: FloatArray, is_odd: BoolArray) -> BoolArray:
+def open_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray) -> BoolArray:
     """Return (3m,) which half-edges have no other that runs back between the very same points of the plane.
 
     Args:
         edge_halfedges: (e, 2) the half-edges of each edge, see `TriangleMesh`.
         corners: (m, 3, 2) of the triangles.
-        is_odd: (m,) triangles all of whose sides are open, as are those of others beside them.
+        group: (m,) only sides of the same group, from 0 on, cancel; below, all are open.
     """
     is_open = np.ones(3 * len(corners), dtype=bool)
-    close_sides(edge_halfedges, np.ascontiguousarray(corners), is_odd, is_open)
+    close_sides(edge_halfedges, np.ascontiguousarray(corners), group, is_open)
     return is_open
 
 
@@ -51,7 +51,8 @@ def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> Int
     face, corner = sides // 3, sides % 3
     ends = np.stack([corners[face, (corner + 1) % 3], corners[face, (corner + 2) % 3]], axis=1)
     ends = np.where((signs[face] < 0)[:, None, None], ends[:, ::-1], ends)
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    flat = np.ascontiguousarray(corners).reshape(-1, 6)
+    low, high = find_extent(flat)
     count = min(int(FINENESS * math.sqrt(len(corners))), MOST_CELLS)
     extent = float((high - low).max())
     # Half a cell wider than needed, so that the last of the points is in the last cell.
@@ -62,7 +63,7 @@ def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> Int
     marks, steps = np.zeros((2, count + 1, count + 1), dtype=np.int32)
     trace_sides(ends.reshape(-1, 4), *grid, marks, steps)
     sum_cells(marks, steps)
-    return np.flatnonzero(find_suspected(np.ascontiguousarray(corners).reshape(-1, 6), signs, *grid, marks))
+    return np.flatnonzero(find_suspected(flat, signs, *grid, marks))
 
 
 class Grid(NamedTuple):
@@ -74,8 +75,8 @@ class Grid(NamedTuple):
 
 
 @compiled
-def close_sides(edge_halfedges: IntArray, corners: FloatArray, is_odd: BoolArray, is_open: BoolArray) -> None:
-    """Write False for half-edges that run back between the same points as another, in triangles that are not odd."""
+def close_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray, is_open: BoolArray) -> None:
+    """Write False for half-edges that run back between the same points as another of their group; see `open_sides`."""
     for e in range(len(edge_halfedges)):
         h, t = edge_halfedges[e]
         if t < 0:
@@ -83,13 +84,24 @@ def close_sides(edge_halfedges: IntArray, corners: FloatArray, is_odd: BoolArray
         f, g = h // 3, t // 3
         start, end, other_start, other_end = (h + 1) % 3, (h + 2) % 3, (t + 1) % 3, (t + 2) % 3
         if (
-            corners[f, start, 0] == corners[g, other_end, 0]
+            group[f] == group[g] >= 0
+            and corners[f, start, 0] == corners[g, other_end, 0]
             and corners[f, start, 1] == corners[g, other_end, 1]
             and corners[f, end, 0] == corners[g, other_start, 0]
             and corners[f, end, 1] == corners[g, other_start, 1]
-            and not (is_odd[f] or is_odd[g])
         ):
             is_open[h] = is_open[t] = False
+
+
+@compiled
+def find_extent(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (2,) the least and the largest coordinates of triangles (m, 6)."""
+    low, high = corners[0, :2].copy(), corners[0, :2].copy()
+    for t in range(len(corners)):
+        for i in range(6):
+            low[i % 2] = min(low[i % 2], corners[t, i])
+            high[i % 2] = max(high[i % 2], corners[t, i])
+    return low, high
 
 
 @compiled

@@ -83,7 +83,8 @@ def overlaps_of_mesh(edge_halfedges: IntArray, corners: FloatArray) -> Overlaps:
     """
     corners, exponent = _at_unit_size(_corners(corners, None))
     turned, signs = _counterclockwise(corners)
-    is_open = open_sides(edge_halfedges, corners, signs <= 0)
+    # What is not counterclockwise has sides that add up with those beside them, or none that count.
+    is_open = open_sides(edge_halfedges, corners, signs - 1)
     return _overlaps(turned, exponent, may_overlap(corners, signs, is_open), None)
 
 
