@@ -23,11 +23,13 @@ class Layout:
         points: (u, 2) of the plane.
         corners: (m, 3) index of a point for each triangle corner.
         chart: (m,) the chart of each triangle.
+        seams: edges of the mesh among which are all whose two sides have different points; None if that is not known.
     """
 
     points: FloatArray
     corners: IntArray
     chart: IntArray
+    seams: IntArray | None = None
 
     @property
     def places(self) -> NDArray[np.complex128]:
@@ -42,12 +44,13 @@ class Layout:
 
     def joined(self, pairs: IntArray) -> Layout:
         """Return the layout with pairs of points (k, 2) made one, whichever has the smallest index."""
-        return Layout(self.points, same_points(len(self.points), pairs)[self.corners], self.chart)
+        return Layout(self.points, same_points(len(self.points), pairs)[self.corners], self.chart, self.seams)
 
     def numbered_anew(self) -> Layout:
         """Return the layout without unused points, charts counted from 0."""
         used, corners = numbered(self.corners, len(self.points))
-        return Layout(self.points[used], corners, numbered(self.chart, int(self.chart.max()) + 1)[1])
+        chart = numbered(self.chart, int(self.chart.max()) + 1)[1]
+        return Layout(self.points[used], corners, chart, self.seams)
 
 
 def numbered(values: IntArray, bound: int) -> tuple[IntArray, IntArray]:
@@ -83,7 +86,7 @@ class Seams:
     """
 
     def __init__(self, mesh: TriangleMesh, layout: Layout) -> None:
-        self.edges = point_seams(mesh, layout.corners)
+        self.edges = point_seams(mesh, layout.corners, layout.seams)
         self.here, self.there = both_sides(mesh, self.edges, layout.corners)
         self.charts = layout.chart[mesh.edge_faces[self.edges]]
 

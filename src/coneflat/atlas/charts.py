@@ -107,7 +107,7 @@ def read_charts(corner_uv: ArrayLike, chart_of_triangle: ArrayLike | None) -> Ch
         )
     charts = Charts(uv.view(np.complex128)[..., 0], chart.astype(np.int64), len(triangles))
     total = charts.sums(charts.areas)
-    mirrored = np.flatnonzero((total < 0) & charts.has_area)
+    mirrored = np.flatnonzero((total < 0) & charts.has_area) if (total < 0).any() else total[:0]
     if len(mirrored):
         raise OptionError(
             f"{len(mirrored):,} of {charts.count:,} charts are mirrored, the first is {mirrored[0]} "

@@ -6,6 +6,8 @@ any seam between them. So what was split off where it was in the way may have it
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,6 +35,7 @@ def glue_charts(
             is on the other, too, or not at all. None if there is no symmetry to keep.
     """
     seams = Seams(mesh, layout)
+    layout = replace(layout, seams=seams.edges)
     inner = np.flatnonzero(seams.charts[:, 0] == seams.charts[:, 1])
     layout = layout.joined(seams.coinciding(layout.places, inner, CONGRUENT))
     refused: set[tuple[int, ...]] = set()
@@ -60,7 +63,7 @@ class _Gluing:
     @property
     def layout(self) -> Layout:
         """What they are now."""
-        return Layout(_pairs(self.places), self.corners, self.chart)
+        return Layout(_pairs(self.places), self.corners, self.chart, self.seams.edges)
 
     def glue_longest(self, lengths: FloatArray, refused: set[tuple[int, ...]]) -> bool:
         """Glue charts at their stretches of seam, the longest first, where they fit; return whether any did.

@@ -13,7 +13,7 @@ from .._arrays import BoolArray, FloatArray
 from ..geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
 from ..geometry.delaunay import intrinsic_delaunay
 from ..geometry.operators import vertex_areas, weighted_areas
-from ..geometry.ties import tie_key
+from ..geometry.ties import mesh_tie_key
 from ..input.constraints import Constraints
 from ..input.symmetry import Symmetry
 from ..mesh import TriangleMesh
@@ -145,7 +145,7 @@ def choose_cones(
             *given,
             epsilon=options.epsilon,
             max_cones=options.max_cones,
-            tie_key=tie_key(mesh.vertices),
+            tie_key=mesh_tie_key(mesh),
             progress=stages.tell,
         )
     elif len(constraints.cones) and np.isfinite(constraints.cones.curvatures).all():
@@ -300,7 +300,7 @@ def search_on(surface: Surface, constraints: Constraints, options: Options, stag
         surface.areas,
         _takes_rest(mesh, constraints, options),
         mesh.euler_characteristic,
-        tie_key=tie_key(mesh.vertices),
+        tie_key=mesh_tie_key(mesh),
         # A corner of angle a has a curvature of pi - a: cones inside keep to the same bound.
         min_cone_angle=options.min_cone_angle + (np.pi if is_straight else 0.0),
         max_cone_angle=options.max_cone_angle,
