@@ -35,7 +35,7 @@ def test_errors_have_one_root():
 
 def test_kernels_compiled_ahead_are_all_that_flattening_needs(tmp_path):
     """What compiles after `coneflat.ahead` in a new process was missed: other kernels or other types."""
-    vertices, faces = sphere(4)
+    vertices, faces = sphere(5)
     np.savez(tmp_path / "mesh.npz", vertices=vertices, faces=faces)
     script = """
 import sys

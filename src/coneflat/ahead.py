@@ -33,6 +33,8 @@ def compile_kernels() -> None:
     flatten(points * [10, 1, 1], faces)  # has triangles to be turned over
     # has triangles to be cut: six of them have no room for 7 pi
     flatten(points, faces, cones={0: -5 * np.pi, **dict.fromkeys(range(100, 600, 100), np.pi)})
+    # large enough for what fine meshes alone take
+    flatten(*_tube(closed=True, around=120, across=60), cones={0: np.pi / 2, 3630: -np.pi / 2})
     for method in ("ricci", "circle-patterns"):
         flatten(*_tube(closed=True), method=method)
     flatten(*_tube(closed=True), quantise=np.pi / 2)

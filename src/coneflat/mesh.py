@@ -78,12 +78,15 @@ class TriangleMesh:
     @cached_property
     def _pairing(self) -> tuple[IntArray, IntArray, IntArray]:
         """Edges as vertex pairs (e, 2), edge of each half-edge (3m,), half-edges of each edge (e, 2)."""
-        tails, heads = self.tails, self.heads
-        order, first = sort_pairs(tails, heads, len(self.vertices))
-        pairs, sides = np.empty((2, np.count_nonzero(first), 2), dtype=np.int64)
-        edge_of = np.empty(len(order), dtype=np.int64)
-        list_edges(tails, heads, order, first, pairs, edge_of, sides)
+        pairs, edge_of, sides, _ = pair_sides(self.faces, len(self.vertices))
         return pairs, edge_of, sides
+
+    def moved_to(self, vertices: FloatArray) -> TriangleMesh:
+        """Return the mesh with its vertices elsewhere, (n, 3); edges that have been found need not be found again."""
+        moved = TriangleMesh(vertices, self.faces)
+        if "_pairing" in self.__dict__:
+            moved.__dict__["_pairing"] = self._pairing
+        return moved
 
     @cached_property
     def tails(self) -> IntArray:
@@ -113,7 +116,7 @@ class TriangleMesh:
     @cached_property
     def edge_faces(self) -> IntArray:
         """(e, 2) the faces beside each edge; the second is -1 on the boundary."""
-        return np.where(self.edge_halfedges < 0, -1, self.edge_halfedges // 3)
+        return self.edge_halfedges // 3  # -1 stays -1
 
     @cached_property
     def is_boundary_edge(self) -> BoolArray:
@@ -247,30 +250,110 @@ def order_pairs(one: IntArray, two: IntArray, bound: int, order: IntArray, first
         first[i] = i == 0 or not is_same
 
 
-@compiled
-def list_edges(
-    tails: IntArray,
-    heads: IntArray,
-    order: IntArray,
-    first: BoolArray,
-    pairs: IntArray,
-    edge_of: IntArray,
-    sides: IntArray,
-) -> None:
-    """Fill the ends of each edge (e, 2), the edge of each half-edge, and the half-edges of each edge (e, 2) or -1.
+# Sides of so many edges from one vertex are sorted by insertion, more by NumPy.
+FEW_SIDES = 64
 
-    order, first: of the half-edges as pairs of vertices, see `sort_pairs`.
+
+@compiled
+def pair_sides(faces: IntArray, count: int) -> tuple[IntArray, IntArray, IntArray, bool]:
+    """Return the edges between `count` vertices, in the order of their ends, and the half-edges of each.
+
+    Returns:
+        (e, 2) the ends, the smaller index first; (3m,) the edge of each half-edge; (e, 2) the half-edges of each edge,
+        the second -1 if there is one alone; and whether all edges have one half-edge, or two that run opposite ways.
     """
-    edge = -1
-    for i in range(len(order)):
-        h = order[i]
-        if first[i]:
-            edge += 1
-            pairs[edge, 0], pairs[edge, 1] = min(tails[h], heads[h]), max(tails[h], heads[h])
-            sides[edge, 0], sides[edge, 1] = h, -1
-        else:
-            sides[edge, 1] = h
-        edge_of[h] = edge
+    size, bits = 3 * len(faces), 1
+    while 2**bits < size:
+        bits += 1
+    starts = np.zeros(count + 1, dtype=np.int64)
+    for f in range(len(faces)):
+        for i in range(3):
+            starts[min(faces[f, i], faces[f, (i + 1) % 3]) + 1] += 1
+    for v in range(count):
+        starts[v + 1] += starts[v]
+    place = starts[:-1].copy()
+    # Of each half-edge from or to a vertex of larger index: that, and the half-edge itself.
+    keys = np.empty(size, dtype=np.int64)
+    for f in range(len(faces)):
+        for i in range(3):
+            tail, head = faces[f, (i + 1) % 3], faces[f, (i + 2) % 3]
+            low = min(tail, head)
+            keys[place[low]] = (max(tail, head) << bits) | (3 * f + i)
+            place[low] += 1
+    edges = 0
+    for v in range(count):
+        sort_few(keys[starts[v] : starts[v + 1]])
+        last = -1
+        for at in range(starts[v], starts[v + 1]):
+            edges += keys[at] >> bits != last
+            last = keys[at] >> bits
+    pairs, sides = np.empty((edges, 2), dtype=np.int64), np.empty((edges, 2), dtype=np.int64)
+    edge_of, is_plain, edge = np.empty(size, dtype=np.int64), True, -1
+    for v in range(count):
+        last = -1
+        for at in range(starts[v], starts[v + 1]):
+            high, h = keys[at] >> bits, keys[at] & (2**bits - 1)
+            if high != last:
+                edge, last = edge + 1, high
+                pairs[edge, 0], pairs[edge, 1] = v, high
+                sides[edge, 0], sides[edge, 1] = h, -1
+            else:
+                first = sides[edge, 0]
+                is_opposed = faces[first // 3, (first + 1) % 3] != faces[h // 3, (h + 1) % 3]
+                is_plain = is_plain and is_opposed and sides[edge, 1] < 0
+                sides[edge, 1] = h
+            edge_of[h] = edge
+    return pairs, edge_of, sides, is_plain
+
+
+@compiled
+def sort_few(keys: IntArray) -> None:
+    """Sort different numbers, mostly few, in place."""
+    if len(keys) > FEW_SIDES:
+        keys[:] = np.sort(keys)
+        return
+    for at in range(1, len(keys)):
+        key, before = keys[at], at - 1
+        while before >= 0 and keys[before] > key:
+            keys[before + 1] = keys[before]
+            before -= 1
+        keys[before + 1] = key
+
+
+@compiled
+def has_one_fan_each(faces: IntArray, count: int, edge_of: IntArray, sides: IntArray) -> bool:
+    """Return whether the faces at each of `count` vertices follow one another across edges, and there are some.
+
+    Args:
+        faces: (m, 3), oriented alike.
+        edge_of, sides: (3m,) the edge of each half-edge, and (e, 2) the half-edges of each edge, one or two.
+    """
+    valence, corner = np.zeros(count, dtype=np.int64), np.full(count, -1)
+    for c in range(3 * len(faces)):
+        vertex = faces[c // 3, c % 3]
+        valence[vertex] += 1
+        corner[vertex] = c
+    for vertex in range(count):
+        if corner[vertex] < 0:
+            return False
+        seen = 0
+        # Around it one way, and from where that ends at a border, the other way.
+        for turn in (1, 2):
+            here = corner[vertex]
+            while here >= 0:
+                seen += 1
+                h = here - here % 3 + (here % 3 + turn) % 3
+                pair = sides[edge_of[h]]
+                other = pair[1] if pair[0] == h else pair[0]
+                here = -1 if other < 0 else other - other % 3 + (other % 3 + turn) % 3
+                if here == corner[vertex]:
+                    break
+            if here == corner[vertex]:
+                break
+            seen -= turn == 1  # the corner begun at counts once
+        if seen != valence[vertex]:
+            return False
+    return True
 
 
 @compiled

@@ -6,7 +6,11 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
-from typing import TypeVar
+from functools import cache
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 Result = TypeVar("Result")
 
@@ -67,12 +71,18 @@ def using_threads(count: int = THREADS) -> Iterator[None]:
     The dense matrices here are small: its threads gain nothing on them, and while they wait for more to do they take
     the cores from everything else, which then takes a third longer.
     """
-    import scipy.linalg  # noqa: F401 - comes with a library of its own, which must be there to be told
-    from threadpoolctl import ThreadpoolController
-
     token = _threads.set(count)
     try:
-        with ThreadpoolController().select(internal_api="openblas").limit(limits=1):
+        with _openblas().limit(limits=1):
             yield
     finally:
         _threads.reset(token)
+
+
+@cache
+def _openblas() -> ThreadpoolController:
+    """Return what sets the threads of OpenBLAS; to look for its libraries takes 6 ms."""
+    import scipy.linalg  # noqa: F401 - comes with a library of its own, which must be there to be told
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController().select(internal_api="openblas")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from ..geometry.planar import signed_double_areas
 from .charts import Charts, read_charts
 from .mirrored import ChartMirrors, upright_angles
 from .orient import border_directions, mean_rise, orient_charts, straight_angles
-from .pack import MOST_TURNS, QUARTERS, Packed, pack_charts
+from .pack import MOST_TURNS, QUARTERS, Packed, pack_known
 from .straight import along_axes
 
 # Of a turn: by how much a multiple of a quantum may miss it.
@@ -31,6 +32,7 @@ def arrange_charts(
     up: tuple[float, float, float] | None = None,
     quantum: float | None = None,
     mirrors: Sequence[ChartMirrors] = (),
+    edge_halfedges: IntArray | None = None,
 ) -> Packed:
     """Return charts packed into a texture.
 
@@ -45,19 +47,24 @@ def arrange_charts(
             rotations between the sides of seams stay such multiples; None for any angle.
         mirrors: of all components, one after the other, which charts are mirror images of each other; axes of symmetry
             stand upright then, and none is turned to fill the texture.
+        edge_halfedges: (e, 2) of the triangles' mesh, see `TriangleMesh`; None where they are not all of it.
     """
+
+    def read(corner_uv: FloatArray) -> Charts:
+        return replace(read_charts(corner_uv, chart), edge_halfedges=edge_halfedges)
+
     flat = _upright(corner_uv, chart)
     rotate: str | int = "any" if up is None else "none"
     if quantum is not None and len(component) > 1:
         turns = whole_turns(quantum)
-        flat = _turned_together(read_charts(flat, chart), component, turns, space, up)
+        flat = _turned_together(read(flat), component, turns, space, up)
         rotate = turns if up is None else "none"
     elif any((each.partner >= 0).any() for each in mirrors):
-        flat = _turned_upright(read_charts(flat, chart), mirrors, space, up)
+        flat = _turned_upright(read(flat), mirrors, space, up)
         rotate = "none"
     elif up is not None:
         flat = orient_charts(flat, chart, corners=space, up=up)
-    return pack_charts(flat, chart, rotate=rotate, resolution=resolution, padding=padding, tiles=tiles)
+    return pack_known(read(flat), None, resolution, padding, padding, rotate, tiles)
 
 
 def _turned_upright(

@@ -11,6 +11,9 @@ from .._arrays import FloatArray, IntArray
 from ..geometry.charts import both_sides, point_seams
 from ..mesh import TriangleMesh, label_components
 
+# Values are numbered by a table of all that there might be, if these are at most so many times as many.
+SPARSE = 10
+
 
 @dataclass(frozen=True, eq=False)
 class Layout:
@@ -20,11 +23,13 @@ class Layout:
         points: (u, 2) of the plane.
         corners: (m, 3) index of a point for each triangle corner.
         chart: (m,) the chart of each triangle.
+        seams: edges of the mesh among which are all whose two sides have different points; None if that is not known.
     """
 
     points: FloatArray
     corners: IntArray
     chart: IntArray
+    seams: IntArray | None = None
 
     @property
     def places(self) -> NDArray[np.complex128]:
@@ -34,18 +39,31 @@ class Layout:
     def split(self, chart: IntArray) -> Layout:
         """Return the layout in other charts, parts of these, with points of their own."""
         keys = chart[:, None] * len(self.points) + self.corners
-        used, corners = np.unique(keys, return_inverse=True)
-        return Layout(self.points[used % len(self.points)], corners.reshape(-1, 3), chart)
+        used, corners = numbered(keys, (int(chart.max()) + 1) * len(self.points))
+        return Layout(self.points[used % len(self.points)], corners, chart)
 
     def joined(self, pairs: IntArray) -> Layout:
         """Return the layout with pairs of points (k, 2) made one, whichever has the smallest index."""
-        return Layout(self.points, same_points(len(self.points), pairs)[self.corners], self.chart)
+        return Layout(self.points, same_points(len(self.points), pairs)[self.corners], self.chart, self.seams)
 
     def numbered_anew(self) -> Layout:
         """Return the layout without unused points, charts counted from 0."""
-        used, corners = np.unique(self.corners, return_inverse=True)
-        _, chart = np.unique(self.chart, return_inverse=True)
-        return Layout(self.points[used], corners.reshape(-1, 3), chart)
+        used, corners = numbered(self.corners, len(self.points))
+        chart = numbered(self.chart, int(self.chart.max()) + 1)[1]
+        return Layout(self.points[used], corners, chart, self.seams)
+
+
+def numbered(values: IntArray, bound: int) -> tuple[IntArray, IntArray]:
+    """Return the different values, upwards, and for each value its place among them.
+
+    By marking them, unless the bound that they are below is far above their number.
+    """
+    if bound > SPARSE * values.size:
+        used, places = np.unique(values, return_inverse=True)
+        return used, places.reshape(values.shape)
+    is_used = np.zeros(bound, dtype=bool)
+    is_used[values] = True
+    return np.flatnonzero(is_used), (np.cumsum(is_used) - 1)[values]
 
 
 def same_points(count: int, pairs: IntArray) -> IntArray:
@@ -68,7 +86,7 @@ class Seams:
     """
 
     def __init__(self, mesh: TriangleMesh, layout: Layout) -> None:
-        self.edges = point_seams(mesh, layout.corners)
+        self.edges = point_seams(mesh, layout.corners, layout.seams)
         self.here, self.there = both_sides(mesh, self.edges, layout.corners)
         self.charts = layout.chart[mesh.edge_faces[self.edges]]
 

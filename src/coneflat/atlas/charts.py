@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import BoolArray, FloatArray, IntArray, as_floats
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
+from ..geometry.layers import open_sides
 from ..geometry.outline import cancel_sides
-from ..mesh import NEXT
+from ..mesh import NEXT, PREVIOUS
 
 # Of the area, relative to the square of the extent: less is a line, but for rounding.
 NO_AREA = 1e-6
@@ -25,11 +26,14 @@ class Charts:
         corners: (m, 3) as complex numbers u + iv.
         chart: (m,) chart of each triangle, from 0.
         count: k; every chart has a triangle.
+        edge_halfedges: (e, 2) the half-edges of each edge, see `TriangleMesh`, if the triangles are known to hang
+            together.
     """
 
     corners: NDArray[np.complex128]
     chart: IntArray
     count: int
+    edge_halfedges: IntArray | None = None
 
     @cached_property
     def areas(self) -> FloatArray:
@@ -56,7 +60,12 @@ class Charts:
 
     def outlines(self) -> Outlines:
         """Return the outline of each chart."""
-        return find_outlines(self.corners, self.areas < 0, self.chart, self.count)
+        is_open = None
+        if self.edge_halfedges is not None:
+            places = np.ascontiguousarray(self.corners).view(np.float64).reshape(-1, 3, 2)
+            group = np.where(self.areas < 0, -1, self.chart)
+            is_open = open_sides(self.edge_halfedges, places, group).reshape(-1, 3)[:, PREVIOUS]
+        return find_outlines(self.corners, self.areas < 0, self.chart, self.count, is_open)
 
     def moved(
         self, factors: NDArray[np.complex128], shifts: NDArray[np.complex128] | None = None
@@ -98,7 +107,7 @@ def read_charts(corner_uv: ArrayLike, chart_of_triangle: ArrayLike | None) -> Ch
         )
     charts = Charts(uv.view(np.complex128)[..., 0], chart.astype(np.int64), len(triangles))
     total = charts.sums(charts.areas)
-    mirrored = np.flatnonzero((total < 0) & charts.has_area)
+    mirrored = np.flatnonzero((total < 0) & charts.has_area) if (total < 0).any() else total[:0]
     if len(mirrored):
         raise OptionError(
             f"{len(mirrored):,} of {charts.count:,} charts are mirrored, the first is {mirrored[0]} "
@@ -132,7 +141,11 @@ class Outlines:
 
 
 def find_outlines(
-    corners: NDArray[np.complex128], flipped: BoolArray, chart: IntArray, count: int
+    corners: NDArray[np.complex128],
+    flipped: BoolArray,
+    chart: IntArray,
+    count: int,
+    is_open: BoolArray | None = None,
 ) -> Outlines:
     """Return the outlines of charts; how often one winds around a point is how many triangles cover it.
 
@@ -144,10 +157,15 @@ def find_outlines(
         corners: (m, 3) of the triangles.
         flipped: (m,) True for triangles upside down.
         chart: (m,) chart of each triangle, below `count`. Every chart has a triangle.
+        is_open: (m, 3) the sides, from each corner on, that are not known to cancel in pairs; None for all.
     """
-    corners = np.where(flipped[:, None], corners[:, [0, 2, 1]], corners)
-    same, balance = cancel_sides(corners, chart)
-    kept = (balance[same] != 0).reshape(-1, 3)
+    if flipped.any():
+        corners = np.where(flipped[:, None], corners[:, [0, 2, 1]], corners)
+    kept = np.ones(corners.shape, dtype=bool) if is_open is None else is_open.copy()
+    triangle, corner = np.nonzero(kept)
+    sides = np.stack([corners[triangle, corner], corners[triangle, NEXT[corner]]], axis=1)
+    same, balance = cancel_sides(sides, chart[triangle])
+    kept[triangle, corner] = balance[same] != 0
     # A chart all of whose sides cancel has no area: all its sides stand for it.
     kept |= (np.bincount(chart, weights=kept.any(axis=1), minlength=count) == 0)[chart][:, None]
     triangle, corner = np.nonzero(kept)

@@ -6,12 +6,15 @@ any seam between them. So what was split off where it was in the way may have it
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..compiled import compiled
 from ..geometry.overlap import find_overlaps
-from ..geometry.planar import bounds, signed_double_areas
+from ..geometry.planar import bounds, fill_bounds, signed_double_areas
 from ..mesh import TriangleMesh
 from ..progress import go_on
 from .chart_seams import Layout, Seams, same_points
@@ -33,6 +36,7 @@ def glue_charts(
             is on the other, too, or not at all. None if there is no symmetry to keep.
     """
     seams = Seams(mesh, layout)
+    layout = replace(layout, seams=seams.edges)
     inner = np.flatnonzero(seams.charts[:, 0] == seams.charts[:, 1])
     layout = layout.joined(seams.coinciding(layout.places, inner, CONGRUENT))
     refused: set[tuple[int, ...]] = set()
@@ -54,12 +58,13 @@ class _Gluing:
         self.stretches = [members for members in stretches if len(members)]
         self.corners, self.chart = layout.corners.copy(), layout.chart.copy()
         self.faces = _members(layout.chart, np.arange(len(layout.chart)))
-        self.low, self.high = bounds(layout.points[layout.corners])
+        self.low, self.high = np.empty((2, len(self.corners), 2))
+        fill_bounds(layout.points, self.corners, np.arange(len(self.corners)), self.low, self.high)
 
     @property
     def layout(self) -> Layout:
         """What they are now."""
-        return Layout(_pairs(self.places), self.corners, self.chart)
+        return Layout(_pairs(self.places), self.corners, self.chart, self.seams.edges)
 
     def glue_longest(self, lengths: FloatArray, refused: set[tuple[int, ...]]) -> bool:
         """Glue charts at their stretches of seam, the longest first, where they fit; return whether any did.
@@ -137,7 +142,7 @@ class _Gluing:
         seams.charts[seams.charts == moved] = self.chart[self.faces[moved]] = kept
         self.faces[kept] = np.concatenate([self.faces[kept], self.faces[moved]])
         self.faces[moved] = self.faces[moved][:0]
-        self.low[self.faces[kept]], self.high[self.faces[kept]] = bounds(self._corners(self.faces[kept]))
+        fill_bounds(_pairs(self.places), self.corners, self.faces[kept], self.low, self.high)
         return True
 
     def _corners(self, faces: IntArray) -> FloatArray:
@@ -150,10 +155,11 @@ class _Gluing:
             return False
         low, high = bounds(corners)
         others = self.faces[kept]
-        others = others[_touches(self.low[others], self.high[others], low.min(axis=0), high.max(axis=0))]
+        others = others[touches(self.low, self.high, others, low.min(axis=0), high.max(axis=0))]
         if not len(others):
             return True
-        near = _touches(low, high, self.low[others].min(axis=0), self.high[others].max(axis=0))
+        least, most = self.low[others].min(axis=0), self.high[others].max(axis=0)
+        near = touches(low, high, np.arange(len(low)), least, most)
         together = np.concatenate([corners[near], self._corners(others)])
         return not len(find_overlaps(together, limit=1).pairs)
 
@@ -165,10 +171,22 @@ def _members(label: IntArray, numbers: IntArray) -> list[IntArray]:
 
 def _pairs(places: NDArray[np.complex128]) -> FloatArray:
     """Return complex numbers as pairs of their parts, along a last axis more."""
-    return np.stack([places.real, places.imag], axis=-1)
+    parts: FloatArray = np.ascontiguousarray(places).view(np.float64).reshape(*places.shape, 2)
+    return parts
 
 
-def _touches(low: FloatArray, high: FloatArray, least: FloatArray, most: FloatArray) -> BoolArray:
-    """Return which of the boxes from `low` to `high` touch the one from `least` to `most`."""
-    inside = (high >= least) & (low <= most)
-    return inside[:, 0] & inside[:, 1]
+@compiled
+def touches(
+    low: FloatArray, high: FloatArray, chosen: IntArray, least: FloatArray, most: FloatArray
+) -> BoolArray:
+    """Return which of the chosen boxes from `low` to `high` (m, 2) touch the one from `least` to `most`."""
+    found = np.empty(len(chosen), np.bool_)
+    for i in range(len(chosen)):
+        f = chosen[i]
+        found[i] = (
+            high[f, 0] >= least[0]
+            and low[f, 0] <= most[0]
+            and high[f, 1] >= least[1]
+            and low[f, 1] <= most[1]
+        )
+    return found

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from .._arrays import FloatArray, IntArray, dots
 from ..flat import LaidOut
-from ..geometry.overlap import find_overlaps
+from ..geometry.overlap import overlaps_of_mesh
 from ..geometry.planar import signed_double_areas
 from ..input.components import Component, seam_costs
 from ..input.symmetry import Symmetry
 from ..mesh import TriangleMesh
 from ..options import Options
 from ..text import plural
+from ..threads import meanwhile
 from .chart_seams import Layout, Seams
 from .glue import glue_charts
 from .mirrored import mirror_charts, split_alike
-from .split import split_overlaps
+from .split import as_disk, split_overlaps
 
 # Parts of the area that charts should have at least. Where the cheapest cuts leave several charts, dearer ones that
 # leave larger pieces may leave fewer.
@@ -55,18 +57,22 @@ def injective_charts(
         symmetry: of mesh and layout; charts are split alike on both sides then, if that takes few more of them.
     """
     whole = Layout(points, corners, np.zeros(len(corners), dtype=np.int64))
-    areas = signed_double_areas(points[corners])
-    pairs = find_overlaps(points, corners).pairs
-    # What an inverted triangle covers is not to be had apart from its neighbours.
-    pairs = pairs[(areas[pairs] > 0).all(axis=1)]
-    if not len(pairs):
-        return glue_charts(mesh, whole, lengths).numbered_anew()
+    places = points[corners]
+    areas = signed_double_areas(places)
+    # The disk has to be made only where something overlaps, but the other core has nothing else to do.
+    with meanwhile(partial(as_disk, points, corners), len(corners)) as opening:
+        pairs = overlaps_of_mesh(mesh.edge_halfedges, places).pairs
+        # What an inverted triangle covers is not to be had apart from its neighbours.
+        pairs = pairs[(areas[pairs] > 0).all(axis=1)]
+        if not len(pairs):
+            return glue_charts(mesh, whole, lengths).numbered_anew()
+        disk = opening.result()
     found: list[tuple[tuple[int, int, float], int, Layout]] = []
     for part in LEAST_PARTS:
         least = part * float(np.abs(areas).sum())
         most = MANY if part < LEAST_PARTS[-1] else np.inf
         chart = split_overlaps(
-            points, corners, lengths[mesh.halfedge_edges], np.abs(areas), pairs, least, most
+            points, corners, lengths[mesh.halfedge_edges], np.abs(areas), pairs, least, most, disk
         )
         if chart is None:
             continue

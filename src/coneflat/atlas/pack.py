@@ -88,6 +88,19 @@ def pack_charts(
     """
     charts = read_charts(corner_uv, chart_of_triangle)
     margin = padding if margin is None else margin
+    return pack_known(charts, areas, resolution, padding, margin, rotate, tiles)
+
+
+def pack_known(
+    charts: Charts,
+    areas: ArrayLike | None,
+    resolution: int,
+    padding: float,
+    margin: float,
+    rotate: str | int,
+    tiles: int,
+) -> Packed:
+    """Pack charts that have been read; see `pack_charts`."""
     _check(resolution, padding, margin, rotate, tiles)
     density = np.ones(charts.count) if areas is None else _densities(charts, areas)
     outlines = charts.outlines()

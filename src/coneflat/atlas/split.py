@@ -26,6 +26,7 @@ def split_overlaps(
     pairs: IntArray,
     least: float = 0.0,
     most: float = np.inf,
+    whole: TriangleMesh | None = None,
 ) -> IntArray | None:
     """Return (m,) the chart of each triangle, numbered from 0, so that no chart has both of a pair; None if too many.
 
@@ -40,13 +41,14 @@ def split_overlaps(
         pairs: (k, 2) of triangles to be separated, in lexicographic order.
         least: the area that a chart should have at least.
         most: the number of charts that are too many.
+        whole: what `as_disk` returns of all triangles, if that is known.
     """
     chart, count = np.zeros(len(corners), dtype=np.int64), 1
     waiting = [(np.arange(len(corners)), pairs)] if len(pairs) else []
     while waiting and count < most:
         go_on()
         faces, pairs = waiting.pop()
-        disk = as_disk(points, corners[faces])
+        disk = whole if whole is not None and len(faces) == len(corners) else as_disk(points, corners[faces])
         one, other = np.zeros((2, len(faces)), dtype=bool)
         for layer, members in zip((one, other), largest_layers(pairs, disk.faces, areas[faces]), strict=True):
             layer[members] = True
@@ -199,12 +201,11 @@ def _cheapest_path(
     faces = disk.edge_faces
     left, right = faces.T
     passable = ~(disk.is_boundary_edge | (one[left] & one[right]) | (other[left] & other[right]))
-    edges = np.flatnonzero(passable)
-    ends_of = disk.edges[edges]
-    graph = MultiGraph(len(disk.vertices), ends_of[:, 0], ends_of[:, 1], costs[edges])
+    one_end, other_end = np.ascontiguousarray(disk.edges.T)
+    graph = MultiGraph(len(disk.vertices), one_end, other_end, np.where(passable, costs, np.inf))
     distance, before, _ = graph.shortest_paths(starts, ends)
     nodes, previous = trace_back(ends[[np.argmin(distance[ends])]], before)
-    return edges[graph.edges_between(nodes, previous)]
+    return graph.edges_between(nodes, previous)
 
 
 def overlap_regions(pairs: ArrayLike, triangles: ArrayLike) -> tuple[int, IntArray]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -15,14 +15,14 @@ from ..geometry import angle_defect, corner_angles, cotangent_laplacian, cotange
 from ..geometry.delaunay import intrinsic_delaunay
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..geometry.operators import vertex_areas, weighted_areas
-from ..geometry.ties import tie_key
+from ..geometry.ties import mesh_tie_key
 from ..input.constraints import Constraints
 from ..input.symmetry import Symmetry
 from ..mesh import TriangleMesh
 from ..options import Options
 from ..progress import Stages
 from ..text import plural
-from ..threads import HUGE
+from ..threads import HUGE, meanwhile
 from . import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
 
 if TYPE_CHECKING:
@@ -89,23 +89,27 @@ class Surface:
 
         flips: the metric is one that may flip edges; else Laplacian and areas are always the mesh's own.
         """
-        angles, n = corner_angles(lengths), len(mesh.vertices)
-        curvature = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
-        widest = np.zeros(n)
-        np.maximum.at(widest, mesh.faces.ravel(), angles.ravel())
-        widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
+        n, cots = len(mesh.vertices), cotangents(lengths)
         faces, sides = mesh.faces, lengths
-        if flips and _far_from_delaunay(mesh, lengths):
+        if flips and _far_from_delaunay(mesh, cots):
             triangulation, done = intrinsic_delaunay(mesh, lengths)
             if len(done) > STRETCHED * len(mesh.edges):
                 faces, sides = triangulation.faces, triangulation.length.reshape(-1, 3)
-        laplacian = cotangent_laplacian(faces, cotangents(sides), n)
-        return cls(mesh, lengths, laplacian, curvature, vertex_areas(faces, sides, n), widest, flips)
+                cots = cotangents(sides)
+        with meanwhile(partial(cotangent_laplacian, faces, cots, n), len(faces)) as weighing:
+            angles = corner_angles(lengths)
+            curvature = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+            widest = np.zeros(n)
+            np.maximum.at(widest, mesh.faces.ravel(), angles.ravel())
+            widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
+            areas = vertex_areas(faces, sides, n)
+            laplacian = weighing.result()
+        return cls(mesh, lengths, laplacian, curvature, areas, widest, flips)
 
     @cached_property
     def tie_key(self) -> FloatArray:
         """(n,) what breaks ties between vertices."""
-        return tie_key(self.mesh.vertices)
+        return mesh_tie_key(self.mesh)
 
     def linear_model(self, takes_rest: BoolArray, weights: FloatArray | None) -> LinearModel:
         """Return the linear model of cones off some vertices (n,), whose (n,) weights, or None, count in E.
@@ -129,9 +133,9 @@ class Surface:
         return intrinsic_delaunay(self.mesh, self.lengths)
 
 
-def _far_from_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> bool:
+def _far_from_delaunay(mesh: TriangleMesh, cots: FloatArray) -> bool:
     """Return whether many edges are not Delaunay: their opposite angles sum to more than half a turn."""
-    weights = np.bincount(mesh.halfedge_edges, cotangents(lengths).ravel(), len(mesh.edges))
+    weights = np.bincount(mesh.halfedge_edges, cots.ravel(), len(mesh.edges))
     return bool(np.count_nonzero(~mesh.is_boundary_edge & (weights < 0)) > MANY * len(mesh.edges))
 
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..compiled import compiled
 from ..cones import ConeSolution
 from ..errors import ConvergenceError, MetricError
-from ..geometry import angle_defect, double_areas, edge_lengths
+from ..geometry import double_areas, edge_lengths
 from ..geometry.operators import area_distortion
-from ..geometry.planar import heights, sides_between, signed_angles, signed_double_areas
+from ..geometry.planar import signed_double_areas
 from ..input.symmetry import SymmetryUse
 from ..mesh import TriangleMesh
 from ..quality.statistics import SolveStatistics
@@ -111,17 +113,49 @@ class FlatMetric(Protocol):
         ...
 
 
-def laid_out_curvature(mesh: TriangleMesh, corners: FloatArray) -> FloatArray:
+def laid_out_curvature(mesh: TriangleMesh, corners: FloatArray, at: BoolArray | None = None) -> FloatArray:
     """Return (n,) the curvature of triangles with given corners (m, 3, 2): a full or half turn less their angles.
 
     Those of triangles that are upside down count as negative. Where triangles wind around a vertex twice, the
     curvature is a full turn less than it seems.
+
+    at: (n,) the vertices of interest, as it takes less time at few; None for all.
     """
-    sides = sides_between(corners)
-    angles = signed_angles(sides)
-    is_flat = np.abs(heights(sides)) < FLAT
-    angles[is_flat] = np.abs(angles[is_flat])
-    return angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+    sums = np.zeros(len(mesh.vertices))
+    at = np.ones(len(sums), dtype=bool) if at is None else at
+    sum_signed_angles(mesh.faces, np.ascontiguousarray(corners), at, FLAT, sums)
+    curvature: FloatArray = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - sums
+    return curvature
+
+
+@compiled
+def sum_signed_angles(
+    faces: IntArray, corners: FloatArray, at: BoolArray, flat: float, sums: FloatArray
+) -> None:
+    """Add the angles of triangles to the sums at their vertices, where these are of interest.
+
+    Args:
+        faces, corners: (m, 3) vertices and (m, 3, 2) places.
+        at: (n,) vertices of interest.
+        flat: height over longest side below which a triangle is neither upright nor upside down: its angles count.
+        sums: (n,) added to; angles of triangles upside down are negative.
+    """
+    sides = np.empty((3, 2))
+    for f in range(len(faces)):
+        if not (at[faces[f, 0]] or at[faces[f, 1]] or at[faces[f, 2]]):
+            continue
+        longest = 0.0
+        for i in range(3):
+            for x in range(2):
+                sides[i, x] = corners[f, (i + 2) % 3, x] - corners[f, (i + 1) % 3, x]
+            longest = max(longest, sides[i, 0] ** 2 + sides[i, 1] ** 2)
+        doubled = sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]
+        is_flat = abs(doubled) < flat * longest or longest == 0.0
+        for i in range(3):
+            if at[faces[f, i]]:
+                one, two = sides[(i + 1) % 3], sides[(i + 2) % 3]
+                angle = math.atan2(one[0] * two[1] - one[1] * two[0], -(one[0] * two[0] + one[1] * two[1]))
+                sums[faces[f, i]] += abs(angle) if is_flat else angle
 
 
 def all_faces(mesh: TriangleMesh) -> IntArray:

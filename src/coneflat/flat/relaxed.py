@@ -8,15 +8,15 @@ from functools import cached_property
 
 import numpy as np
 
-from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
+from .._arrays import BoolArray, FloatArray, IntArray, has_any
 from ..compiled import compiled
 from ..errors import LengthError, SeamError
 from ..geometry import double_areas, edge_lengths
 from ..geometry.operators import LEAST_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
-from ..geometry.planar import map_factors, signed_double_areas
+from ..geometry.planar import signed_double_areas
+from ..geometry.straight import place_triangles
 from ..input.components import Component
 from ..layout.relax import Relaxed, StretchEnergy, relax
-from ..layout.relax.relax import rest_sides
 from ..mesh import TriangleMesh, label_components
 from ..options import Options
 from .base import LaidOut, laid_out_curvature, vertex_log_scale
@@ -136,14 +136,15 @@ class _Surface:
         of_faces = np.maximum(at_unit_scale(weights), LEAST_WEIGHT)[self.part.mesh.faces].mean(axis=1)
         return besides * of_faces[self.laid_out.face_origin]
 
-    @cached_property
-    def _factors(self) -> tuple[ComplexArray, ComplexArray]:
-        return map_factors(rest_sides(self.lengths))
+    def ratios(self, laid_out: LaidOut, chosen: IntArray | None = None) -> FloatArray:
+        """Return (m,) ratios of singular values, infinite for triangles that are turned over or have no area.
 
-    def ratios(self, laid_out: LaidOut) -> FloatArray:
-        """Return (m,) ratios of singular values, infinite for triangles that are turned over or have no area."""
-        found: FloatArray = map_ratios(*self._factors, laid_out.points, laid_out.corners)
-        return found
+        chosen: the triangles of interest, the others are infinite; None for all.
+        """
+        ratios = np.full(len(self.mesh.faces), np.inf)
+        chosen = np.arange(len(ratios)) if chosen is None else chosen
+        fill_ratios(np.ascontiguousarray(self.lengths), laid_out.points, laid_out.corners, chosen, ratios)
+        return ratios
 
     def mean(self, ratios: FloatArray) -> float:
         """The mean ratio by area, over upright triangles."""
@@ -157,10 +158,11 @@ class _Surface:
 
         The vertices there, (n,), too. before: (m,) the ratios of the layout that nothing may be worse than.
         """
-        after, (mesh, faces) = self.ratios(moved), (self.mesh, self.mesh.faces)
+        mesh, faces = self.mesh, self.mesh.faces
         edges = mesh.edges[was_free[mesh.edges[:, 0]] & was_free[mesh.edges[:, 1]]]
         count, patch = label_components(len(mesh.vertices), edges[:, 0], edges[:, 1])
         touched = np.flatnonzero(has_any(was_free, faces) & np.isfinite(before))
+        after = self.ratios(moved, touched)
         corner = np.argmax(was_free[faces[touched]], axis=1)
         of_face = patch[faces[touched, corner]]
         gain = before[touched] - after[touched]
@@ -176,7 +178,10 @@ class _Surface:
         """Return the moved layout with the curvature and the scale that it has, and with what it was before."""
         mesh, given = self.mesh, self.part.mesh
         corners = moved.points[moved.corners]
-        curvature = laid_out_curvature(mesh, corners)
+        # Where triangles were moved; elsewhere it is what it was.
+        changed = np.zeros(len(mesh.vertices), dtype=bool)
+        changed[mesh.faces[has_any(was_free, mesh.faces)]] = True
+        curvature = np.where(changed, laid_out_curvature(mesh, corners, changed), moved.curvature)
         after = np.abs(signed_double_areas(corners)) / 2
         log_scale = np.where(was_free, vertex_log_scale(mesh, self.areas, after), moved.log_scale)
         count = len(given.vertices)
@@ -202,28 +207,33 @@ class _Surface:
 
 
 @compiled
-def map_ratios(
-    along: ComplexArray, across: ComplexArray, points: FloatArray, corners: IntArray
-) -> FloatArray:
-    """Return (m,) ratios of singular values of the maps z -> a z + b conj(z), infinite for those turned over.
+def fill_ratios(
+    lengths: FloatArray, points: FloatArray, corners: IntArray, chosen: IntArray, ratios: FloatArray
+) -> None:
+    """Write the ratio of singular values of the maps of chosen triangles; infinite for those turned over.
 
     Args:
-        along, across: (m, 3) the derivatives of a and b by the places of the corners.
-        points: (u, 2).
+        lengths: (m, 3) side lengths of the triangles as they should be.
+        points: (u, 2) of the plane.
         corners: (m, 3) indices of points.
+        chosen: triangles.
+        ratios: (m,) filled at the chosen.
     """
-    ratios = np.full(len(corners), np.inf)
-    for f in range(len(corners)):
-        a, b = 0j, 0j
+    rest = np.empty(3, np.complex128)
+    for f in chosen:
+        ratios[f] = np.inf
+        place_triangles(lengths[f], rest)
         x, y = points[corners[f, 0]]
+        a, b = 0j, 0j
         for i in range(1, 3):
             place = complex(points[corners[f, i], 0] - x, points[corners[f, i], 1] - y)
-            a += along[f, i] * place
-            b += across[f, i] * place
+            # Both times the area of the triangle at rest, which the ratio does not depend on.
+            a += rest[i].conjugate() * place
+            b += rest[i] * place
         one, two = abs(a), abs(b)
-        if one > two:
+        has_area = (rest[0].conjugate() * rest[1]).imag != 0.0
+        if has_area and one > two:
             ratios[f] = (one + two) / (one - two)
-    return ratios
 
 
 def _largest(ratios: FloatArray) -> float:

@@ -27,8 +27,13 @@ def both_sides(mesh: TriangleMesh, edges: IntArray, at_corners: Values) -> tuple
     return flat[np.stack(one, axis=1)], flat[np.stack(two[::-1], axis=1)]
 
 
-def point_seams(mesh: TriangleMesh, corners: IntArray) -> IntArray:
-    """Return the inner edges whose two sides have different points; `corners` (m, 3) numbers those of the corners."""
+def point_seams(mesh: TriangleMesh, corners: IntArray, among: IntArray | None = None) -> IntArray:
+    """Return the inner edges whose two sides have different points; `corners` (m, 3) numbers those of the corners.
+
+    among: edges among which they are; None for all.
+    """
+    if among is not None:
+        return among[find_split(mesh.edge_halfedges[among], np.ascontiguousarray(corners))]
     return np.flatnonzero(find_split(mesh.edge_halfedges, np.ascontiguousarray(corners)))
 
 

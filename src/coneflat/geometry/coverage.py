@@ -9,7 +9,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..mesh import NEXT
-from .outline import cancel_sides
+from .outline import cancel_sides, triangle_sides
 
 # Crossings of horizontal lines with sides that are sorted at a time, to bound the memory.
 AT_A_TIME = 2_000_000
@@ -78,7 +78,7 @@ def _outline(corners: FloatArray) -> IntArray:
     The first of equal ones stands for all: positive as it runs, negative if it runs against it.
     """
     places = corners @ np.array([1, 1j])
-    same, balance = cancel_sides(places, np.zeros(len(places), dtype=np.int64))
+    same, balance = cancel_sides(triangle_sides(places), np.zeros(places.size, dtype=np.int64))
     return np.where(same == np.arange(len(same)), balance, 0).astype(np.int64).reshape(-1, 3)
 
 

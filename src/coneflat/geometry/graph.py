@@ -218,10 +218,10 @@ def widen_sets(
 
 @compiled
 def push(keys: FloatArray, items: IntArray, size: int, key: float, item: int) -> int:
-    """Put an item on a binary heap and return its new size."""
+    """Put an item on a heap, four below each, and return its new size."""
     i = size
     while i > 0:
-        parent = (i - 1) // 2
+        parent = (i - 1) >> 2
         if keys[parent] <= key:
             break
         keys[i] = keys[parent]
@@ -234,19 +234,21 @@ def push(keys: FloatArray, items: IntArray, size: int, key: float, item: int) ->
 
 @compiled
 def drop_first(keys: FloatArray, items: IntArray, size: int) -> int:
-    """Take the least item off a binary heap and return its new size."""
+    """Take the least item off a heap and return its new size."""
     size -= 1
     key, item = keys[size], items[size]
     i = 0
     while True:
-        child = 2 * i + 1
-        if child >= size:
+        first = 4 * i + 1
+        if first >= size:
             break
-        if child + 1 < size and keys[child + 1] < keys[child]:
-            child += 1
-        if keys[child] >= key:
+        child, least = first, keys[first]
+        for other in range(first + 1, min(first + 4, size)):
+            if keys[other] < least:
+                child, least = other, keys[other]
+        if least >= key:
             break
-        keys[i] = keys[child]
+        keys[i] = least
         items[i] = items[child]
         i = child
     keys[i] = key

@@ -7,24 +7,31 @@ from numpy.typing import NDArray
 
 from .._arrays import ComplexArray, IntArray
 from ..compiled import compiled
+from ..mesh import NEXT
 
 
-def cancel_sides(corners: ComplexArray, chart: IntArray) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def cancel_sides(sides: ComplexArray, chart: IntArray) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Return which sides of triangles have the same ends, and how often they run one direction more than the other.
 
     Args:
-        corners: (m, 3) of the triangles. Side i runs from corner i to the next.
-        chart: (m,) sides of different charts are different.
+        sides: (s, 2) start and end of each.
+        chart: (s,) sides of different charts are different.
 
     Returns:
-        (3m,) the first side with the same ends, in either order; and (3m,) of each such side how often it is there as
+        (s,) the first side with the same ends, in either order; and (s,) of each such side how often it is there as
         it runs less how often against it, 0 where they cancel.
     """
-    corners = corners + 0.0  # no -0.0: it has other bits
-    table = np.full(2 ** int(np.ceil(np.log2(2 * corners.size))), -1, dtype=np.int32)
-    same, balance = np.empty((2, corners.size), dtype=np.int32)
-    match_sides(corners.view(np.uint64).reshape(-1, 2), chart, table, same, balance)
+    sides = np.ascontiguousarray(sides) + 0.0  # no -0.0: it has other bits
+    table = np.full(2 ** (2 * max(len(sides), 1) - 1).bit_length(), -1, dtype=np.int32)
+    same, balance = np.empty((2, len(sides)), dtype=np.int32)
+    match_sides(sides.view(np.uint64).reshape(-1, 2), chart, table, same, balance)
     return same, balance
+
+
+def triangle_sides(corners: ComplexArray) -> ComplexArray:
+    """Return (3m, 2) start and end of the sides of triangles with corners (m, 3): side i begins at corner i."""
+    sides: ComplexArray = np.stack([corners, corners[:, NEXT]], axis=2).reshape(-1, 2)
+    return sides
 
 
 @compiled
@@ -38,25 +45,25 @@ def match_sides(
     """Find the sides of a chart that have the same ends, by a table of the sides seen so far.
 
     Args:
-        bits: (3m, 2) of the coordinates of the triangle corners. Side i runs from corner i to the next.
-        chart: (m,) chart of each triangle.
+        bits: (2s, 2) of the coordinates of the ends, start and end of each side.
+        chart: (s,) chart of each side.
         table: 2^p numbers, at least twice as many as sides, all -1; overwritten.
-        same: (3m,) filled: the first side with the same ends, in either order.
-        balance: (3m,) filled: of each such side, how often it is there as it runs less how often against it.
+        same: (s,) filled: the first side with the same ends, in either order.
+        balance: (s,) filled: of each such side, how often it is there as it runs less how often against it.
     """
     mask = np.uint64(len(table) - 1)
-    for side in range(len(bits)):
-        start, end = side, side - side % 3 + (side + 1) % 3
+    for side in range(len(chart)):
+        start, end = 2 * side, 2 * side + 1
         # The hash must not depend on the order of the ends.
-        key = _mixed(_hash(bits[start]) + _hash(bits[end]) + np.uint64(chart[side // 3]))
+        key = _mixed(_hash(bits[start]) + _hash(bits[end]) + np.uint64(chart[side]))
         balance[side] = 0
         while True:
             slot = np.int64(key & mask)
             other = table[slot]
             if other < 0:
                 table[slot] = other = side
-            other_start, other_end = other, other - other % 3 + (other + 1) % 3
-            if chart[other // 3] == chart[side // 3]:
+            other_start, other_end = 2 * other, 2 * other + 1
+            if chart[other] == chart[side]:
                 if _equal(bits, start, other_start) and _equal(bits, end, other_end):
                     same[side] = other
                     balance[other] += 1

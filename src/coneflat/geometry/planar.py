@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import ComplexArray, FloatArray
+from .._arrays import ComplexArray, FloatArray, IntArray
+from ..compiled import compiled
 from ..mesh import NEXT, PREVIOUS
 
 
 def signed_double_areas(corners: FloatArray) -> FloatArray:
     """Return (m,) twice the area of triangles with corners (m, 3, 2), negative where these run clockwise."""
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    areas: FloatArray = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    areas = np.empty(len(corners))
+    fill_double_areas(np.ascontiguousarray(corners, dtype=np.float64), areas)
     return areas
 
 
 def bounds(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return (m, 2) the least and the largest coordinates of triangles with corners (m, 3, 2)."""
-    # Corner by corner: NumPy is slow at least values along an axis of three.
-    one, two, three = corners[:, 0], corners[:, 1], corners[:, 2]
-    return np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
+    low, high = np.empty((2, len(corners), 2))
+    points = np.ascontiguousarray(corners, dtype=np.float64).reshape(-1, 2)
+    every = np.arange(len(corners))
+    fill_bounds(points, np.arange(len(points)).reshape(-1, 3), every, low, high)
+    return low, high
 
 
 def signed_angles(sides: ComplexArray) -> FloatArray:
@@ -61,3 +64,27 @@ def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
             # Side 0 runs from corner 1 to corner 2, side 1 from corner 2 to corner 0.
             found.append(np.stack([c1, -c0, c0 - c1], axis=1))
     return found[0], found[1]
+
+
+@compiled
+def fill_double_areas(corners: FloatArray, areas: FloatArray) -> None:
+    """Fill in (m,) twice the area of triangles with corners (m, 3, 2), negative where these run clockwise."""
+    for f in range(len(corners)):
+        x, y = corners[f, 0, 0], corners[f, 0, 1]
+        areas[f] = (corners[f, 1, 0] - x) * (corners[f, 2, 1] - y) - (corners[f, 1, 1] - y) * (
+            corners[f, 2, 0] - x
+        )
+
+
+@compiled
+def fill_bounds(
+    points: FloatArray, corners: IntArray, chosen: IntArray, low: FloatArray, high: FloatArray
+) -> None:
+    """Write the least and the largest coordinates of chosen triangles to (m, 2), at their own places there.
+
+    points: (u, 2). corners: (m, 3) indices of points.
+    """
+    for f in chosen:
+        for x in range(2):
+            one, two, three = points[corners[f, 0], x], points[corners[f, 1], x], points[corners[f, 2], x]
+            low[f, x], high[f, x] = min(one, two, three), max(one, two, three)

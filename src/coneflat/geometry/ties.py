@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import FloatArray, dots
+from ..mesh import TriangleMesh
 
 # Relative to the range of the values: far above what rounding makes of equal ones, far below what tells others
 # apart.
@@ -66,6 +67,14 @@ def tie_key(vertices: FloatArray) -> FloatArray:
     for weight in (0.05, 0.02, 0.01):
         first = np.argmax(key >= key.max() - EQUAL)
         key += weight * np.linalg.norm(centred - centred[first], axis=1)
+    return key
+
+
+def mesh_tie_key(mesh: TriangleMesh) -> FloatArray:
+    """Return the key (n,) of a mesh, which is not computed again."""
+    key: FloatArray | None = mesh.__dict__.get("_tie_key")
+    if key is None:
+        key = mesh.__dict__["_tie_key"] = tie_key(mesh.vertices)
     return key
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..compiled import compiled
 from ..errors import GridError
-from ..geometry.overlap import fill_orientations
+from ..geometry.orientation import fill_orientations
 from ..mesh import TriangleMesh
 from ..text import list_some, plural
 

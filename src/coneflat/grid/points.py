@@ -12,7 +12,7 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..compiled import compiled
-from ..geometry.overlap import orientation
+from ..geometry.orientation import orientation
 from .exact_grid import ExactGrid, turn
 
 # Where in its triangle a point lies: within side 0, 1 or 2, at corner 0, 1 or 2, or inside.

@@ -10,7 +10,7 @@ import numpy as np
 
 from .._arrays import FloatArray, IntArray
 from ..compiled import compiled
-from ..geometry.overlap import orientation
+from ..geometry.orientation import orientation
 from .exact_grid import ExactGrid, turn
 from .points import GridPoints, Ports, find_entry
 

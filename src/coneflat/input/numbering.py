@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from .._arrays import BoolArray, FloatArray, IntArray, unit_exponent
 from ..errors import NonFiniteError
 from ..geometry.lengths import as_lengths, check_lengths
-from ..mesh import TriangleMesh
 from .validation import CheckedMesh
 
 
@@ -45,7 +44,7 @@ def at_unit_size(checked: CheckedMesh) -> CheckedMesh:
     if size < SMALLEST:
         raise NonFiniteError(f"positions of at most {size:.3g} are too small for numbers: scale the mesh")
     exponent = -unit_exponent(checked.mesh.vertices)
-    mesh = TriangleMesh(np.ldexp(checked.mesh.vertices, exponent), checked.mesh.faces)
+    mesh = checked.mesh.moved_to(np.ldexp(checked.mesh.vertices, exponent))
     return replace(checked, mesh=mesh, exponent=exponent)
 
 

@@ -16,7 +16,17 @@ from ..errors import (
     NonOrientableError,
 )
 from ..geometry.graph import MultiGraph
-from ..mesh import NEXT, PREVIOUS, TriangleMesh, corner_fans, label_components, sort_by_counting, sort_pairs
+from ..mesh import (
+    NEXT,
+    PREVIOUS,
+    TriangleMesh,
+    corner_fans,
+    has_one_fan_each,
+    label_components,
+    pair_sides,
+    sort_by_counting,
+    sort_pairs,
+)
 from ..text import list_some, plural
 
 REPAIR_ADVICE = "pass repair=True (on the command line: leave out --strict)"
@@ -115,10 +125,13 @@ class _Check:
         self.pairs = np.empty((0, 2), dtype=np.int64)
         self.vertex_origin = np.arange(len(vertices))
         self.notes: list[str] = []
+        self.pairing: tuple[IntArray, IntArray, IntArray] | None = None
 
     def run(self) -> CheckedMesh:
         """Take all steps."""
         self.drop_degenerate_faces()
+        if self.is_manifold():
+            return self.finish()
         self.pair_halfedges()
         self.orient()
         self.split_fans()
@@ -133,7 +146,8 @@ class _Check:
 
     def drop_degenerate_faces(self) -> None:
         """Refuse or drop faces that use a vertex twice; drop faces given twice in a repair."""
-        bad = (self.faces == self.faces[:, NEXT]).any(axis=1)
+        one, two, three = self.faces.T
+        bad = (one == two) | (two == three) | (three == one)
         if bad.any():
             where = np.flatnonzero(bad)
             if not self.repair:
@@ -150,6 +164,14 @@ class _Check:
                 keep[first] = True
                 self.notes.append(f"Dropped {plural(int((~keep).sum()), 'face')} given twice.")
                 self._keep(keep)
+
+    def is_manifold(self) -> bool:
+        """Whether the faces are one as they stand, as most are: then there is nothing to do."""
+        *pairing, is_plain = pair_sides(self.faces, len(self.vertices))
+        if not is_plain or not has_one_fan_each(self.faces, len(self.vertices), *pairing[1:]):
+            return False
+        self.pairing = (pairing[0], pairing[1], pairing[2])
+        return True
 
     def pair_halfedges(self) -> None:
         """Find the pairs of half-edges (k, 2) that are glued; edges of three or more faces are not."""
@@ -245,4 +267,6 @@ class _Check:
     def finish(self) -> CheckedMesh:
         """Return the result."""
         mesh = TriangleMesh(self.vertices[self.vertex_origin], self.faces)
+        if self.pairing is not None:
+            mesh.__dict__["_pairing"] = self.pairing  # the mesh's own, which it need not find again
         return CheckedMesh(mesh, self.vertex_origin, self.face_origin, self.is_turned, tuple(self.notes))

@@ -116,28 +116,61 @@ def _close_gaps(
     jumps along lines where fronts have met; k iterations spread a jump over about k triangles. SciPy's would divide by
     zero where no gap is left, as on small charts.
     """
-    squared = sides.real**2 + sides.imag**2
-    weight = 1 / np.maximum(squared, NO_LENGTH**2 * squared.max())
-    ends = corner.reshape(-1, 3)
-    diagonal = np.bincount(ends[:, [1, 2, 0]].ravel(), weight, len(points))
-    diagonal += np.bincount(ends[:, [2, 0, 1]].ravel(), weight, len(points))
+    weight, diagonal = weigh_sides(corner, sides, NO_LENGTH, len(points))
     damping = np.divide(1.0, diagonal, out=np.zeros(len(points)), where=~pinned & (diagonal > 0))
     residual, pull = np.empty_like(points), np.empty_like(points)
     gap_forces(corner, sides, weight, frame, points, residual)
     shift = np.zeros_like(points)
     direction = damping * residual
-    product = np.vdot(residual, direction).real
+    product = float(np.vdot(residual, direction).real)
     for _ in range(SWEEPS):
         if product == 0:
             break
         apply_stiffness(corner, weight, direction, pull)
-        length = product / np.vdot(direction, pull).real
-        shift += length * direction
-        residual -= length * pull
-        damped = damping * residual
-        product, before = np.vdot(residual, damped).real, product
-        direction = damped + product / before * direction
+        product = take_step(product, damping, pull, direction, shift, residual)
     points += shift
+
+
+@compiled
+def weigh_sides(
+    corner: IntArray, sides: ComplexArray, no_length: float, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return (3m,) one over the squared length of each side, and (count,) the sum of these at each point.
+
+    no_length: part of the longest side below which one counts as if it were that long.
+    """
+    longest, weight, diagonal = 0.0, np.empty(len(sides)), np.zeros(count)
+    for h in range(len(sides)):
+        weight[h] = sides[h].real ** 2 + sides[h].imag ** 2
+        longest = max(longest, weight[h])
+    for h in range(len(sides)):
+        weight[h] = 1.0 / max(weight[h], no_length**2 * longest)
+        diagonal[corner[h - h % 3 + (h + 1) % 3]] += weight[h]
+        diagonal[corner[h - h % 3 + (h + 2) % 3]] += weight[h]
+    return weight, diagonal
+
+
+@compiled
+def take_step(
+    product: float,
+    damping: FloatArray,
+    pull: ComplexArray,
+    direction: ComplexArray,
+    shift: ComplexArray,
+    residual: ComplexArray,
+) -> float:
+    """Take a step of conjugate gradients, in place; return the product of residual and its damped self after it."""
+    slope = 0.0
+    for v in range(len(pull)):
+        slope += direction[v].real * pull[v].real + direction[v].imag * pull[v].imag
+    length, after = product / slope, 0.0
+    for v in range(len(pull)):
+        shift[v] += length * direction[v]
+        residual[v] -= length * pull[v]
+        after += damping[v] * (residual[v].real ** 2 + residual[v].imag ** 2)
+    for v in range(len(pull)):
+        direction[v] = damping[v] * residual[v] + after / product * direction[v]
+    return after
 
 
 @compiled
@@ -251,9 +284,10 @@ def gap_forces(
 def apply_stiffness(corner: IntArray, weight: FloatArray, shift: ComplexArray, force: ComplexArray) -> None:
     """Fill the force at each vertex by which springs along the sides resist a shift of the vertices."""
     force[:] = 0.0
-    for h in range(len(weight)):
-        start = corner[h - h % 3 + (h + 1) % 3]
-        end = corner[h - h % 3 + (h + 2) % 3]
-        pull = weight[h] * (shift[end] - shift[start])
-        force[end] += pull
-        force[start] -= pull
+    for h in range(0, len(weight), 3):
+        i, j, k = corner[h], corner[h + 1], corner[h + 2]
+        a, b, c = shift[i], shift[j], shift[k]
+        one, two, three = weight[h] * (c - b), weight[h + 1] * (a - c), weight[h + 2] * (b - a)
+        force[i] += two - three
+        force[j] += three - one
+        force[k] += one - two

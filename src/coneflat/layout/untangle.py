@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
+from ..compiled import compiled
 from ..geometry.planar import heights, signed_angles
 from ..geometry.straight import FlatTriangles
 from .patches import DEGENERATE, Patches
@@ -82,6 +83,8 @@ def untangle(
         V. Garanzha et al., "Foldover-free maps in 50 lines of code", 2021: an energy that grows without
         bound as a triangle loses its area, with a regularisation that makes it finite beyond.
     """
+    if whole is None and not are_low(flat.sides, DEGENERATE):
+        return Untangled(flat, np.empty(0, dtype=np.int64), 0.0, np.empty(0, dtype=np.int64), 0)
     state = _Untangling(flat, faces, angles, on_boundary, whole)
     for stay, sizes in (
         (pinned | on_seam | on_boundary, RINGS_BESIDE_SEAMS),
@@ -253,3 +256,16 @@ def _wanted_shapes(sides: ComplexArray, least: float) -> ComplexArray:
     wanted[f, (longest + 1) % 3] = base * (apex - 1)
     wanted[f, (longest + 2) % 3] = -base * apex
     return wanted
+
+
+@compiled
+def are_low(sides: ComplexArray, least: float) -> bool:
+    """Return whether any triangle with sides (3m,) is not higher than a share of its longest side, or upside down."""
+    for base in range(0, len(sides), 3):
+        doubled = sides[base].real * sides[base + 1].imag - sides[base].imag * sides[base + 1].real
+        longest = 0.0
+        for h in range(base, base + 3):
+            longest = max(longest, sides[h].real ** 2 + sides[h].imag ** 2)
+        if not doubled > least * longest:
+            return True
+    return False

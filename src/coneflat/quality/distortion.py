@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +13,7 @@ from ..compiled import compiled
 from ..errors import ArrayShapeError
 from ..geometry.charts import both_sides, joined_edges, label_charts
 from ..geometry.lengths import check_lengths
-from ..geometry.overlap import Overlaps, find_overlaps
+from ..geometry.overlap import Overlaps, overlaps_of_mesh
 from ..geometry.straight import place_triangles
 from ..mesh import TriangleMesh
 from ..threads import meanwhile
@@ -118,14 +117,21 @@ def measure(
         LengthError: the lengths are no metric.
     """
     _check_shapes(mesh, corner_uv, prescribed)
-    find = partial(find_overlaps, corner_uv) if overlaps is None else lambda: overlaps
-    with meanwhile(find, len(corner_uv)) as finding:
+
+    def look_around() -> tuple[Overlaps, float | None]:
+        """Return the overlaps, and the largest error of the angles around a vertex."""
+        found = overlaps_of_mesh(mesh.edge_halfedges, corner_uv) if overlaps is None else overlaps
+        if prescribed is None:
+            return found, None
+        error = angle_sum_errors(mesh, corner_uv, prescribed)[0]
+        return found, float(np.nanmax(np.abs(error), initial=0.0))
+
+    with meanwhile(look_around, len(corner_uv)) as looking:
         own = None if lengths is None else check_lengths(mesh, lengths, flat=True)
         measured = measure_map(mesh, corner_uv, curvature_error, cones, own)
-        if prescribed is not None:
-            error = angle_sum_errors(mesh, corner_uv, prescribed)[0]
-            measured = replace(measured, angle_sum_error=float(np.nanmax(np.abs(error), initial=0.0)))
-        found = finding.result()
+        found, error = looking.result()
+    if error is not None:
+        measured = replace(measured, angle_sum_error=error)
     return replace(measured, overlap=found.fraction, overlapping_pairs=len(found.pairs))
 
 
@@ -261,16 +267,22 @@ def _mean(values: FloatArray, weights: FloatArray) -> float:
 
 
 def _spread(log_scale: FloatArray, weights: FloatArray) -> float:
-    return float(np.exp(quantile(log_scale, weights, 0.95) - quantile(log_scale, weights, 0.05)))
+    low, high = quantiles(log_scale, weights, 0.05, 0.95)
+    return float(np.exp(high - low))
 
 
 def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
     """Return the value below which lies a fraction of the weight; NaN of nothing."""
+    return quantiles(values, weights, fraction)[0]
+
+
+def quantiles(values: FloatArray, weights: FloatArray, *fractions: float) -> list[float]:
+    """Return the values below which lie fractions of the weight; NaN of nothing."""
     if not len(values):
-        return float("nan")
+        return [float("nan")] * len(fractions)
     order = np.argsort(values)
     cumulated = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(cumulated, fraction * cumulated[-1])])
+    return [float(values[order[np.searchsorted(cumulated, part * cumulated[-1])]]) for part in fractions]
 
 
 def _drawn(lengths: FloatArray) -> tuple[FloatArray, IntArray]:

@@ -12,6 +12,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..atlas import part_touching
 from ..atlas.arrange import arrange_charts
+from ..atlas.chart_seams import numbered
 from ..atlas.mirrored import ChartMirrors, mirrors_of
 from ..geometry.planar import sides_between
 from ..input.numbering import result_numbering, turn_corners
@@ -134,9 +135,10 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     numbering = _number_vertices(prepared, laid_out)
     triangles = _sort_triangles(prepared, laid_out, numbering)
     corners_in_space = numbering.positions[triangles.faces]
+    mesh = _known_or_new(checked.mesh, np.ldexp(numbering.positions, checked.exponent), triangles.faces)
     with stages("pack"):
         mirrors = [mirrors_of(one) for one in laid_out]
-        layout = _pack(laid_out, mirrors, triangles, corners_in_space, options)
+        layout = _pack(laid_out, mirrors, triangles, mesh, corners_in_space, options)
     source, face_corners = _polygons(prepared, laid_out, numbering, triangles)
     if face_corners is not None and source is not None:
         polygons = Polygons(source.offsets, face_corners)
@@ -146,9 +148,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     curvature = _curvature(prepared, laid_out, numbering, options)
     cones = numbering.renumber([one.cones for one in laid_out])
     with stages("measure"):
-        layout, distortion = _measure(
-            prepared, laid_out, numbering, triangles, layout, curvature, cones, options
-        )
+        layout, distortion = _measure(prepared, laid_out, mesh, layout, curvature, cones, options)
         rotations = _rotations(laid_out, layout.uv[layout.own], options)
     result = Flattening(
         vertices=numbering.positions,
@@ -258,6 +258,7 @@ def _pack(
     laid_out: Sequence[LaidOut],
     mirrors: Sequence[ChartMirrors],
     triangles: _Triangles,
+    mesh: TriangleMesh,
     corners_in_space: FloatArray,
     options: Options,
 ) -> _Layout:
@@ -265,8 +266,9 @@ def _pack(
     points, own, chart, component, lies_on = _all_charts(laid_out)
     corners = own[triangles.order]
     # What lies on other points is not packed.
-    below = (lies_on[corners] == corners).all(axis=1)
-    of_all, of_below = np.unique(chart[triangles.order][below], return_inverse=True)
+    is_whole = np.array_equal(lies_on, np.arange(len(lies_on)))
+    below = slice(None) if is_whole else (lies_on[corners] == corners).all(axis=1)
+    of_all, of_below = numbered(chart[triangles.order][below], int(chart.max()) + 1)
     packed = arrange_charts(
         points[corners[below]],
         of_below,
@@ -277,11 +279,12 @@ def _pack(
         tiles=options.tiles,
         up=options.up,
         quantum=options.quantise,
-        mirrors=mirrors if below.all() else (),
+        mirrors=mirrors if is_whole else (),
+        edge_halfedges=mesh.edge_halfedges if is_whole else None,
     )
     uv = np.empty_like(points)
     uv[corners[below]] = packed.corner_uv
-    if not below.all():
+    if not is_whole:
         uv = _laid_on(uv, lies_on, max(APART * _longest_side(packed.corner_uv), LEAST_APART))
     return _Layout(uv, corners, own, packed.scale, packed.efficiency)
 
@@ -300,18 +303,17 @@ def _curvature(
 def _measure(
     prepared: Prepared,
     laid_out: Sequence[LaidOut],
-    numbering: _Numbering,
-    triangles: _Triangles,
+    mesh: TriangleMesh,
     layout: _Layout,
     curvature: _Curvature,
     cones: IntArray,
     options: Options,
 ) -> tuple[_Layout, Distortion]:
     """Return the measures of a layout, and the layout, in which triangles of an atlas that only touch are apart."""
-    checked, residual = prepared.checked, curvature.residual
+    residual = curvature.residual
     measured = partial(
         measure,
-        _known_or_new(checked.mesh, np.ldexp(numbering.positions, checked.exponent), triangles.faces),
+        mesh,
         curvature_error=curvature_errors(residual[np.isfinite(residual)]),
         cones=cones,
         prescribed=curvature.prescribed,
@@ -348,9 +350,9 @@ def _prescribed(one: LaidOut, options: Options) -> FloatArray:
 
 
 def _known_or_new(known: TriangleMesh, positions: FloatArray, faces: IntArray) -> TriangleMesh:
-    """Return a mesh, the known one if it is that: its edges have been found."""
-    if np.array_equal(known.faces, faces) and np.array_equal(known.vertices, positions):
-        return known
+    """Return a mesh, with the edges of the known one if it is that: they have been found."""
+    if np.array_equal(known.faces, faces):
+        return known.moved_to(positions)
     return TriangleMesh(positions, faces)
 
 

@@ -13,12 +13,13 @@ from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import OptionError, SeamError
 from ..geometry.graph import MultiGraph
 from ..geometry.operators import at_safe_scale
-from ..geometry.ties import tie_key
+from ..geometry.ties import mesh_tie_key
 from ..mesh import TriangleMesh
 from ..text import plural
 from .improve import shorten
 from .key_paths import Fixed
 from .open_mesh import NOTHING, OpenMesh, Reach, Terminals
+from .shortest_paths import find_between
 from .straighten import BENDING, Straightener
 
 # Relative: on grids many paths are equally long, and rounding should not choose among them, lest the result
@@ -66,7 +67,7 @@ def find_seams(
     is_required &= ~mesh.is_boundary_edge
     is_forbidden[forbidden] = True
     _refuse(is_required & is_forbidden, "both required and forbidden as seams")
-    key = tie_key(mesh.vertices)
+    key = mesh_tie_key(mesh)
     costs = _checked(edge_costs, len(mesh.edges)) * (1 + TIE_BREAK * key[mesh.edges].sum(axis=1))
     for dear in (is_avoided, is_forbidden):
         if dear is not None and dear.any():
@@ -134,11 +135,10 @@ def connect_terminals(work: OpenMesh, terminals: Terminals) -> None:
     terminals at once, then a minimum spanning tree over the cheapest bridges between their regions.
     """
     reach = work.search(terminals, terminals.around, np.zeros(len(terminals.around)))
-    bridges = _bridges(work)
-    one, two = (_regions(work, terminals, reach, side) for side in (bridges, work.twin[bridges]))
-    between = one != two
-    bridges = bridges[between]
-    regions = MultiGraph(terminals.count, one[between], two[between], _costs_over(work, reach, bridges))
+    bridges, one, two = find_between(
+        work.mesh.edge_halfedges, work.cut, work.twin, work.tail, terminals.number, reach.origin
+    )
+    regions = MultiGraph(terminals.count, one, two, _costs_over(work, reach, bridges))
     _cut_over(work, bridges[regions.minimum_spanning_tree()], reach)
     work.forget(terminals, reach)
 
@@ -177,12 +177,6 @@ def _bridges(work: OpenMesh) -> IntArray:
     """Return a half-edge of each edge off the border."""
     halfedges = work.mesh.edge_halfedges[:, 0]
     return halfedges[~work.cut[halfedges]]
-
-
-def _regions(work: OpenMesh, terminals: Terminals, reach: Reach, halfedges: IntArray) -> IntArray:
-    """Return the terminal that is nearest to the vertex that each half-edge leaves."""
-    terminal = terminals.number[halfedges]
-    return np.where(terminal < 0, reach.origin[work.tail[halfedges]], terminal)
 
 
 def _costs_over(work: OpenMesh, reach: Reach, halfedges: IntArray) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..geometry.intrinsic import halfedge_twins
-from ..mesh import TriangleMesh, sort_by_counting
+from ..mesh import TriangleMesh
 
 NOTHING = np.empty(0, dtype=np.int64)
 NO_COSTS = np.empty(0)
@@ -82,17 +82,16 @@ class OpenMesh:
     """
 
     def __init__(self, mesh: TriangleMesh, edge_costs: FloatArray, is_border: BoolArray) -> None:
+        from .shortest_paths import sort_slots
+
         n, sides = len(mesh.vertices), 3 * len(mesh.faces)
         self.mesh, self.twin, self.tail = mesh, halfedge_twins(mesh), mesh.tails
         self.cost, self.cut = edge_costs[mesh.halfedge_edges], is_border[mesh.halfedge_edges]
         self.height = np.zeros(n)
         self.effort = 0
-        glued = np.flatnonzero(self.twin >= 0)
-        self.slots = glued[sort_by_counting(self.tail[glued], n)]
-        starts, count = np.zeros(n + 1, dtype=np.int64), len(glued)
-        np.cumsum(np.bincount(self.tail[glued], minlength=n), out=starts[1:])
-        self._slot_of = np.empty(sides, dtype=np.int64)
-        self._slot_of[self.slots] = np.arange(count)
+        starts, count = np.zeros(n + 1, dtype=np.int64), int(np.count_nonzero(self.twin >= 0))
+        self.slots, self._slot_of = np.empty(count, dtype=np.int64), np.empty(sides, dtype=np.int64)
+        sort_slots(self.twin, self.tail, starts, self.slots, self._slot_of)
         self._enters = np.empty(count, dtype=np.int64)
         self._graph = starts, self.tail[self.twin[self.slots]], self.cost[self.slots], self._enters
         self._leaving = np.empty(n, dtype=np.int64)

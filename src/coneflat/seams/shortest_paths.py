@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..compiled import compiled
 from ..geometry.graph import drop_first, push
@@ -136,3 +138,51 @@ def search(
                 origin[v] = source
                 size = push(keys, items, size, e + height[v], v)
     return count
+
+
+@compiled
+def find_between(
+    edge_halfedges: IntArray,
+    cut: BoolArray,
+    twin: IntArray,
+    tail: IntArray,
+    number: IntArray,
+    origin: IntArray,
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return a half-edge of each edge off the border between the regions of two terminals, and these, (k,) each.
+
+    number: (3m,) the terminal that each half-edge leaves, -1 if there is none: then it is in the region of `origin`, of
+    the vertex (n,) that it leaves.
+    """
+    found = np.empty((3, len(edge_halfedges)), np.int64)
+    count = 0
+    for e in range(len(edge_halfedges)):
+        h = edge_halfedges[e, 0]
+        if cut[h]:
+            continue
+        t = twin[h]
+        one = number[h] if number[h] >= 0 else origin[tail[h]]
+        two = number[t] if number[t] >= 0 else origin[tail[t]]
+        if one != two:
+            found[0, count], found[1, count], found[2, count] = h, one, two
+            count += 1
+    return found[0, :count].copy(), found[1, :count].copy(), found[2, :count].copy()
+
+
+@compiled
+def sort_slots(twin: IntArray, tail: IntArray, starts: IntArray, slots: IntArray, slot_of: IntArray) -> None:
+    """Sort the half-edges that have a twin by the vertex that they leave, (n + 1,) zeros at its start on entry.
+
+    slots: filled: the half-edge of each slot. slot_of: (3m,) filled: the slot of each half-edge that has one.
+    """
+    for h in range(len(twin)):
+        if twin[h] >= 0:
+            starts[tail[h] + 1] += 1
+    for v in range(len(starts) - 1):
+        starts[v + 1] += starts[v]
+    place = starts[:-1].copy()
+    for h in range(len(twin)):
+        if twin[h] >= 0:
+            slot_of[h] = place[tail[h]]
+            slots[slot_of[h]] = h
+            place[tail[h]] += 1

@@ -210,21 +210,25 @@ def _order_of_aggregates(part: csr_matrix, order: IntArray) -> IntArray:
 
 def representatives(basis: csr_matrix, fitness: FloatArray) -> IntArray:
     """Return for each coarse function the vertex where it is largest, times the fitness, without repetitions."""
-    columns = basis.tocsc()
-    first = first_of_largest(columns.indptr, columns.data * fitness[columns.indices])
-    return np.unique(columns.indices[first[first >= 0]]).astype(np.int64)
+    first = rows_of_largest(basis.indptr, basis.indices, basis.data, np.asarray(fitness), basis.shape[1])
+    return np.unique(first[first >= 0])
 
 
 @compiled
-def first_of_largest(starts: IntArray, values: FloatArray) -> IntArray:
-    """Return the first of the largest positive values, but for ties, of each run that begins at a start; -1 if none."""
-    first = np.full(len(starts) - 1, -1)
-    for run in range(len(first)):
-        largest = 0.0
-        for at in range(starts[run], starts[run + 1]):
-            largest = max(largest, values[at])
-        for at in range(starts[run], starts[run + 1]):
-            if values[at] > 0.0 and values[at] >= largest * (1 - TIE):
-                first[run] = at
-                break
+def rows_of_largest(
+    starts: IntArray, columns: IntArray, values: FloatArray, factors: FloatArray, count: int
+) -> IntArray:
+    """Return the row with the largest positive value of each of `count` columns, the first but for ties; -1 if none.
+
+    starts, columns, values: a matrix by rows. factors: one for each row.
+    """
+    largest, first = np.zeros(count), np.full(count, -1)
+    for row in range(len(starts) - 1):
+        for at in range(starts[row], starts[row + 1]):
+            largest[columns[at]] = max(largest[columns[at]], values[at] * factors[row])
+    for row in range(len(starts) - 1):
+        for at in range(starts[row], starts[row + 1]):
+            column, value = columns[at], values[at] * factors[row]
+            if first[column] < 0 and value > 0.0 and value >= largest[column] * (1 - TIE):
+                first[column] = row
     return first

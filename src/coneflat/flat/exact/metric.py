@@ -17,6 +17,7 @@ from ...mesh import TriangleMesh
 from ...text import list_some, plural
 from .newton import ConformalProblem, State, find_scale
 from .preconditioner import Inverse
+from .settle import settled
 
 # How far, in radians, prescribed curvatures may miss Gauss-Bonnet; decimals typed by hand are good to more.
 SUM_TOLERANCE = 1e-8
@@ -150,7 +151,8 @@ def exact_metric(
         else:
             problem = kind(triangulation, flat_turn, target, fixed, pinned, preconditioner)
         euclidean = problem.prepare(delaunay, None if known is None else known[1])
-        state, steps = find_scale(problem, first[original], tolerance, max_steps)
+        settle = settled if kind is ConformalProblem else None
+        state, steps = find_scale(problem, first[original], tolerance, max_steps, settle)
         return problem, state, original, euclidean, steps
 
     problem, state, original, euclidean, steps = solved_from(log_scale)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -119,6 +120,11 @@ class ConformalProblem:
         """Flip to Delaunay in the scaled metric, from some half-edges; return the half-edges flipped."""
         return make_delaunay(self.triangulation, log_scale, suspects=suspects)
 
+    def record(self, flipped: IntArray) -> None:
+        """Keep in mind that half-edges were flipped."""
+        self.records.append(flipped)
+        self._pattern = None
+
     def evaluate(self, log_scale: FloatArray) -> State:
         """Flip to Delaunay in the scaled metric and return the curvature there."""
         sums = np.empty(len(log_scale))
@@ -130,8 +136,7 @@ class ConformalProblem:
         if len(suspects):
             flipped = self.flip(log_scale, suspects)
             if len(flipped):
-                self.records.append(flipped)
-                self._pattern = None
+                self.record(flipped)
                 broken = self.sum_angles(log_scale, sums, cots)
         curvature = self.flat_turn - sums
         residual = np.where(self.fixed, 0.0, self.target - curvature)
@@ -181,15 +186,24 @@ class ConformalProblem:
 
 
 def find_scale(
-    problem: ConformalProblem, log_scale: FloatArray, tolerance: float, max_steps: int
+    problem: ConformalProblem,
+    log_scale: FloatArray,
+    tolerance: float,
+    max_steps: int,
+    settle: Callable[[ConformalProblem, State], FloatArray | None] | None = None,
 ) -> tuple[State, int]:
     """Return the state with the least residual that Newton's method reaches, and the number of steps.
 
-    The search starts from a given log scale; on a bounded surface from none, where that breaks triangles.
+    The search starts from a given log scale; on a bounded surface from none, where that breaks triangles. `settle`
+    returns a better one for a state, if it can.
     """
     start = problem.evaluate(log_scale)
     if not start.is_admissible:
         start = problem.evaluate(np.where(problem.fixed, log_scale, 0.0))
+    better = None if settle is None else settle(problem, start)
+    if better is not None:
+        found = problem.evaluate(better)
+        start = found if found.is_admissible else problem.evaluate(start.place)
     halvings = HALVINGS_BOUNDED if problem.is_bounded else HALVINGS
     best, steps = minimise(
         problem, start, Limits(tolerance, max_steps, GOAL, halvings, largest_step=LARGEST_STEP)

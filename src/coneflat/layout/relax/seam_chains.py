@@ -8,7 +8,8 @@ import numpy as np
 
 from ..._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import SeamError
-from ...mesh import NEXT, PREVIOUS, TriangleMesh, label_components
+from ...geometry.charts import both_sides, point_seams
+from ...mesh import TriangleMesh, label_components
 
 # Radians by which the rotation between the sides of a seam may change at a vertex without it being a cone. Cones have
 # curvatures of 1e-4 at least; lengths of edges of the plane are good to 1e-9 where they are shortest.
@@ -62,13 +63,10 @@ def find_chains(
     Raises:
         SeamError: the sides of a seam are no rigid copies of each other.
     """
-    starts, ends = corners[:, NEXT].ravel(), corners[:, PREVIOUS].ravel()
-    inner = np.flatnonzero(~mesh.is_boundary_edge)
-    h, t = mesh.edge_halfedges[inner].T
-    is_seam = (starts[h] != ends[t]) | (ends[h] != starts[t])
-    edges, h, t = inner[is_seam], h[is_seam], t[is_seam]
+    edges = point_seams(mesh, corners)
+    h, t = mesh.edge_halfedges[edges].T
     vertices = np.stack([mesh.tails[h], mesh.heads[h]], axis=1)
-    sides = np.stack([np.stack([starts[h], ends[h]], axis=1), np.stack([ends[t], starts[t]], axis=1)])
+    sides = np.stack(both_sides(mesh, edges, corners))
     one, two = (points[side[:, 1]] - points[side[:, 0]] for side in sides)
     if not quarter_turns:
         _check_rigid(edges, vertices, one, two)

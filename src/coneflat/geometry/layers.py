@@ -1,0 +1,173 @@
+"""Which triangles in the plane may overlap others: those where cells of a grid are covered twice, or by an outline.
+
+How many triangles cover a point is the winding number of their sides about it, and sides that run there and back
+between the same points cancel. In a cell of the grid that none of the others meets it is the same everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from ..compiled import compiled
+
+Int32Array: TypeAlias = NDArray[np.int32]
+
+# Cells along a side of the grid for the root of the number of triangles, and at most.
+FINENESS, MOST_CELLS = 1.5, 2048
+# Fewer triangles are compared as they are; and so they are where sides cross more rows of cells, in the mean.
+FEW, MOST_ROWS = 2000, 20
+
+
+def open_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray) -> BoolArray:
+    """Return (3m,) which half-edges have no other that runs back between the very same points of the plane.
+
+    Args:
+        edge_halfedges: (e, 2) the half-edges of each edge, see `TriangleMesh`.
+        corners: (m, 3, 2) of the triangles.
+        group: (m,) only sides of the same group, from 0 on, cancel; below, all are open.
+    """
+    is_open = np.ones(3 * len(corners), dtype=bool)
+    close_sides(edge_halfedges, np.ascontiguousarray(corners), group, is_open)
+    return is_open
+
+
+def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> IntArray:
+    """Return the triangles with area that may overlap others: all that do are among them.
+
+    Args:
+        corners: (m, 3, 2) of the triangles.
+        signs: (m,) 1 counterclockwise, -1 clockwise, 0 without area.
+        is_open: (3m,) half-edges, all but those that cancel in pairs; see `open_sides`.
+    """
+    every = np.flatnonzero(signs)
+    if len(every) < FEW:
+        return every
+    sides = np.flatnonzero(is_open & np.repeat(signs != 0, 3))
+    face, corner = sides // 3, sides % 3
+    ends = np.stack([corners[face, (corner + 1) % 3], corners[face, (corner + 2) % 3]], axis=1)
+    ends = np.where((signs[face] < 0)[:, None, None], ends[:, ::-1], ends)
+    flat = np.ascontiguousarray(corners).reshape(-1, 6)
+    low, high = find_extent(flat)
+    count = min(int(FINENESS * math.sqrt(len(corners))), MOST_CELLS)
+    extent = float((high - low).max())
+    # Half a cell wider than needed, so that the last of the points is in the last cell.
+    scale = (count - 0.5) / extent if extent > 0 else 0.0
+    if not 0 < scale < np.inf or np.abs(np.diff(ends[..., 1])).sum() * scale > MOST_ROWS * len(every):
+        return every
+    grid = Grid(float(low[0]), float(low[1]), scale)
+    marks, steps = np.zeros((2, count + 1, count + 1), dtype=np.int32)
+    trace_sides(ends.reshape(-1, 4), *grid, marks, steps)
+    sum_cells(marks, steps)
+    return np.flatnonzero(find_suspected(flat, signs, *grid, marks))
+
+
+class Grid(NamedTuple):
+    """Square cells from a corner on, so many to a unit of length."""
+
+    x: float
+    y: float
+    scale: float
+
+
+@compiled
+def close_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray, is_open: BoolArray) -> None:
+    """Write False for half-edges that run back between the same points as another of their group; see `open_sides`."""
+    for e in range(len(edge_halfedges)):
+        h, t = edge_halfedges[e]
+        if t < 0:
+            continue
+        f, g = h // 3, t // 3
+        start, end, other_start, other_end = (h + 1) % 3, (h + 2) % 3, (t + 1) % 3, (t + 2) % 3
+        if (
+            group[f] == group[g] >= 0
+            and corners[f, start, 0] == corners[g, other_end, 0]
+            and corners[f, start, 1] == corners[g, other_end, 1]
+            and corners[f, end, 0] == corners[g, other_start, 0]
+            and corners[f, end, 1] == corners[g, other_start, 1]
+        ):
+            is_open[h] = is_open[t] = False
+
+
+@compiled
+def find_extent(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (2,) the least and the largest coordinates of triangles (m, 6)."""
+    low, high = corners[0, :2].copy(), corners[0, :2].copy()
+    for t in range(len(corners)):
+        for i in range(6):
+            low[i % 2] = min(low[i % 2], corners[t, i])
+            high[i % 2] = max(high[i % 2], corners[t, i])
+    return low, high
+
+
+@compiled
+def trace_sides(
+    sides: FloatArray, x: float, y: float, scale: float, marks: Int32Array, steps: Int32Array
+) -> None:
+    """Mark the cells in the boxes around sides (k, 4), and count where sides cross the middles of rows.
+
+    marks, steps: (c + 1, c + 1) zeros, by rows; differences from cell to cell on return, see `sum_cells`. The column in
+    which a crossing is may be off by rounding, but then both are among the side's own, which are marked.
+    """
+    for i in range(len(sides)):
+        x0, y0, x1, y1 = sides[i]
+        left, right = int((min(x0, x1) - x) * scale), int((max(x0, x1) - x) * scale)
+        bottom, top = int((min(y0, y1) - y) * scale), int((max(y0, y1) - y) * scale)
+        marks[bottom, left] += 1
+        marks[bottom, right + 1] -= 1
+        marks[top + 1, left] -= 1
+        marks[top + 1, right + 1] += 1
+        for row in range(bottom, top + 1):
+            middle = y + (row + 0.5) / scale
+            if (y0 <= middle) != (y1 <= middle):
+                crossing = x0 + (middle - y0) / (y1 - y0) * (x1 - x0)
+                column = min(max(int((crossing - x) * scale), left), right)
+                # Right of a side that runs down is what it winds around.
+                steps[row, column + 1] += 1 if y1 < y0 else -1
+
+
+@compiled
+def sum_cells(marks: Int32Array, steps: Int32Array) -> None:
+    """Sum the differences; on return `marks` has how many cells left of and below each one are suspected.
+
+    Those are: a side is in them, or they are covered twice.
+    """
+    rows, columns = marks.shape
+    for row in range(rows):
+        marked, layers = 0, 0
+        for column in range(columns):
+            marked += marks[row, column]
+            layers += steps[row, column]
+            marks[row, column] = marked + (marks[row - 1, column] if row else 0)
+            steps[row, column] = layers
+    for row in range(rows):
+        along = 0
+        for column in range(columns):
+            along += 1 if marks[row, column] > 0 or abs(steps[row, column]) > 1 else 0
+            # From here on the row is summed up; the next one has its own marks yet.
+            marks[row, column] = along + (marks[row - 1, column] if row else 0)
+
+
+@compiled
+def find_suspected(
+    corners: FloatArray, signs: IntArray, x: float, y: float, scale: float, sums: Int32Array
+) -> BoolArray:
+    """Return (m,) which triangles (m, 6) with area have suspected cells in the boxes around them."""
+    found = np.zeros(len(corners), np.bool_)
+    for t in range(len(corners)):
+        c = corners[t]
+        left, right = int((min(c[0], c[2], c[4]) - x) * scale), int((max(c[0], c[2], c[4]) - x) * scale)
+        bottom, top = int((min(c[1], c[3], c[5]) - y) * scale), int((max(c[1], c[3], c[5]) - y) * scale)
+        inside = sums[top, right]
+        if left > 0:
+            inside -= sums[top, left - 1]
+        if bottom > 0:
+            inside -= sums[bottom - 1, right]
+        if left > 0 and bottom > 0:
+            inside += sums[bottom - 1, left - 1]
+        found[t] = signs[t] != 0 and inside > 0
+    return found

@@ -1,0 +1,75 @@
+"""On which side of a line a point lies, without rounding.
+
+A filter decides in nearly all cases; the others are summed exactly (J. R. Shewchuk, "Adaptive precision floating-point
+arithmetic and fast robust geometric predicates", 1997). Coordinates must be 0 or have magnitudes from 2^-420 to 2^420
+for this, so that nothing over- or underflows.
+"""
+
+from __future__ import annotations
+
+from .._arrays import FloatArray, IntArray
+from ..compiled import compiled
+
+# Rounding of the determinant, relative to the sum of the magnitudes of its two products (Shewchuk, Section 4.3).
+FILTER = (3 + 16 * 2.0**-53) * 2.0**-53
+# Multiplied by this, a number splits into two halves of 26 bits.
+SPLITTER = 2.0**27 + 1
+
+
+@compiled
+def orientation(px: float, py: float, qx: float, qy: float, rx: float, ry: float, parts: FloatArray) -> float:
+    """Return a number that is positive if r lies left of the line from p to q, negative right of it, 0 on it.
+
+    parts: (12,) room for exact sums.
+    """
+    left = (px - rx) * (qy - ry)
+    right = (py - ry) * (qx - rx)
+    if abs(left - right) >= FILTER * (abs(left) + abs(right)):
+        return left - right
+    for count in (0, 4, 8):
+        _add_product(parts, count, px, qy)
+        _add_product(parts, count + 2, -py, qx)
+        px, py, qx, qy, rx, ry = qx, qy, rx, ry, px, py
+    largest = 11
+    while largest > 0 and parts[largest] == 0:
+        largest -= 1
+    return parts[largest]
+
+
+@compiled
+def _add_product(parts: FloatArray, count: int, x: float, y: float) -> None:
+    """Add x y to a sum, without rounding (Dekker 1971).
+
+    parts: of the sum, the first `count` in use; they do not overlap and grow, so the last that is not 0 has the
+    sign of the sum.
+    """
+    scaled = SPLITTER * x
+    x_high = scaled - (scaled - x)
+    x_low = x - x_high
+    scaled = SPLITTER * y
+    y_high = scaled - (scaled - y)
+    y_low = y - y_high
+    product = x * y
+    error = x_low * y_low - (((product - x_high * y_high) - x_low * y_high) - x_high * y_low)
+    _add_term(parts, count, error)
+    _add_term(parts, count + 1, product)
+
+
+@compiled
+def _add_term(parts: FloatArray, count: int, term: float) -> None:
+    """Add a number to a sum, without rounding (Shewchuk, GROW-EXPANSION)."""
+    for i in range(count):
+        total = parts[i] + term
+        moved = total - parts[i]
+        parts[i] = (parts[i] - (total - moved)) + (term - moved)
+        term = total
+    parts[count] = term
+
+
+@compiled
+def fill_orientations(corners: FloatArray, parts: FloatArray, signs: IntArray) -> None:
+    """Fill the orientations (m,) of triangles (m, 6): 1 counterclockwise, -1 clockwise, 0 without area."""
+    for t in range(len(corners)):
+        c = corners[t]
+        turn = orientation(c[0], c[1], c[2], c[3], c[4], c[5], parts)
+        signs[t] = int(turn > 0) - int(turn < 0)
