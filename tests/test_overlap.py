@@ -12,7 +12,6 @@ from coneflat import errors
 from coneflat.atlas import overlap_regions, part_touching
 from coneflat.geometry import coverage
 from coneflat.geometry.overlap import fill_orientations, find_overlaps, snug_boxes
-from coneflat.mesh import TriangleMesh
 
 UNIT = [[0, 0], [1, 0], [0, 1]]
 ULP = 2.0**-53
