@@ -123,3 +123,22 @@ def test_the_laplacian_of_edges_glued_to_each_other():
 def test_a_laplacian_of_arrays_that_do_not_fit_is_refused(faces, cots, count, kind):
     with pytest.raises(kind):
         cotangent_laplacian(faces, cots, count)
+
+
+@pytest.mark.parametrize("function", [corner_angles, cotangents, double_areas, mollify])
+@pytest.mark.parametrize("lengths", [np.ones(3), np.ones((2, 2)), np.ones((2, 3, 3)), [["a"] * 3], 1.0])
+def test_lengths_that_are_no_sides_of_triangles_are_refused(function, lengths):
+    with pytest.raises(errors.ArrayShapeError):
+        function(lengths)
+
+
+@pytest.mark.parametrize("vertices", [np.ones((4, 2)), np.ones(12), [["a"] * 3] * 4])
+def test_vertices_that_are_no_points_in_space_have_no_edge_lengths(vertices):
+    with pytest.raises(errors.ArrayShapeError):
+        edge_lengths(vertices, np.array([[0, 1, 2]]))
+
+
+@pytest.mark.parametrize("faces", [[0, 1, 2], [[0, 1]], [[[0, 1, 2]]]])
+def test_faces_that_are_no_triangles_have_no_edge_lengths(faces):
+    with pytest.raises(errors.ArrayShapeError):
+        edge_lengths(np.ones((4, 3)), faces)

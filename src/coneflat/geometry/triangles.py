@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, as_floats
 from ..compiled import compiled
-from ..errors import DegenerateFaceError, FaceIndexError
+from ..errors import ArrayShapeError, DegenerateFaceError, FaceIndexError
 from ..mesh import NEXT, PREVIOUS
 from ..text import list_some, plural
 
@@ -21,11 +22,14 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return (m, 3) side lengths in model units; both sides of an edge get the same bits.
 
     Raises:
+        ArrayShapeError: vertices are not (n, 3), or faces not (m, 3).
         FaceIndexError: a face names a vertex that does not exist.
     """
     from ..mesh import measure_sides
 
-    points, triangles = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
+    points, triangles = as_triples("vertices", vertices), np.asarray(faces, dtype=np.int64)
+    if triangles.ndim != 2 or triangles.shape[1] != 3:
+        raise ArrayShapeError(f"faces must have the shape (m, 3), not {triangles.shape}")
     if triangles.size and not 0 <= triangles.min() <= triangles.max() < len(points):
         raise FaceIndexError(
             f"faces name vertices from {triangles.min()} to {triangles.max()}, but there are {len(points)}, from 0 on"
@@ -34,9 +38,17 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return lengths
 
 
+def as_triples(name: str, values: ArrayLike) -> FloatArray:
+    """Return numbers (m, 3) in one piece; compiled loops would read beyond others."""
+    array = as_floats(name, values)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ArrayShapeError(f"{name} must have the shape (m, 3), not {array.shape}")
+    return array
+
+
 def slacks(lengths: FloatArray) -> FloatArray:
     """Return (m, 3) b + c - a for every side a; negative where the triangle inequality is broken."""
-    lengths = np.ascontiguousarray(lengths, dtype=np.float64)
+    lengths = as_triples("lengths", lengths)
     slack = np.empty_like(lengths)
     fill_slacks(lengths, slack)
     return slack
@@ -49,7 +61,7 @@ def is_broken(lengths: FloatArray) -> BoolArray:
 
 def double_areas(lengths: FloatArray) -> FloatArray:
     """Return (m,) twice the area of each triangle; 0 where the triangle inequality is broken."""
-    lengths = np.ascontiguousarray(lengths, dtype=np.float64)
+    lengths = as_triples("lengths", lengths)
     areas = np.empty(len(lengths))
     fill_double_areas(lengths, areas)
     return areas
@@ -108,6 +120,7 @@ def mollify(
     Raises:
         DegenerateFaceError: with `strict`, or when the mesh as a whole has no area.
     """
+    lengths = as_triples("lengths", lengths)
     longest = np.maximum(np.maximum(lengths[:, 0], lengths[:, 1]), lengths[:, 2])
     areas, squares = double_areas(lengths), longest**2
     bad = np.flatnonzero(areas <= ZERO_AREA * squares)
