@@ -6,12 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..geometry.intrinsic import halfedge_twins
 from ..mesh import TriangleMesh
 
 NOTHING = np.empty(0, dtype=np.int64)
 NO_COSTS = np.empty(0)
+# What searches go through without end is kept in half of the memory, which is what they wait for.
+INDEX = np.int32
 # What a search takes for the distance of vertices on the border.
 ON_BORDER = -1.0
 
@@ -52,15 +54,15 @@ class Reach:
     """
 
     distance: FloatArray
-    before: IntArray
-    origin: IntArray
-    reached: IntArray
+    before: Int32Array
+    origin: Int32Array
+    reached: Int32Array
     count: int = 0
     arrival: FloatArray = field(default_factory=lambda: NO_COSTS)
     last: IntArray = field(default_factory=lambda: NOTHING)
 
     @property
-    def vertices(self) -> IntArray:
+    def vertices(self) -> Int32Array:
         """The vertices reached off the border."""
         return self.reached[: self.count]
 
@@ -80,7 +82,7 @@ class Slots:
     twin: IntArray
     starts: IntArray
     halfedges: IntArray
-    heads: IntArray
+    heads: Int32Array
     of_halfedges: IntArray
     leaving: IntArray
 
@@ -103,7 +105,7 @@ class Slots:
         sort_slots(twin, tail, starts, slots, slot_of)
         leaving = np.empty(n, dtype=np.int64)
         leaving[tail] = np.arange(sides)
-        return cls(twin, starts, slots, mesh.heads[slots], slot_of, leaving)
+        return cls(twin, starts, slots, mesh.heads[slots].astype(INDEX), slot_of, leaving)
 
 
 class OpenMesh:
@@ -127,13 +129,13 @@ class OpenMesh:
         self.height = np.zeros(n)
         self.effort = 0
         self.slots, self._slot_of, count = slots.halfedges, slots.of_halfedges, len(slots.halfedges)
-        self._enters = np.empty(count, dtype=np.int64)
+        self._enters = np.empty(count, dtype=INDEX)
         self._graph = slots.starts, slots.heads, self.cost[self.slots], self._enters
         self._leaving = slots.leaving
         self._number, self._around = np.full(sides, -1, dtype=np.int64), np.empty(sides, dtype=np.int64)
         self._labelled = NOTHING
         # A slot is put on the heap twice at most: as a seed, and for the vertex it leads to.
-        self.heap = np.empty(2 * count + n), np.empty(2 * count + n, dtype=np.int64)
+        self.heap = np.empty(2 * count + n), np.empty(2 * count + n, dtype=INDEX)
         self._spare: list[Reach] = []
 
     def label_terminals(self, points: IntArray) -> Terminals:
@@ -185,7 +187,7 @@ class OpenMesh:
 
     def _new_reach(self) -> Reach:
         n = len(self.height)
-        return Reach(np.full(n, np.inf), *np.empty((3, n), dtype=np.int64))
+        return Reach(np.full(n, np.inf), *np.empty((3, n), dtype=INDEX))
 
     def _run(
         self,
