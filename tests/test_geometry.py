@@ -106,3 +106,20 @@ def test_the_laplacian_of_edges_glued_to_each_other():
     cots = np.array([[0.5, 2.0, 3.0]])
     found = cotangent_laplacian(np.array([[0, 1, 1]]), cots, 2)
     np.testing.assert_allclose(found.toarray(), 2.5 * np.array([[1, -1], [-1, 1]]))
+
+
+@pytest.mark.parametrize(
+    ("faces", "cots", "count", "kind"),
+    [
+        ([[0, 1, 2], [1, 2, 3]], np.ones((2, 3)), 3, errors.FaceIndexError),
+        ([[0, 1, 2], [1, 2, -3]], np.ones((2, 3)), 4, errors.FaceIndexError),
+        ([[0, 1, 2], [1, 2, 3]], np.ones((1, 3)), 4, errors.ArrayShapeError),
+        ([[0, 1, 2], [1, 2, 3]], np.ones((2, 2)), 4, errors.ArrayShapeError),
+        ([[0, 1, 2], [1, 2, 3]], np.ones(6), 4, errors.ArrayShapeError),
+        ([[0, 1, 2], [1, 2, 3]], [["a"] * 3] * 2, 4, errors.ArrayShapeError),
+        (np.empty((0, 3)), np.empty((0, 3)), 4, errors.EmptyMeshError),
+    ],
+)
+def test_a_laplacian_of_arrays_that_do_not_fit_is_refused(faces, cots, count, kind):
+    with pytest.raises(kind):
+        cotangent_laplacian(faces, cots, count)

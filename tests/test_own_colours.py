@@ -194,3 +194,13 @@ def test_without_them_there_is_no_such_entry(viewed_page):
     text = viewed_page.read_text()
     head = json.loads(re.search(r"<script[^>]*application/json[^>]*>(.*?)</script>", text, re.S)[1])
     assert "own" not in head["scales"]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"color": {0: 1.0}}, {"color": 3}, {"show": np.zeros((2, 3))}, {"show": 7}]
+)
+def test_what_names_no_colours_is_refused(tmp_path, wrong):
+    result = coneflat.flatten(*shapes.sphere(1))
+    with pytest.raises(OptionError):
+        result.view(tmp_path / "page.html", **wrong)
+    assert not (tmp_path / "page.html").exists()

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from .._arrays import BoolArray, FloatArray, Int32Array, IntArray, unit_exponent
+from .._arrays import BoolArray, FloatArray, Int32Array, IntArray, as_faces, as_floats, unit_exponent
 from ..compiled import compiled
-from ..errors import OptionError
+from ..errors import ArrayShapeError, OptionError
 from .triangles import double_areas
 
 # Of the largest: weights below count as this. Without any, the norm would not tell apart what only lies there.
@@ -66,12 +66,22 @@ def cotangent_laplacian(faces: IntArray, cots: FloatArray, vertex_count: int) ->
     """Return the (n, n) positive semidefinite Laplacian, w_ij = (cot a + cot b) / 2.
 
     (L x)_i = sum_j w_ij (x_i - x_j); its kernel are the constants on each component.
+
+    Args:
+        faces: (m, 3) vertex indices.
+        cots: (m, 3) cotangents of the corner angles.
+        vertex_count: n.
+
+    Raises:
+        ArrayShapeError, EmptyMeshError, FaceIndexError: the arrays do not fit each other.
     """
+    triangles, given = as_faces(faces, vertex_count), as_floats("cots", cots)
+    if given.shape != triangles.shape:
+        raise ArrayShapeError(f"cots must have the shape {triangles.shape}, as the faces, not {given.shape}")
     starts = np.zeros(vertex_count + 1, dtype=np.int32)
-    rows = np.empty(6 * len(faces) + vertex_count, dtype=np.int32)
+    rows = np.empty(6 * len(triangles) + vertex_count, dtype=np.int32)
     values = np.empty(len(rows))
-    given = np.ascontiguousarray(faces, dtype=np.int64), np.ascontiguousarray(cots)
-    count = fill_laplacian(*given, starts, rows, values)
+    count = fill_laplacian(triangles, np.ascontiguousarray(given), starts, rows, values)
     shape = vertex_count, vertex_count
     return csc_matrix((values[:count].copy(), rows[:count].copy(), starts), shape=shape)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .._arrays import ComplexArray, FloatArray, IntArray
-from ..errors import ConvergenceError, GridError
+from ..errors import ConvergenceError, GridError, OptionError
 from ..geometry.planar import map_factors, sides_between, signed_angles, signed_double_areas
 from ..geometry.triangles import double_areas
 from ..layout.relax import Lines, PointConstraints, Relaxed, StretchEnergy, relax
@@ -45,7 +45,7 @@ def attempt(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None, 
         start = _displaced(layout, smooth, rounding, transitions, values)
         try:
             found = _relaxed(layout, start, transitions, values, energy)
-        except ConvergenceError as error:
+        except (ConvergenceError, OptionError) as error:
             tries, why = tries + 1, str(error)
             continue
         points = _snapped(found, transitions, values)

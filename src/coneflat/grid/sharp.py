@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .._arrays import ComplexArray, FloatArray, IntArray
-from ..errors import CurvatureError, GridError, MetricError, SeamError
+from ..errors import CurvatureError, GridError, MetricError, OptionError, SeamError
 from ..geometry import double_areas
 from ..geometry.planar import signed_double_areas
 from ..layout.relax import Lines, PointConstraints, StretchEnergy, relax
@@ -101,6 +101,7 @@ def glued(opened: Opened, lengths: FloatArray, loose: Loose) -> Loose:
 
     Raises:
         ConvergenceError: they cannot be without turning a triangle over, as far as is known.
+        GridError: sides and seams, each turned to the nearest axis, contradict each other.
     """
     mesh, whole = opened.mesh, np.concatenate([loose.cones, opened.nodes])
     chains = find_chains(mesh, loose.corners, loose.points, whole, quarter_turns=True)
@@ -113,15 +114,11 @@ def glued(opened: Opened, lengths: FloatArray, loose: Loose) -> Loose:
         quarter_turns=True,
         nodes=whole,
     )
-    found = relax(
-        mesh,
-        np.stack([loose.points.real, loose.points.imag], axis=1),
-        loose.corners,
-        StretchEnergy(STRETCH),
-        constraints,
-        lengths=lengths,
-        steps=STEPS,
-    )
+    points, energy = np.stack([loose.points.real, loose.points.imag], axis=1), StretchEnergy(STRETCH)
+    try:
+        found = relax(mesh, points, loose.corners, energy, constraints, lengths=lengths, steps=STEPS)
+    except OptionError as error:
+        raise GridError(f"sides and seams cannot all lie along the axes: {error}") from error
     return replace(loose, points=found.points[:, 0] + 1j * found.points[:, 1])
 
 

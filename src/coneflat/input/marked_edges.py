@@ -111,10 +111,14 @@ def edges_within(checked: CheckedMesh, vertices: Iterable[int], count: int) -> B
 def out_of_reach(mesh: TriangleMesh, is_forbidden: BoolArray) -> IntArray:
     """Return the vertices of a connected mesh to which no seam gets from most of the others, or from the boundary.
 
+    None where nothing may be cut at all: it is the seams, then, that cannot be had, and not the cones.
+
     is_forbidden: (m, 3) sides that are not cut.
     """
     barred = is_forbidden.ravel()[mesh.edge_halfedges[:, 0]] & ~mesh.is_boundary_edge
     ways = mesh.edges[~barred]
+    if not len(ways):
+        return np.empty(0, dtype=np.int64)
     number, label = label_components(len(mesh.vertices), ways[:, 0], ways[:, 1])
     # Of places that are equally large, one that does not depend on numbers.
     sizes = np.bincount(label, weights=1 + TIE_BREAK * tie_key(mesh.vertices), minlength=number)

@@ -40,6 +40,8 @@ def own_quantity(result: Flattening, name: str, archive: Path | None = None) -> 
         OptionError: there is no such property, or its numbers do not fit the mesh.
         MeshFileError: the file cannot be read.
     """
+    if not isinstance(name, str):
+        raise OptionError(f"color must be the name of a property, or of a file, not {shown(name)}")
     label, values = _named(result, name, archive)
     if values.dtype.kind not in "fiub" or values.ndim != 1:
         raise OptionError(

@@ -20,12 +20,12 @@ from ...files.atomic import as_path, atomic_write, check_target, known_ending
 from ...files.texture import read_picture
 from ...text import shown
 from ..own import own_quantity
+from ..quantity import Quantity
 from .content import content_of
 from .payload import Told, payload_of
 
 if TYPE_CHECKING:
     from ...result.flattening import Flattening
-    from ..quantity import Quantity
 
 SHOWS = ("checker", "picture", "charts", "qc", "area", "curvature", "flat", "plain")
 """What a page can show first."""
@@ -80,12 +80,12 @@ def page_of(
     """
     if show is None:
         show = "own" if color is not None else "checker" if texture is None else "picture"
-    if show not in SHOWS and (show != "own" or color is None):
-        raise OptionError(f"unknown show {show!r}: choose from {', '.join(SHOWS)}")
+    if not isinstance(show, str) or (show not in SHOWS and (show != "own" or color is None)):
+        raise OptionError(f"unknown show {shown(show)}: choose from {', '.join(SHOWS)}")
     picture = None if texture is None else read_picture(texture)
     if isinstance(most_triangles, bool) or not isinstance(most_triangles, (int, np.integer)):
         raise OptionError(f"most_triangles must be a whole number, not {shown(most_triangles)}")
-    own = own_quantity(result, color) if isinstance(color, str) else color
+    own = color if color is None or isinstance(color, Quantity) else own_quantity(result, color)
     content = content_of(result, most_triangles, own=own)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
