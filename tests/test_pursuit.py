@@ -8,6 +8,7 @@ from scipy.sparse import csr_matrix
 from coneflat import check_mesh, edge_lengths, read_mesh
 from coneflat.cones.sparse import ConeSearch, fit_curvatures
 from coneflat.cones.sparse.aggregation import coarse_basis
+from coneflat.cones.sparse.green import GreenOperator
 from coneflat.errors import CurvatureError, OptionError
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, double_areas
 from coneflat.geometry.operators import area_distortion
@@ -259,6 +260,20 @@ def test_long_thin_triangles_take_no_more_cones_than_needed(shared):
     found = pursue(model.vertices * [30, 1, 1], model.corners.reshape(-1, 3), distortion=0.2)
     assert found.distortion <= 0.2
     assert len(found.solution.cones) <= 16
+
+
+@pytest.mark.parametrize("shape", ["sphere", "torus", "hill", "annulus"])
+def test_the_laplacian_of_the_unknowns_is_that_of_the_mesh(shape):
+    laplacian, _, areas, is_boundary, _ = surface(*SHAPES[shape])
+    order = np.random.default_rng(2).permutation(len(areas))
+    operator = GreenOperator(laplacian, areas / areas.sum(), is_boundary, order)
+    free = order[~is_boundary[order]]
+    np.testing.assert_array_equal(operator.vertices, free)
+    np.testing.assert_array_equal(operator.laplacian.toarray(), laplacian.toarray()[free][:, free])
+    assert operator.laplacian.has_canonical_format
+    source = np.zeros(len(free))
+    source[3], source[-5] = 1.0, -1.0
+    np.testing.assert_allclose(operator.laplacian @ operator.solve(source), source, atol=1e-9)
 
 
 def test_scale_does_not_change_the_coarse_model():

@@ -21,6 +21,7 @@ from ..input.symmetry import Symmetry
 from ..mesh import TriangleMesh
 from ..options import Options
 from ..progress import Stages
+from ..seams.open_mesh import Slots
 from ..text import plural
 from ..threads import HUGE, meanwhile
 from . import ConeSolution, check_enough, check_feasible, cones_at, cones_with_curvature, greedy_cones
@@ -131,6 +132,13 @@ class Surface:
     def delaunay(self) -> tuple[IntrinsicTriangulation, IntArray]:
         """The intrinsic Delaunay triangulation, and the half-edges flipped for it."""
         return intrinsic_delaunay(self.mesh, self.lengths)
+
+    def get_ready(self, options: Options) -> None:
+        """Find what metric and cut will need of the mesh alone, unless it is huge: while cones are searched."""
+        if len(self.mesh.faces) <= HUGE:
+            Slots.of(self.mesh)
+            if options.method == "exact" and not options.refine:
+                _ = self.delaunay
 
 
 def _far_from_delaunay(mesh: TriangleMesh, cots: FloatArray) -> bool:
@@ -243,28 +251,36 @@ def _pursued(
     if only is not None:
         return only
     search = search_on(surface, constraints, options, stages)
+    with meanwhile(partial(surface.get_ready, options), len(mesh.faces)):
+        found = _searched(search, surface, constraints, options, turned, symmetry)
+    return replace(found, cones=found.cones[~mesh.is_boundary_vertex[found.cones]])
 
-    distortion, count = options.distortion, options.cone_count
+
+def _searched(
+    search: ConeSearch,
+    surface: Surface,
+    constraints: Constraints,
+    options: Options,
+    turned: Turned | None,
+    symmetry: Symmetry | None,
+) -> ConeSolution:
+    """Return what a search finds; see `_pursued`."""
+    distortion, count, most = options.distortion, options.cone_count, options.max_cones
     if options.quantise is None:
-        sparse = search.fewest(distortion, options.max_cones) if count is None else search.best_of(count)
+        sparse = search.fewest(distortion, most) if count is None else search.best_of(count)
         if symmetry is not None and not len(constraints.required):
             sparse = mirrored_cones(search, sparse, symmetry, constraints, options)
-        found = sparse.solution
-    else:
-        from ..geometry.handles import open_turning
-        from .integer.align import align_handles
-        from .integer.search import quantise_cones
+        return sparse.solution
+    from ..geometry.handles import open_turning
+    from .integer.align import align_handles
+    from .integer.search import quantise_cones
 
-        quantised = quantise_cones(
-            search, options.quantise, distortion=distortion, count=count, most=options.max_cones
-        )
-        if turned is not None and mesh.genus():
-            by_scale = open_turning(mesh).by_log_scale(surface.lengths)
-            bound = quantised.distortion * DEARER
-            bound = bound if count is not None else max(distortion, bound)
-            quantised = align_handles(search, quantised, by_scale, turned, bound)
-        found = quantised.solution
-    return replace(found, cones=found.cones[~mesh.is_boundary_vertex[found.cones]])
+    quantised = quantise_cones(search, options.quantise, distortion=distortion, count=count, most=most)
+    if turned is not None and surface.mesh.genus():
+        by_scale = open_turning(surface.mesh).by_log_scale(surface.lengths)
+        bound = max(quantised.distortion * DEARER, distortion if count is None else 0.0)
+        quantised = align_handles(search, quantised, by_scale, turned, bound)
+    return quantised.solution
 
 
 def mirrored_cones(

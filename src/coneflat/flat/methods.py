@@ -48,7 +48,8 @@ def find_metric(
                 pass
         if mesh.genus():
             return corrected_flattening(lengths, solution, choices, open_turning(mesh), options.quantise)
-    flipped = surface.delaunay if surface.is_kept else None
+    # What is known is the same, bit for bit, as what the metric would find.
+    flipped = surface.delaunay if surface.is_kept or "delaunay" in surface.__dict__ else None
     return exact_flattening(mesh, lengths, solution, choices, flipped)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..compiled import compiled
 from ..mesh import sort_pairs
 
@@ -217,7 +217,7 @@ def widen_sets(
 
 
 @compiled
-def push(keys: FloatArray, items: IntArray, size: int, key: float, item: int) -> int:
+def push(keys: FloatArray, items: IntArray | Int32Array, size: int, key: float, item: int) -> int:
     """Put an item on a heap, four below each, and return its new size."""
     i = size
     while i > 0:
@@ -233,7 +233,7 @@ def push(keys: FloatArray, items: IntArray, size: int, key: float, item: int) ->
 
 
 @compiled
-def drop_first(keys: FloatArray, items: IntArray, size: int) -> int:
+def drop_first(keys: FloatArray, items: IntArray | Int32Array, size: int) -> int:
     """Take the least item off a heap and return its new size."""
     size -= 1
     key, item = keys[size], items[size]

@@ -7,15 +7,12 @@ between the same points cancel. In a cell of the grid that none of the others me
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..compiled import compiled
-
-Int32Array: TypeAlias = NDArray[np.int32]
 
 # Cells along a side of the grid for the root of the number of triangles, and at most.
 FINENESS, MOST_CELLS = 1.5, 2048

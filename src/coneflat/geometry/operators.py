@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
-from .._arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats, unit_exponent
+from .._arrays import BoolArray, FloatArray, Int32Array, IntArray, as_faces, as_floats, unit_exponent
 from ..compiled import compiled
 from ..errors import ArrayShapeError, OptionError
 from .triangles import double_areas
@@ -17,8 +14,6 @@ from .triangles import double_areas
 LEAST_WEIGHT = 1e-6
 # Numbers up to this, and down to its inverse, can be multiplied and summed up without a thought.
 LARGE = 1e100
-
-Int32Array: TypeAlias = NDArray[np.int32]
 
 
 def vertex_areas(faces: IntArray, lengths: FloatArray, vertex_count: int) -> FloatArray:

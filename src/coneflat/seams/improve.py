@@ -145,7 +145,7 @@ class Reconnection:
             merged = np.minimum(merged, first.value + second.value)
             both = first.reach.vertices
             both = both[np.isfinite(second.reach.distance[both])]
-            inner.append(both)
+            inner.append(both.astype(np.int64))
             costs.append(first.reach.distance[both] + second.reach.distance[both])
         begin = [end for end in self.ends[:-1] if merged[end] < self.limit]
         seeds = [self.terminals.leaving(end) for end in begin]

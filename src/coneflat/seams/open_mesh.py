@@ -6,12 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..geometry.intrinsic import halfedge_twins
 from ..mesh import TriangleMesh
 
 NOTHING = np.empty(0, dtype=np.int64)
 NO_COSTS = np.empty(0)
+# What searches go through without end is kept in half of the memory, which is what they wait for.
+INDEX = np.int32
 # What a search takes for the distance of vertices on the border.
 ON_BORDER = -1.0
 
@@ -52,23 +54,62 @@ class Reach:
     """
 
     distance: FloatArray
-    before: IntArray
-    origin: IntArray
-    reached: IntArray
+    before: Int32Array
+    origin: Int32Array
+    reached: Int32Array
     count: int = 0
     arrival: FloatArray = field(default_factory=lambda: NO_COSTS)
     last: IntArray = field(default_factory=lambda: NOTHING)
 
     @property
-    def vertices(self) -> IntArray:
+    def vertices(self) -> Int32Array:
         """The vertices reached off the border."""
         return self.reached[: self.count]
 
 
+@dataclass(frozen=True, eq=False)
+class Slots:
+    """The half-edges of a mesh that have a twin, sorted by the vertex that they leave.
+
+    Attributes:
+        twin: (3m,) the half-edge on the other side, -1 on the boundary.
+        starts: (n + 1,) where the slots of each vertex begin.
+        halfedges, heads: the half-edge of each slot, and the vertex that it leads to.
+        of_halfedges: (3m,) the slot of each half-edge that has one.
+        leaving: (n,) a half-edge that leaves each vertex.
+    """
+
+    twin: IntArray
+    starts: IntArray
+    halfedges: IntArray
+    heads: Int32Array
+    of_halfedges: IntArray
+    leaving: IntArray
+
+    @classmethod
+    def of(cls, mesh: TriangleMesh) -> Slots:
+        """Return the slots of a mesh, which are not sorted again."""
+        known: Slots | None = mesh.__dict__.get("_slots")
+        if known is None:
+            known = mesh.__dict__["_slots"] = cls._sorted(mesh)
+        return known
+
+    @classmethod
+    def _sorted(cls, mesh: TriangleMesh) -> Slots:
+        from .shortest_paths import sort_slots
+
+        n, sides = len(mesh.vertices), 3 * len(mesh.faces)
+        twin, tail = halfedge_twins(mesh), mesh.tails
+        starts, count = np.zeros(n + 1, dtype=np.int64), int(np.count_nonzero(twin >= 0))
+        slots, slot_of = np.empty(count, dtype=np.int64), np.empty(sides, dtype=np.int64)
+        sort_slots(twin, tail, starts, slots, slot_of)
+        leaving = np.empty(n, dtype=np.int64)
+        leaving[tail] = np.arange(sides)
+        return cls(twin, starts, slots, mesh.heads[slots].astype(INDEX), slot_of, leaving)
+
+
 class OpenMesh:
     """A mesh and what has been cut of it so far.
-
-    Slots are the half-edges that have a twin, sorted by the vertex that they leave.
 
     Attributes:
         mesh: the mesh.
@@ -82,24 +123,19 @@ class OpenMesh:
     """
 
     def __init__(self, mesh: TriangleMesh, edge_costs: FloatArray, is_border: BoolArray) -> None:
-        from .shortest_paths import sort_slots
-
-        n, sides = len(mesh.vertices), 3 * len(mesh.faces)
-        self.mesh, self.twin, self.tail = mesh, halfedge_twins(mesh), mesh.tails
+        n, sides, slots = len(mesh.vertices), 3 * len(mesh.faces), Slots.of(mesh)
+        self.mesh, self.twin, self.tail = mesh, slots.twin, mesh.tails
         self.cost, self.cut = edge_costs[mesh.halfedge_edges], is_border[mesh.halfedge_edges]
         self.height = np.zeros(n)
         self.effort = 0
-        starts, count = np.zeros(n + 1, dtype=np.int64), int(np.count_nonzero(self.twin >= 0))
-        self.slots, self._slot_of = np.empty(count, dtype=np.int64), np.empty(sides, dtype=np.int64)
-        sort_slots(self.twin, self.tail, starts, self.slots, self._slot_of)
-        self._enters = np.empty(count, dtype=np.int64)
-        self._graph = starts, self.tail[self.twin[self.slots]], self.cost[self.slots], self._enters
-        self._leaving = np.empty(n, dtype=np.int64)
-        self._leaving[self.tail] = np.arange(sides)
+        self.slots, self._slot_of, count = slots.halfedges, slots.of_halfedges, len(slots.halfedges)
+        self._enters = np.empty(count, dtype=INDEX)
+        self._graph = slots.starts, slots.heads, self.cost[self.slots], self._enters
+        self._leaving = slots.leaving
         self._number, self._around = np.full(sides, -1, dtype=np.int64), np.empty(sides, dtype=np.int64)
         self._labelled = NOTHING
         # A slot is put on the heap twice at most: as a seed, and for the vertex it leads to.
-        self.heap = np.empty(2 * count + n), np.empty(2 * count + n, dtype=np.int64)
+        self.heap = np.empty(2 * count + n), np.empty(2 * count + n, dtype=INDEX)
         self._spare: list[Reach] = []
 
     def label_terminals(self, points: IntArray) -> Terminals:
@@ -151,7 +187,7 @@ class OpenMesh:
 
     def _new_reach(self) -> Reach:
         n = len(self.height)
-        return Reach(np.full(n, np.inf), *np.empty((3, n), dtype=np.int64))
+        return Reach(np.full(n, np.inf), *np.empty((3, n), dtype=INDEX))
 
     def _run(
         self,

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..compiled import compiled
 from ..geometry.graph import drop_first, push
 
@@ -55,9 +55,9 @@ def label_terminals(
 @compiled
 def search(
     starts: IntArray,
-    heads: IntArray,
+    heads: Int32Array,
     costs: FloatArray,
-    enters: IntArray,
+    enters: Int32Array,
     seeds: IntArray,
     seed_costs: FloatArray,
     seed_origins: IntArray,
@@ -68,13 +68,13 @@ def search(
     limit: float,
     farthest: float,
     distance: FloatArray,
-    before: IntArray,
-    origin: IntArray,
-    reached: IntArray,
+    before: Int32Array,
+    origin: Int32Array,
+    reached: Int32Array,
     arrival: FloatArray,
     last: IntArray,
     keys: FloatArray,
-    items: IntArray,
+    items: Int32Array,
 ) -> int:
     """Search the paths off the border in the order of distance plus height; return how many vertices were reached.
 
@@ -147,7 +147,7 @@ def find_between(
     twin: IntArray,
     tail: IntArray,
     number: IntArray,
-    origin: IntArray,
+    origin: Int32Array,
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Return a half-edge of each edge off the border between the regions of two terminals, and these, (k,) each.
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import FloatArray, Int32Array, IntArray
 from ..compiled import compiled
 from ..geometry.graph import drop_first, push
 from .key_paths import Fixed, KeyPaths, Parts, find_key_paths
@@ -136,7 +136,7 @@ def straightest(
     spokes: IntArray,
     angles: FloatArray,
     keys: FloatArray,
-    items: IntArray,
+    items: Int32Array,
 ) -> tuple[int, int]:
     """Find the cheapest path from half-edges that leave a terminal to another terminal, when turning costs.
 

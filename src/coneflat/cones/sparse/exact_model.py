@@ -40,8 +40,7 @@ class ExactModel(DenseModel):
         self._usable = np.ones(len(log_scale), dtype=bool)
         self._indptr = operator.laplacian.indptr.astype(np.int64)
         self._indices = operator.laplacian.indices.astype(np.int64)
-        self._slope = linear.score
-        self._least = least
+        self._linear, self._least = linear, least
         # The Green's functions of the unknowns, in blocks as they came, and their means.
         self._responses: list[FloatArray] = []
         self._means: list[FloatArray] = []
@@ -74,7 +73,7 @@ class ExactModel(DenseModel):
         gram[:old, old:] = rows[:, :old].T
         gram[old:, old:] = (rows[:, old:] + rows[:, old:].T) / 2
         self.gram = gram
-        self.slope = self._slope[self.unknowns]
+        self.slope = self._linear.score[self.unknowns]
         self.usable = self._usable[self.unknowns]
         self.usable[self.fixed] = False
         self.least = self._least[self.unknowns]

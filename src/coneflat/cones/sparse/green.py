@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
-from ..._arrays import BoolArray, FloatArray, IntArray
+from ..._arrays import BoolArray, FloatArray, Int32Array, IntArray
+from ...compiled import compiled
 from ...solver import Factor, factorize, used_again
 
 # Right-hand sides solved at once: more gain nothing and cost memory, of which they take so many numbers at most.
@@ -37,8 +38,7 @@ class GreenOperator:
         self, laplacian: csc_matrix, areas: FloatArray, is_boundary: BoolArray, order: IntArray
     ) -> None:
         self.vertices = order[~is_boundary[order]]
-        self.laplacian = csr_matrix(csr_matrix(laplacian)[self.vertices][:, self.vertices])
-        self.laplacian.sort_indices()
+        self.laplacian = renumbered(laplacian, self.vertices)
         self.areas = areas[self.vertices]
         self.is_closed = len(self.vertices) == len(order)
         self._share = areas
@@ -59,8 +59,8 @@ class GreenOperator:
 
     @cached_property
     def _factorized(self) -> Factor:
-        inner = self.laplacian[1:][:, 1:] if self.is_closed else self.laplacian
-        return factorize(csc_matrix(inner))
+        inner = _without_first(self.laplacian) if self.is_closed else self.laplacian
+        return factorize(csc_matrix(inner.T))  # symmetric: its rows are its columns
 
     @property
     def break_even(self) -> int:
@@ -128,3 +128,62 @@ class GreenOperator:
         for unknown in list(known)[: max(0, len(known) - max(1, KEPT // len(self.vertices)))]:
             del known[unknown]
         return rows
+
+
+def renumbered(matrix: csc_matrix, order: IntArray) -> csr_matrix:
+    """Return the rows and columns of a matrix (n, n) that are named in an order (f,), by rows with sorted columns."""
+    number = np.full(matrix.shape[0], -1, dtype=np.int32)
+    number[order] = np.arange(len(order))
+    rows = matrix.indices.astype(np.int32, copy=False)
+    starts = np.zeros(len(order) + 1, dtype=np.int32)
+    columns, values = np.empty(len(rows), dtype=np.int32), np.empty(len(rows))
+    spread_columns(
+        matrix.indptr.astype(np.int32, copy=False), rows, matrix.data, order, number, starts, columns, values
+    )
+    count = int(starts[-1])
+    return csr_matrix((values[:count], columns[:count], starts), shape=(len(order), len(order)))
+
+
+@compiled
+def spread_columns(
+    starts: Int32Array,
+    rows: Int32Array,
+    values: FloatArray,
+    order: IntArray,
+    number: Int32Array,
+    new_starts: Int32Array,
+    new_columns: Int32Array,
+    new_values: FloatArray,
+) -> None:
+    """Write the columns of a matrix, in an order, into its rows, which are sorted then.
+
+    starts, rows, values: the matrix by columns. order: (f,) columns; number: (n,) their places in it, -1 for others.
+    new_starts: (f + 1,) zeros on entry. new_columns, new_values: room for all entries.
+    """
+    for column in order:
+        for at in range(starts[column], starts[column + 1]):
+            if number[rows[at]] >= 0:
+                new_starts[number[rows[at]] + 1] += 1
+    for row in range(len(order)):
+        new_starts[row + 1] += new_starts[row]
+    place = new_starts[:-1].copy()
+    for new in range(len(order)):
+        for at in range(starts[order[new]], starts[order[new] + 1]):
+            row = number[rows[at]]
+            if row >= 0:
+                new_columns[place[row]] = new
+                new_values[place[row]] = values[at]
+                place[row] += 1
+
+
+def _without_first(matrix: csr_matrix) -> csr_matrix:
+    """Return a matrix, by rows with sorted columns, without its first row and column."""
+    begin = matrix.indptr[1]
+    kept = matrix.indices[begin:] > 0
+    starts = matrix.indptr[1:] - begin
+    gone = np.searchsorted(starts, np.flatnonzero(~kept), side="right") - 1
+    counts = np.diff(starts)
+    counts[gone] -= 1
+    np.cumsum(counts, out=starts[1:])
+    entries = matrix.data[begin:][kept], matrix.indices[begin:][kept] - 1, starts
+    return csr_matrix(entries, shape=(len(counts), len(counts)))

@@ -26,6 +26,7 @@ from ...geometry.operators import vertex_areas, weighted_areas
 from ...geometry.ties import tie_key as key_of_shape
 from ...mesh import TriangleMesh
 from ...text import list_some, plural
+from ...threads import meanwhile
 from ..solution import FULL_TURN, ConeSolution
 from .best_sets import ConeSet
 from .coarse_model import candidates
@@ -127,7 +128,9 @@ class ConeSearch:
             self._least = np.maximum(self._least, np.minimum(FULL_TURN - room[vertices], 0.0))
         self._required = self.unknowns_of(cones)
         self.exact = ExactModel(linear, self._required, limits, self._least)
-        self.restrict(usable)
+        # The exact model needs the score next, the coarse one does not.
+        with meanwhile(lambda: linear.score, 2 * len(vertices)):
+            self.restrict(usable)
 
     @classmethod
     def from_mesh(cls, mesh: TriangleMesh, lengths: FloatArray | None = None, **options: Any) -> ConeSearch:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ..._arrays import BoolArray, FloatArray, IntArray
+from ..._arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ...cones import ConeSolution
 from ...errors import ConvergenceError
 from ...geometry import angle_defect, corner_angles
@@ -21,7 +21,6 @@ from ...solver.newton import Limits, Point, minimise
 from ...text import plural
 from ..base import failure_notes, off_by
 from ..exact.flatten import ExactFlatMetric, at_own_area
-from ..exact.hessian import Int32Array
 from ..exact.metric import ExactMetric, checked_target
 from .coherent_angles import CoherentAngles, coherent_angles
 from .proper import make_proper

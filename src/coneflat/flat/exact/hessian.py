@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
-from ..._arrays import BoolArray, FloatArray, IntArray
+from ..._arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ...compiled import compiled
 from ...geometry.intrinsic import IntrinsicTriangulation
 
@@ -46,9 +43,6 @@ class HessianPattern:
         )
         n = len(held)
         return csc_matrix((values, self._rows, self._starts), shape=(n, n))
-
-
-Int32Array: TypeAlias = NDArray[np.int32]
 
 
 @compiled

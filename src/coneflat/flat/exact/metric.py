@@ -210,10 +210,11 @@ def _keep_area(
     centre = np.full(count, -np.inf)
     np.maximum.at(centre, component, log_scale)
     log_scale = log_scale - np.where(free, centre, 0.0)[component]
-    faces = problem.triangulation.faces
     metric = problem.flat_lengths(log_scale).reshape(-1, 3)
     before = np.bincount(labels[mesh.faces[:, 0]], weights=double_areas(lengths), minlength=count)
-    after = np.bincount(component[faces[:, 0]], weights=double_areas(metric), minlength=count)
+    after = np.bincount(
+        component[problem.triangulation.tail[::3]], weights=double_areas(metric), minlength=count
+    )
     copies = len(metric) / len(lengths)  # 2 if the surface was doubled
     # Where nothing is left of the area, the metric is refused: any shift will do.
     is_left = np.isfinite(after) & (after > 0)

@@ -43,11 +43,11 @@ def settled(problem: ConformalProblem, start: State) -> FloatArray | None:
     missed = np.abs(start.residual)
     rank = n - 1 - int(SHARE * n)
     is_chosen = missed > max(FAR_OFF, float(np.partition(missed, rank)[rank]))
-    faces = problem.triangulation.faces
+    corners = _corners(problem)
     for _ in range(RINGS):
         if np.count_nonzero(is_chosen) > MOST * n:
             return None
-        is_chosen[faces[has_any(is_chosen, faces)]] = True
+        is_chosen[corners[has_any(is_chosen, corners)]] = True
     chosen = np.flatnonzero(is_chosen & ~problem.fixed)
     if not 0 < len(chosen) <= MOST * n:
         return None
@@ -57,6 +57,11 @@ def settled(problem: ConformalProblem, start: State) -> FloatArray | None:
     if not best.largest < float(np.abs(start.residual).max()):
         return None
     return around.whole(best.place)
+
+
+def _corners(problem: ConformalProblem) -> IntArray:
+    """Return (m, 3) the vertices of each triangle, in no order of interest: a view, where `faces` is a copy."""
+    return problem.triangulation.tail.reshape(-1, 3)
 
 
 class Surroundings:
@@ -78,7 +83,7 @@ class Surroundings:
         self._last: Point | None = None
 
     def _find_faces(self) -> IntArray:
-        return np.flatnonzero(has_any(self._local >= 0, self.problem.triangulation.faces))
+        return np.flatnonzero(has_any(self._local >= 0, _corners(self.problem)))
 
     def whole(self, place: FloatArray) -> FloatArray:
         """Return (n,) the log scale of all vertices."""

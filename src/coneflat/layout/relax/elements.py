@@ -8,13 +8,11 @@ and so in the unknowns that move these.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
-from ..._arrays import ComplexArray, FloatArray, IntArray, has_any
+from ..._arrays import ComplexArray, FloatArray, Int32Array, IntArray, has_any
 from ...compiled import compiled
 from ...geometry.planar import map_factors
 from ...mesh import label_components
@@ -25,8 +23,6 @@ from .motions import Motions
 SHORT_OF_FLAT = 0.9
 # Part of each diagonal entry that is added to it: what nothing holds may turn and shift as a whole.
 RIDGE = 1e-11
-
-Int32Array: TypeAlias = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
