@@ -201,6 +201,23 @@ def test_a_mesh_is_dropped_on_an_empty_page(browser, tmp_path):
         served.close()
 
 
+def test_another_mesh_takes_the_place_of_the_first(visit, tmp_path):
+    visit.settle()
+    shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3))
+    (tmp_path / "empty.obj").write_bytes(b"")
+    first = visit.page.inner_text("#title")
+    visit.page.set_input_files("#open", tmp_path / "ball.obj")
+    visit.wait("window.studio?.layout && studio.news.mesh === 'ball.obj'")
+    visit.settle()
+    assert visit.page.inner_text("#name") == "ball.obj"
+    assert visit.page.inner_text("#title") != first
+    visit.page.set_input_files("#open", tmp_path / "empty.obj")
+    visit.wait("window.studio?.news?.trouble && studio.news.mesh === 'empty.obj'")
+    assert "is empty" in visit.page.inner_text("#refusal")
+    assert visit.run("studio.viewer") is None
+    assert visit.page.locator("#cone-list > .cone").count() == 0
+
+
 def test_the_page_says_when_the_studio_has_ended(browser, studio):
     visit = StudioVisit(browser, studio)
     visit.settle()

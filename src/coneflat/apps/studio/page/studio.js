@@ -30,11 +30,15 @@ class Studio {
 
   /** Follow what happens, as long as the page is open. */
   async follow() {
-    for (let version = ""; ; ) {
+    for (;;) {
       try {
-        this.news = await this.server.state(version);
-        version = this.news.version;
+        const news = await this.server.state(this.news);
         trouble("");
+        if (this.news && news.opened !== this.news.opened && this.layout) {
+          location.reload(); // What is here is about another mesh, down to the numbers of its vertices.
+          return;
+        }
+        this.news = news;
         await this.hear();
       } catch (error) {
         if (error instanceof Refusal) {
