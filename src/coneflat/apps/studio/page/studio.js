@@ -55,6 +55,8 @@ class Studio {
 
   async hear() {
     document.body.classList.toggle("empty", !this.news.mesh);
+    document.body.classList.toggle("bare", !this.news.layout);
+    if (!this.viewer) document.getElementById("name").textContent = this.news.mesh ?? "";
     if (this.news.layout && this.news.layout !== this.layout) {
       this.take(await this.server.layout(this.viewer?.model));
       this.layout = this.news.layout;
