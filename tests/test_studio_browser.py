@@ -123,6 +123,22 @@ def _seams(result):
     return [edge for edge, points in sides.items() if len(points) > 1]
 
 
+def test_nothing_is_marked_where_a_cone_was(visit):
+    page = visit.page
+    visit.settle()
+    marked = (
+        "(() => { const {canvas} = coneflat.marks, {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width,"
+        "canvas.height); return data.filter((value, i) => i % 4 === 3 && value > 9).length; })()"
+    )
+    page.keyboard.press("a")
+    page.mouse.click(*visit.place_of(visit.visible_vertices(1)[0]))
+    visit.settle()
+    page.click("#undo")
+    visit.settle()
+    visit.page.wait_for_timeout(300)  # until the browser has shown it
+    assert visit.run(marked) == 0
+
+
 def test_searches_keep_what_is_locked(visit):
     page = visit.page
     visit.settle()
