@@ -30,7 +30,7 @@ class Studio {
 
   /** Follow what happens, as long as the page is open. */
   async follow() {
-    for (;;) {
+    for (let heard; ; ) {
       try {
         const news = await this.server.state(this.news);
         trouble("");
@@ -38,8 +38,8 @@ class Studio {
           location.reload(); // What is here is about another mesh, down to the numbers of its vertices.
           return;
         }
-        this.news = news;
-        await this.hear();
+        const isOld = !news.layout || news.layout === this.layout;
+        heard = [news, isOld ? null : await this.server.layout(this.viewer?.model)];
       } catch (error) {
         if (error instanceof Refusal) {
           trouble(error.message);
@@ -49,18 +49,20 @@ class Studio {
         const again = this.news?.project ? `; start it again with: coneflat studio ${this.news.project}` : "";
         trouble(`the studio does not answer. Everything that was chosen is kept${again}`);
         await new Promise((done) => setTimeout(done, RETRY));
+        continue;
       }
+      this.hear(...heard);
     }
   }
 
-  async hear() {
+  /** Show what is new; model: the layout, if that is. */
+  hear(news, model) {
+    this.news = news;
     document.body.classList.toggle("empty", !this.news.mesh);
     document.body.classList.toggle("bare", !this.news.layout);
     if (!this.viewer) document.getElementById("name").textContent = this.news.mesh ?? "";
-    if (this.news.layout && this.news.layout !== this.layout) {
-      this.take(await this.server.layout(this.viewer?.model));
-      this.layout = this.news.layout;
-    }
+    if (model) this.take(model);
+    if (model) this.layout = news.layout;
     this.paint.hear();
     this.panel.show();
     this.viewer?.remark();
