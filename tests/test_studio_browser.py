@@ -123,6 +123,22 @@ def _seams(result):
     return [edge for edge, points in sides.items() if len(points) > 1]
 
 
+def test_nothing_is_marked_where_a_cone_was(visit):
+    page = visit.page
+    visit.settle()
+    marked = (
+        "(() => { const {canvas} = coneflat.marks, {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width,"
+        "canvas.height); return data.filter((value, i) => i % 4 === 3 && value > 9).length; })()"
+    )
+    page.keyboard.press("a")
+    page.mouse.click(*visit.place_of(visit.visible_vertices(1)[0]))
+    visit.settle()
+    page.click("#undo")
+    visit.settle()
+    visit.page.wait_for_timeout(300)  # until the browser has shown it
+    assert visit.run(marked) == 0
+
+
 def test_searches_keep_what_is_locked(visit):
     page = visit.page
     visit.settle()
@@ -199,6 +215,21 @@ def test_a_mesh_is_dropped_on_an_empty_page(browser, tmp_path):
         visit.close()
     finally:
         served.close()
+
+
+def test_another_mesh_takes_the_place_of_the_first(visit, tmp_path):
+    visit.settle()
+    shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3))
+    (tmp_path / "empty.obj").write_bytes(b"")
+    first = visit.page.inner_text("#title")
+    visit.page.set_input_files("#open", tmp_path / "ball.obj")
+    visit.page.locator("#name", has_text="ball.obj").wait_for()
+    visit.settle()
+    assert visit.page.inner_text("#title") != first
+    visit.page.set_input_files("#open", tmp_path / "empty.obj")
+    visit.page.locator("#refusal-text", has_text="is empty").wait_for()
+    assert visit.run("studio.viewer") is None
+    assert visit.page.locator("#cone-list > .cone").count() == 0
 
 
 def test_the_page_says_when_the_studio_has_ended(browser, studio):

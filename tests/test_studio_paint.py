@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+from dataclasses import fields
 from io import BytesIO
 
 import numpy as np
@@ -285,5 +286,7 @@ class TestReplay:
         again = coneflat.flatten(tmp_path / "ball.obj", **chosen.keywords())
         np.testing.assert_array_equal(names["result"].uv, again.uv)
         assert command_line("ball.obj", "p.json", chosen) == "coneflat flatten --project p.json"
+        # What is kept for undo is what was chosen, and nothing that was made of it.
+        assert set(vars(chosen)) == {each.name for each in fields(chosen)}
         many = Choices().painted("no_cone", region(range(0, 40_000, 2)))
         assert python_lines("ball.obj", many).startswith("# What was drawn or painted is too much")

@@ -120,8 +120,9 @@ class TestPage:
         assert len(content) >= 4 + size + last["offset"] + last["count"]
         assert size % 4 == 0
         assert page.post("/act", json={"do": "remove", "vertex": state["found"][0]}).status_code == 200
-        later = page.get(f"/state?after={state['version']}").json()
+        later = page.get(f"/state?after={state['version']}&chosen={state['chosen']}").json()
         assert later["choices"]["by_hand"]
+        assert "choices" not in page.get(f"/state?chosen={later['chosen']}").json()
         assert page.post("/export/obj").text.count("\nvt ") > 0
         assert (tmp_path / "ball_studio.json").exists()
 

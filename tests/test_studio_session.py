@@ -233,7 +233,38 @@ class TestSession:
     )
     def test_names_lead_nowhere_else(self, session, name):
         with pytest.raises(StudioError, match="is no name of a file"):
-            session.file_named(name)
+            session.open_named(name)
+
+    def test_another_mesh_has_other_layouts(self, session, tmp_path):
+        first = settled(session)
+        shapes.write_obj(tmp_path / "cube.obj", *shapes.box())
+        session.open_named("cube.obj")
+        assert session.picture() is None
+        second = settled(session)
+        assert second["opened"] > first["opened"]
+        assert second["layout"] > first["layout"]
+        (tmp_path / "empty.obj").write_bytes(b"")
+        session.open_named("empty.obj")
+        third = settled(session)
+        assert "is empty" in third["trouble"]["text"]
+        assert third["layout"] == 0
+        assert third["opened"] > second["opened"]
+
+    def test_choices_are_told_to_who_has_not_got_them(self, session):
+        first = settled(session)
+        assert session.state()["choices"] == Session(session.folder).state()["choices"]
+        assert not {"choices", "command", "python"} & set(session.state(first["chosen"]))
+        for action in (
+            {"do": "paint", "layer": "no_seam", "where": "3-9"},
+            {"do": "units", "of_file": "mm", "shown": ""},
+        ):
+            before = session.state()
+            session.act(action)
+            after = session.state(before["chosen"])
+            assert after["chosen"] > before["chosen"]
+            assert after["choices"] != before["choices"]
+        session.act({"do": "undo"})
+        assert session.state(after["chosen"])["choices"] == before["choices"]
 
     def test_links_lead_nowhere_else(self, session, tmp_path_factory, tmp_path):
         other = tmp_path_factory.mktemp("other")

@@ -221,13 +221,22 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
         except Superseded:
             write_frame(answers, {"job": number, "given_up": True})
         except ConeflatError as error:
-            failed = {"error": str(error), "repair": isinstance(error, REPAIRABLE)}
-            write_frame(answers, {"job": number, **failed})
+            write_frame(answers, {"job": number, **_told_failure(error)})
         except MemoryError:
             write_frame(answers, {"job": number, "error": "not enough memory for this mesh", "repair": False})
         except Exception as error:
             said = f"internal error, please report it: {type(error).__name__}: {error}"
             write_frame(answers, {"job": number, "error": said, "repair": False})
+
+
+def _told_failure(error: ConeflatError) -> Head:
+    """Return what the page says of a failure: what a repair would mend, a button does there."""
+    from ...input.validation import REPAIR_ADVICE
+
+    return {
+        "error": str(error).replace(REPAIR_ADVICE, "repair the mesh"),
+        "repair": isinstance(error, REPAIRABLE),
+    }
 
 
 def main() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
@@ -230,20 +229,17 @@ class Choices:
 
     # What they mean.
 
-    @cached_property
-    def words(self) -> Mapping[str, Any]:
-        """The keyword arguments of `coneflat.flatten` that they mean.
+    def keywords(self) -> dict[str, Any]:
+        """Return the keyword arguments of `coneflat.flatten` that they mean.
+
+        They are not kept: of painted places they take many times what the choices do, of which undo keeps hundreds.
 
         Raises:
             OptionError: they do not go together.
         """
         words = meaning(self)
         read_options(words)
-        return MappingProxyType(words)
-
-    def keywords(self) -> dict[str, Any]:
-        """Return `words`, to be changed."""
-        return dict(self.words)
+        return words
 
     def as_plain(self) -> dict[str, Any]:
         """Return them as JSON holds them."""

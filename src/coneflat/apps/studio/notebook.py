@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...errors import ArrayShapeError, OptionError, StudioError
+from ...errors import ArrayShapeError, StudioError
 from ...files.atomic import atomic_write
 from ...files.obj_write import lines_of
 from ...input.arrays import as_input
-from .serve import HOST, listening
+from .serve import address_of, listening, studio_server
 from .session import PATIENCE, Session
 
 if TYPE_CHECKING:
@@ -64,12 +64,7 @@ class Studio:
             MeshFileError, ProjectError: the file cannot be read.
             OptionError: the extra `studio` is not installed.
         """
-        try:
-            from .server import StudioServer
-        except ImportError as error:
-            raise OptionError(
-                f'the studio needs {error.name or "a server"}: pip install "coneflat[studio]"'
-            ) from error
+        server_class = studio_server()
         self.height = height
         self._own_folder: tempfile.TemporaryDirectory[str] | None = None
         file = self._file_of(mesh, faces, folder)
@@ -82,8 +77,8 @@ class Studio:
             self._session.open(file)
             token, listener = secrets.token_urlsafe(24), listening(0)
             port = listener.getsockname()[1]
-            self.address = f"http://{HOST}:{port}/?token={token}"
-            self._server = StudioServer(self._session, token, port, framed=True)
+            self.address = address_of(port, token)
+            self._server = server_class(self._session, token, port, framed=True)
         except BaseException:
             self._session.close()
             raise

@@ -71,7 +71,7 @@ def quads_of(source: Joined, choices: Choices, count: int, ending: str, told: To
     from ...files.quads import write_quads_stream
     from ...grid.quads import quads
 
-    words = choices.searching().words
+    words = choices.searching().keywords()
     options = {name: words[name] for name in OF_QUADS if name in words}
     if words.get("boundary") == "straight":
         options["boundary"] = "straight"
@@ -96,5 +96,5 @@ def curve_of(source: Joined, choices: Choices, told: Told) -> dict[str, Any]:
 
 def curve_options(choices: Choices) -> dict[str, Any]:
     """Return what of the choices a curve depends on."""
-    words = choices.searching().words
+    words = choices.searching().keywords()
     return {name: words[name] for name in OF_CURVES if name in words}

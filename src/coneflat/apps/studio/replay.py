@@ -33,11 +33,10 @@ class Replay:
 
 def command_line(mesh: str, project: str, choices: Choices) -> str:
     """Return a command that flattens a mesh by what was chosen; what was drawn or painted needs the project's file."""
-    words = choices.words
     if choices.cuts or choices.kept or choices.paint:
         return shlex.join(["coneflat", "flatten", "--project", project])
     parts = ["coneflat", "flatten", mesh]
-    for name, value in words.items():
+    for name, value in choices.keywords().items():
         flag = "--" + name.replace("_", "-")
         if name == "repair":
             parts += ["--repair"] if value else []
@@ -52,7 +51,7 @@ def command_line(mesh: str, project: str, choices: Choices) -> str:
 
 def python_lines(mesh: str, choices: Choices) -> str:
     """Return Python that flattens a mesh by what was chosen."""
-    given = [f"    {name}={_written(value)}," for name, value in choices.words.items()]
+    given = [f"    {name}={_written(value)}," for name, value in choices.keywords().items()]
     if sum(map(len, given)) > LONGEST:
         return "# What was drawn or painted is too much to be written here; the project's file has it."
     call = "\n".join([f"result = coneflat.flatten(\n    {mesh!r},", *given, ")"])

@@ -12,6 +12,7 @@ from ...errors import OptionError, StudioError
 from ...view.page.webpage import open_address
 
 if TYPE_CHECKING:
+    from .server import StudioServer
     from .session import Session
 
 HOST = "127.0.0.1"
@@ -40,12 +41,7 @@ def run_studio(
         StudioError: the port cannot be had.
         MeshFileError, ProjectError: the file cannot be read.
     """
-    try:
-        from .server import StudioServer
-    except ImportError as error:
-        raise OptionError(
-            f'the studio needs {error.name or "a server"}: pip install "coneflat[studio]"'
-        ) from error
+    server_class = studio_server()
     from .session import Session
 
     is_project = file is not None and file.suffix.lower() == ".json"
@@ -53,7 +49,7 @@ def run_studio(
     with listening(port) as listener:
         port = listener.getsockname()[1]
         token = secrets.token_urlsafe(24)
-        address = f"http://{HOST}:{port}/?token={token}"
+        address = address_of(port, token)
         try:
             if file is not None:
                 session.open(file)
@@ -62,9 +58,29 @@ def run_studio(
                 session.listen(Teller(session, tell))
             if opens:
                 open_address(address)
-            StudioServer(session, token, port).run(sockets=[listener])
+            server_class(session, token, port).run(sockets=[listener])
         finally:
             session.close()
+
+
+def studio_server() -> type[StudioServer]:
+    """Return the class of servers.
+
+    Raises:
+        OptionError: the extra `studio` is not installed.
+    """
+    try:
+        from .server import StudioServer
+    except ImportError as error:
+        raise OptionError(
+            f'the studio needs {error.name or "a server"}: pip install "coneflat[studio]"'
+        ) from error
+    return StudioServer
+
+
+def address_of(port: int, token: str) -> str:
+    """Return the address of the page."""
+    return f"http://{HOST}:{port}/?token={token}"
 
 
 class Teller:

@@ -22,6 +22,7 @@ from starlette.types import ASGIApp
 from ...errors import ConeflatError, StudioError
 from ...files import INPUT_FORMATS
 from .guard import MOST_ASKED, Guard
+from .opening import file_within
 from .page import studio_page
 from .session import Session
 
@@ -102,7 +103,8 @@ def studio_app(
         after = request.query_params.get("after", "")
         if _is_number(after):
             await bell.wait_beyond(session, int(after), LONG_POLL)
-        return JSONResponse(await run_sync(session.state))
+        known = request.query_params.get("chosen", "")
+        return JSONResponse(await run_sync(session.state, int(known) if _is_number(known) else 0))
 
     async def layout(request: Request) -> Response:
         known = request.query_params.get("known", "")
@@ -135,7 +137,7 @@ def studio_app(
         return JSONResponse(await run_sync(session.curve))
 
     async def upload(request: Request) -> Response:
-        path = session.file_named(request.query_params.get("name", ""))
+        path = file_within(request.query_params.get("name", ""), session.folder)
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
             raise StudioError(f"{path.name} is no mesh that can be read: {', '.join(INPUT_FORMATS)}")
         stored = await _store(request, path, most_uploaded)

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...errors import ConeflatError, MeshFileError, ProjectError, StudioError
+from ...errors import ConeflatError, MeshFileError, StudioError
 from ...options.kinds import as_whole
 from ...text import shown
 from .choices import Choices
 from .frames import Head
 from .history import History
 from .known import Known
+from .opening import opened, opened_within
 from .outputs import EXPORTS, MOST_QUADS, QUADS, curve_options
-from .project import Project, hash_of, read_project
+from .project import Project
 from .replay import Replay
 from .steps import STEPS
 from .worker import Worker
@@ -38,7 +40,7 @@ class Session:
         folder: where projects are, and whatever the page names.
         color: what numbers are shown as colours, if any.
         version: counts what has happened; who has seen a version need not look again.
-        layout: the number of the layout that is shown; 0 for none.
+        layout: the number of the layout that was shown last; no other one gets it, whatever mesh is opened.
         is_early: whether that is the first one of a change, and another will follow.
     """
 
@@ -56,6 +58,10 @@ class Session:
         self._mesh: Path | None = None
         self._sha256 = ""
         self._history = History(Choices())
+        self._opened = 0  # meshes and projects until now
+        self._chosen = (
+            1  # counts changes of what is chosen, and so numbers it; 0 is nothing that anybody knows
+        )
         self._job = 0
         self._busy: dict[str, Any] | None = None
         self._trouble: dict[str, Any] | None = None
@@ -81,21 +87,7 @@ class Session:
             MeshFileError: the mesh cannot be read.
             ProjectError: the project cannot, or its mesh is another.
         """
-        if path.suffix.lower() == ".json":
-            self._open_project(path, anywhere=True)
-            return
-        sha256 = hash_of(path)
-        project = self.folder / f"{path.stem}_studio.json"
-        chosen = Choices()
-        if project.exists():
-            before = read_project(project)
-            if before.sha256 != sha256:
-                raise ProjectError(
-                    f"{project} is a project of another mesh: its SHA-256 begins with {before.sha256[:12]}, that of "
-                    f"{path} with {sha256[:12]}; move it away, or work in another folder"
-                )
-            chosen = before.choices
-        self._begin(path, sha256, project, chosen)
+        self._begin(*opened(path, self.folder))
 
     def open_named(self, name: str) -> None:
         """Work on a mesh or a project in the session's folder.
@@ -104,37 +96,15 @@ class Session:
             StudioError: it is no file of the folder.
             MeshFileError, ProjectError: as of `open`.
         """
-        path = self.file_named(name)
-        if path.suffix.lower() == ".json":
-            self._open_project(path, anywhere=False)
-        else:
-            self.open(path)
+        self._begin(*opened_within(name, self.folder))
 
-    def file_named(self, name: str) -> Path:
-        """Return the file of the session's folder that has a name.
-
-        Raises:
-            StudioError: it lies elsewhere, or has no proper name.
-        """
-        if not name or name != Path(name).name or name.startswith(".") or "\\" in name or "\0" in name:
-            raise StudioError(f"{shown(name)} is no name of a file in the session's folder")
-        path = self.folder / name
-        if not path.resolve().is_relative_to(self.folder):
-            raise StudioError(f"{shown(name)} leads out of the session's folder")
-        return path
-
-    def _open_project(self, path: Path, anywhere: bool) -> None:
-        project = read_project(path)
-        if not anywhere and not project.mesh.resolve().is_relative_to(self.folder):
-            raise ProjectError(f"the mesh of {path.name} lies outside the session's folder")
-        project.check_mesh()
-        self._begin(project.mesh, project.sha256, path, project.choices)
-
-    def _begin(self, mesh: Path, sha256: str, project: Path, chosen: Choices) -> None:
+    def _begin(self, project: Project, file: Path) -> None:
         with self._changed:
-            self._mesh, self._sha256, self.project_file = mesh.resolve(), sha256, project
-            self._history = History(chosen)
-            self._found, self._shown, self.layout = [], None, 0
+            self._mesh, self._sha256, self.project_file = project.mesh.resolve(), project.sha256, file
+            self._history = History(project.choices)
+            self._opened += 1
+            self._chosen += 1
+            self._found, self._shown = [], None
             self.is_early, self._last = False, None
             self._flatten()
 
@@ -197,6 +167,7 @@ class Session:
 
     def _follow(self, before: Choices) -> None:
         """Do what follows from a step: a layout, or no more than that what is chosen is kept and told."""
+        self._chosen += 1
         if not self._history.now.flattens_like(before):
             return self._flatten()
         trouble = self._trouble
@@ -229,28 +200,37 @@ class Session:
         """The seconds that each stage of the layout that is shown took."""
         return dict(self._seconds)
 
-    def state(self) -> dict[str, Any]:
-        """Return all that there is to know, as plain values."""
+    def state(self, known: int = 0) -> dict[str, Any]:
+        """Return all that there is to know, as plain values.
+
+        known: the number, `chosen`, of choices that need not be told again: paint may be large, and news come often.
+        """
         with self._changed:
-            chosen = self._history.now
             undo, redo = self._history.depth
-            name = None if self._mesh is None else self._mesh.name
-            project = "" if self.project_file is None else self.project_file.name
             return {
                 "version": self.version,
-                "mesh": name,
-                "project": project,
-                "choices": chosen.as_plain(),
+                "opened": self._opened,
+                "mesh": None if self._mesh is None else self._mesh.name,
+                "project": self._project_name,
+                "chosen": self._chosen,
                 "undo": undo,
                 "redo": redo,
                 "busy": self._busy,
                 "trouble": self._trouble,
-                "layout": self.layout,
+                "layout": 0 if self._shown is None else self.layout,
                 "early": self.is_early,
                 "found": self._found,
                 "seconds": sum(self._seconds.values()),
-                **self._replay.of(name, project, chosen),
+                **({} if known == self._chosen else self._told_choices()),
             }
+
+    @property
+    def _project_name(self) -> str:
+        return "" if self.project_file is None else self.project_file.name
+
+    def _told_choices(self) -> dict[str, Any]:
+        chosen, name = self._history.now, None if self._mesh is None else self._mesh.name
+        return {"choices": chosen.as_plain(), **self._replay.of(name, self._project_name, chosen)}
 
     def picture(self, known: int = 0) -> tuple[Head, bytes] | None:
         """Return the layout that is shown: numbers and texts, and arrays; None where there is none yet.
@@ -291,7 +271,7 @@ class Session:
             StudioError: there is no mesh, or something was changed.
         """
         with self._changed:
-            key = self._sha256, repr(curve_options(self._history.now))
+            key = self._sha256, sha256(repr(curve_options(self._history.now)).encode()).hexdigest()
             if key not in self._curves:
                 self._curves[key] = self._asked({"do": "curve"})[0]
             return self._curves[key]

@@ -3,6 +3,7 @@
 const RING = 11; // pixels
 const SMALL = 14; // pixels: what is smaller gets a ring around it, to be found
 const IN_FRONT = 0.03; // model radii: what is nearer to the user by less hides nothing
+const UNSEEN = "rgba(0, 0, 0, 0.01)";
 
 class Marks {
   constructor(canvas, model, renderer) {
@@ -23,6 +24,8 @@ class Marks {
     const pen = this.canvas.getContext("2d");
     pen.setTransform(this.pixel, 0, 0, this.pixel, 0, 0);
     pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    pen.fillStyle = UNSEEN; // Where nothing is drawn after clearing, Chromium may go on showing what was there.
+    pen.fillRect(0, 0, 1, 1);
     const [picked, hovered] = [state.get("picked"), state.get("hovered")];
     if (!picked && !hovered) this.seen.clear();
     for (const pane of panes) {

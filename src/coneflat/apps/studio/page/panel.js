@@ -175,9 +175,9 @@ class Panel {
     this.part("brush-size").value = brush.radius;
     this.part("brush-weight").value = brush.weight;
     this.part("brush-size-value").textContent = brush.radius;
-    for (const [layer] of BRUSHES.slice(0, -1)) {
+    for (const [layer, name, letter] of BRUSHES.slice(0, -1)) {
       const count = paint.count(layer);
-      this.part(`tool-${layer}`).title = count ? `${grouped(count)} vertices are painted` : "";
+      this.part(`tool-${layer}`).title = `${name} (${letter})${count ? `: ${grouped(count)} vertices are painted` : ""}`;
       this.part(`tool-${layer}`).dataset.painted = String(count > 0);
     }
   }
@@ -193,6 +193,7 @@ class Panel {
     const key = JSON.stringify([rows, picked]);
     if (key === this.conesShown) return;
     this.conesShown = key;
+    this.part("cone-names").hidden = !rows.length;
     const typing = document.activeElement?.closest?.("#cone-list .cone")?.dataset.vertex;
     this.part("cone-list").replaceChildren(...rows.map((row) => this.coneRow(row, row.vertex === picked)));
     if (typing !== undefined) this.angleField(typing)?.focus();

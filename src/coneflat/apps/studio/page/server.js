@@ -13,9 +13,12 @@ class Server {
     return answer;
   }
 
-  /** Return what there is to know, once it is newer than a version. */
-  async state(after) {
-    return (await this.ask(`/state?after=${after}`)).json();
+  /** Return what there is to know, once it is newer than what was known; choices that are the same are taken from that. */
+  async state(known) {
+    const news = await (await this.ask(`/state?after=${known?.version ?? ""}&chosen=${known?.chosen ?? ""}`)).json();
+    if (news.choices) return news;
+    const {choices, command, python} = known;
+    return {...news, choices, command, python};
   }
 
   /** Return the layout that is shown now; arrays that a model from here has, too, are taken from that. */

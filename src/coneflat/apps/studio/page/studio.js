@@ -30,12 +30,16 @@ class Studio {
 
   /** Follow what happens, as long as the page is open. */
   async follow() {
-    for (let version = ""; ; ) {
+    for (let heard; ; ) {
       try {
-        this.news = await this.server.state(version);
-        version = this.news.version;
+        const news = await this.server.state(this.news);
         trouble("");
-        await this.hear();
+        if (this.news && news.opened !== this.news.opened && this.layout) {
+          location.reload(); // What is here is about another mesh, down to the numbers of its vertices.
+          return;
+        }
+        const isOld = !news.layout || news.layout === this.layout;
+        heard = [news, isOld ? null : await this.server.layout(this.viewer?.model)];
       } catch (error) {
         if (error instanceof Refusal) {
           trouble(error.message);
@@ -45,16 +49,20 @@ class Studio {
         const again = this.news?.project ? `; start it again with: coneflat studio ${this.news.project}` : "";
         trouble(`the studio does not answer. Everything that was chosen is kept${again}`);
         await new Promise((done) => setTimeout(done, RETRY));
+        continue;
       }
+      this.hear(...heard);
     }
   }
 
-  async hear() {
+  /** Show what is new; model: the layout, if that is. */
+  hear(news, model) {
+    this.news = news;
     document.body.classList.toggle("empty", !this.news.mesh);
-    if (this.news.layout && this.news.layout !== this.layout) {
-      this.take(await this.server.layout(this.viewer?.model));
-      this.layout = this.news.layout;
-    }
+    document.body.classList.toggle("bare", !this.news.layout);
+    if (!this.viewer) document.getElementById("name").textContent = this.news.mesh ?? "";
+    if (model) this.take(model);
+    if (model) this.layout = news.layout;
     this.paint.hear();
     this.panel.show();
     this.viewer?.remark();

@@ -4,8 +4,8 @@
 const TOOLS = [
   ["look", "Look", "v", "Drag turns the model. Drag a cone to move it."],
   ["cone", "Cone", "a", "Click puts a cone there; drag one to move it."],
-  ["cut", "Cut", "x", "Click from point to point: the shortest path between them is cut. Esc ends the line."],
-  ["keep", "Keep whole", "k", "Click from point to point: no seam runs along the path between them. Esc ends the line."],
+  ["cut", "Cut", "x", "Click from point to point: the shortest path between them is cut. Esc, or Cut again, ends the line."],
+  ["keep", "Keep whole", "k", "Click from point to point: no seam runs along the path between them. Esc, or Keep whole again, ends the line."],
   ["corner", "Corner", "o", "Click four points of the boundary: the corners of a rectangle. A click on one takes it away."],
 ];
 const NEAR = 12; // pixels within which a click means what is there
