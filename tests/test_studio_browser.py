@@ -232,6 +232,20 @@ def test_another_mesh_takes_the_place_of_the_first(visit, tmp_path):
     assert visit.page.locator("#cone-list > .cone").count() == 0
 
 
+def test_a_layout_that_is_gone_stops_nothing(visit):
+    visit.settle()
+    visit.page.route(
+        "**/layout*", lambda route: route.fulfill(status=400, body="there is no layout yet"), times=1
+    )
+    visit.page.locator("#stretch").focus()
+    visit.page.keyboard.press("End")
+    visit.wait("studio.news.choices.options.stretch === 1 && !studio.isBusy()")
+    visit.page.keyboard.press("Home")
+    visit.settle()
+    assert visit.page.locator("#trouble").is_hidden()
+    visit.troubles.clear()  # The browser tells of the refusal, too.
+
+
 def test_the_page_says_when_the_studio_has_ended(browser, studio):
     visit = StudioVisit(browser, studio)
     visit.settle()

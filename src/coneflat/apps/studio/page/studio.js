@@ -39,7 +39,7 @@ class Studio {
           return;
         }
         const isOld = !news.layout || news.layout === this.layout;
-        heard = [news, isOld ? null : await this.server.layout(this.viewer?.model)];
+        heard = [news, isOld ? null : await this.server.layout(this.viewer?.model).catch(orNone)];
       } catch (error) {
         if (error instanceof Refusal) {
           trouble(error.message);
@@ -356,6 +356,12 @@ class Studio {
   cornersShown() {
     return this.tools.mode === "corner" || this.choices.options.boundary === "rectangle" ? this.choices.corners ?? [] : [];
   }
+}
+
+/** A layout that is refused is there no more: another mesh was opened meanwhile, of which there will be news. */
+function orNone(error) {
+  if (error instanceof Refusal) return null;
+  throw error;
 }
 
 window.studio = new Studio();
