@@ -132,8 +132,8 @@ def test_lengths_that_are_no_sides_of_triangles_are_refused(function, lengths):
         function(lengths)
 
 
-@pytest.mark.parametrize("vertices", [np.ones((4, 2)), np.ones(12), [["a"] * 3] * 4])
-def test_vertices_that_are_no_points_in_space_have_no_edge_lengths(vertices):
+@pytest.mark.parametrize("vertices", [np.ones(12), np.ones((4, 3, 3)), [["a"] * 3] * 4])
+def test_vertices_that_are_no_points_have_no_edge_lengths(vertices):
     with pytest.raises(errors.ArrayShapeError):
         edge_lengths(vertices, np.array([[0, 1, 2]]))
 

@@ -22,12 +22,16 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return (m, 3) side lengths in model units; both sides of an edge get the same bits.
 
     Raises:
-        ArrayShapeError: vertices are not (n, 3), or faces not (m, 3).
+        ArrayShapeError: vertices are not (n, 3), or (n, 2), or faces not (m, 3).
         FaceIndexError: a face names a vertex that does not exist.
     """
     from ..mesh import measure_sides
 
-    points, triangles = as_triples("vertices", vertices), np.asarray(faces, dtype=np.int64)
+    points, triangles = as_floats("vertices", vertices), np.asarray(faces, dtype=np.int64)
+    if points.ndim != 2:
+        raise ArrayShapeError(
+            f"vertices must have the shape (n, 3), or (n, 2) in the plane, not {points.shape}"
+        )
     if triangles.ndim != 2 or triangles.shape[1] != 3:
         raise ArrayShapeError(f"faces must have the shape (m, 3), not {triangles.shape}")
     if triangles.size and not 0 <= triangles.min() <= triangles.max() < len(points):
