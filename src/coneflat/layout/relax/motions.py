@@ -17,6 +17,8 @@ from .seam_chains import SeamChains, find_chains
 # Relative size below which what elimination leaves of an equation is rounding, and of a coefficient. What is taken for
 # none there is missed by the sides of seams.
 ROUNDING, NONE = 1e-10, 1e-15
+# What rounding leaves between the sides of seams is looked at in units of this, in which it is not none.
+FINE = 2.0**-40
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +31,7 @@ class Motions:
         unknown, coefficient: which they are, and by what they shift the point. The unknown k is none to be solved for:
             at 1 it takes the points to where the constraints want them.
         has_offset: whether constraints do not hold as the points are.
+        made_by: what has made them.
     """
 
     count: int
@@ -36,6 +39,21 @@ class Motions:
     unknown: IntArray
     coefficient: ComplexArray
     has_offset: bool
+    made_by: _Builder
+
+    def closed(self, points: ComplexArray) -> ComplexArray:
+        """Return points (u,) that were moved so, with what rounding has left between the sides of seams closed.
+
+        Layouts may shrink a thousand times, and what is rounding of where points were is as much more of a seam then.
+        Those that were brought to quarter turns stay as they are.
+        """
+        if self.made_by.constraints.quarter_turns:
+            return points
+        motions = self.made_by.at(points).motions()
+        step = np.zeros(motions.count + 1)
+        step[-1] = FINE
+        moved: ComplexArray = points + motions.shifts(step)
+        return moved
 
     def shifts(self, step: FloatArray) -> ComplexArray:
         """Return (u,) the shifts of the points, with step (k + 1,)."""
@@ -107,8 +125,11 @@ class _Builder:
         is_free: BoolArray,
         chains: SeamChains,
         constraints: CheckedConstraints,
+        is_closing: bool = False,
     ) -> None:
         self.points, self.vertex, self.chains, self.constraints = points, vertex, chains, constraints
+        self.is_closing = is_closing
+        self.free_vertices = is_free
         self.is_free = is_free[vertex]
         self.entries: list[tuple[IntArray, IntArray, ComplexArray]] = []
         on_seam = np.zeros(len(points), dtype=bool)
@@ -137,6 +158,12 @@ class _Builder:
             for side, shift in zip(c.tied.tolist(), self._complex(c.translations).tolist(), strict=True)
         ]
 
+    def at(self, points: ComplexArray) -> _Builder:
+        """Return the same for points to which these were moved, whose offset in units of `FINE` closes all seams."""
+        return _Builder(
+            points, self.vertex, self.free_vertices, self.chains, self.constraints, is_closing=True
+        )
+
     def _loose_chains(self) -> IntArray:
         """Return the chains whose translations may change."""
         chains = self.chains
@@ -164,10 +191,11 @@ class _Builder:
 
     def _missing(self, left: IntArray, right: IntArray, chain: IntArray) -> ComplexArray:
         """Return by what right points have to be shifted to be where the left ones go; nothing along rigid seams."""
-        if not self.constraints.quarter_turns:
+        if not (self.constraints.quarter_turns or self.is_closing):
             return np.zeros(len(left), dtype=np.complex128)
         turned: ComplexArray = self.chains.rotation[chain] * self.points[left]
-        return turned + self.translation[chain] - self.points[right]
+        missing: ComplexArray = turned + self.translation[chain] - self.points[right]
+        return missing / FINE if self.is_closing else missing
 
     def motions(self) -> Motions:
         """Return the motions."""
@@ -191,6 +219,7 @@ class _Builder:
             unknown[order],
             coefficient[order],
             bool(np.any(coefficient[last] != 0)),
+            self,
         )
 
     def _add(self, points: IntArray, variables: IntArray, factors: ComplexArray, is_complex: bool) -> None:
@@ -304,8 +333,8 @@ class _Builder:
         diagonal = np.abs(np.diag(r))
         rank = int((diagonal > ROUNDING * max(diagonal[0], 1e-300)).sum())
         turned = q.T @ right
-        missed = float(np.abs(right - q[:, :rank] @ turned[:rank]).max())
-        _require_solved(missed, right)
+        if not self.is_closing:  # rounding may contradict itself, between points that stay
+            _require_solved(float(np.abs(right - q[:, :rank] @ turned[:rank]).max()), right)
         solved = scipy.linalg.solve_triangular(
             r[:rank, :rank], np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
         )

@@ -130,7 +130,8 @@ def relax(
             f"in {plural(found.steps, 'step')}"
         )
     total = float(elements.weight.sum())
-    moved = np.stack([found.points.real, found.points.imag], axis=1)
+    closed = motions.closed(found.points)
+    moved = np.stack([closed.real, closed.imag], axis=1)
     return Relaxed(moved, found.before / total, found.after / total, found.steps, is_free)
 
 
