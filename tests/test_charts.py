@@ -66,7 +66,7 @@ class TestSeparate:
         if first == second:
             second = (first + 1) % len(disk.faces)
         one[first] = other[second] = True
-        pieces = separate(disk, one, other, costs.astype(float))
+        pieces = separate(disk, one, other, costs.astype(float)[disk.halfedge_edges].reshape(-1, 3))
         assert pieces[first] != pieces[second]
         inside = np.flatnonzero(~disk.is_boundary_edge)
         a, b = disk.edge_faces[inside].T

@@ -16,7 +16,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "coneflat"
 #: Rooms, from the ground up; a room is a folder, or a file beside them.
 FLOORS: tuple[tuple[str, ...], ...] = (
     ("", "errors", "text"),
-    ("_arrays", "compiled", "threads", "progress", "kept"),
+    ("_arrays", "_sets", "compiled", "threads", "progress", "kept"),
     ("mesh", "options"),
     ("geometry", "solver"),
     ("quality", "seams"),
@@ -37,6 +37,7 @@ HOLDS = {
     "errors": "all that users can cause",
     "text": "words for messages",
     "_arrays": "array types, users' arrays checked",
+    "_sets": "sets by union and find",
     "compiled": "the decorator of kernels",
     "threads": "cores, two stages at once",
     "progress": "stages timed and told",

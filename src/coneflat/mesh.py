@@ -15,6 +15,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ._arrays import BoolArray, FloatArray, IntArray
+from ._sets import label_nodes
 from .compiled import compiled
 
 NEXT = np.array([1, 2, 0])
@@ -354,35 +355,6 @@ def has_one_fan_each(faces: IntArray, count: int, edge_of: IntArray, sides: IntA
         if seen != valence[vertex]:
             return False
     return True
-
-
-@compiled
-def label_nodes(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
-    """Return the number of connected components of a graph and the component of each node, in the order of nodes.
-
-    Of two trees of nodes that an edge joins, the root of larger index goes under the other; paths to roots are halved.
-    """
-    parent = np.arange(count)
-    for e in range(len(tails)):
-        one, two = tails[e], heads[e]
-        while parent[one] != one:
-            parent[one] = parent[parent[one]]
-            one = parent[one]
-        while parent[two] != two:
-            parent[two] = parent[parent[two]]
-            two = parent[two]
-        if one < two:
-            parent[two] = one
-        else:
-            parent[one] = two
-    number = 0
-    for v in range(count):  # a parent comes before its children
-        if parent[v] == v:
-            parent[v] = number
-            number += 1
-        else:
-            parent[v] = parent[parent[v]]
-    return number, parent
 
 
 @compiled

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats
+from ..compiled import compiled
 from ..errors import ArrayShapeError, FaceIndexError, OptionError
 from ..geometry.charts import label_charts
 from ..geometry.graph import MultiGraph, trace_back
+from ..geometry.parts import part_of
 from ..mesh import NEXT, TriangleMesh, corner_fans, label_components, sort_by_counting, sort_pairs
 from ..progress import go_on
 from ..text import list_some, plural
@@ -44,18 +46,21 @@ def split_overlaps(
         whole: what `as_disk` returns of all triangles, if that is known.
     """
     chart, count = np.zeros(len(corners), dtype=np.int64), 1
-    waiting = [(np.arange(len(corners)), pairs)] if len(pairs) else []
+    waiting = []
+    if len(pairs):
+        disk = as_disk(points, corners) if whole is None else whole
+        waiting.append((np.arange(len(corners)), pairs, disk, np.arange(len(corners))))
     while waiting and count < most:
         go_on()
-        faces, pairs = waiting.pop()
-        disk = whole if whole is not None and len(faces) == len(corners) else as_disk(points, corners[faces])
+        faces, pairs, disk, members = waiting.pop()
+        if len(members) < len(disk.faces):
+            disk = unpinched(part_of(disk, members))
         one, other = np.zeros((2, len(faces)), dtype=bool)
         for layer, members in zip((one, other), largest_layers(pairs, disk.faces, areas[faces]), strict=True):
             layer[members] = True
         if least > 0:
             one, other = widen(disk, one, other, areas[faces], least)
-        sides = disk.edge_halfedges[:, 0]
-        pieces = separate(disk, one, other, costs[3 * faces[sides // 3] + sides % 3])
+        pieces = separate(disk, one, other, costs.reshape(-1, 3)[faces])
         if pieces is None:
             # They stay together and overlap, which the measures show.
             continue
@@ -66,7 +71,8 @@ def split_overlaps(
                 chart[faces[members]] = count
                 count += 1
             if (left == piece).any():
-                waiting.append((faces[members], np.searchsorted(members, pairs[left == piece])))
+                within = np.searchsorted(members, pairs[left == piece])
+                waiting.append((faces[members], within, disk, members))
     return None if waiting else chart
 
 
@@ -74,13 +80,17 @@ def as_disk(points: FloatArray, corners: IntArray) -> TriangleMesh:
     """Return triangles of the plane as a mesh of their own, opened where they touch in a point only."""
     is_used = np.zeros(len(points), dtype=bool)
     is_used[corners] = True
-    pinched = TriangleMesh(points[is_used], (np.cumsum(is_used) - 1)[corners])
-    if np.count_nonzero(pinched.is_boundary_edge) == np.count_nonzero(pinched.is_boundary_vertex):
-        return pinched
-    inside = pinched.edge_halfedges[~pinched.is_boundary_edge]
-    count, fans = corner_fans(pinched.faces, *inside.T)
+    return unpinched(TriangleMesh(points[is_used], (np.cumsum(is_used) - 1)[corners]))
+
+
+def unpinched(mesh: TriangleMesh) -> TriangleMesh:
+    """Return triangles of the plane opened where they touch in a point only."""
+    if np.count_nonzero(mesh.is_boundary_edge) == np.count_nonzero(mesh.is_boundary_vertex):
+        return mesh
+    inside = mesh.edge_halfedges[~mesh.is_boundary_edge]
+    count, fans = corner_fans(mesh.faces, *inside.T)
     vertices = np.empty((count, 2))
-    vertices[fans] = pinched.vertices[pinched.faces]
+    vertices[fans] = mesh.vertices[mesh.faces]
     return TriangleMesh(vertices, fans)
 
 
@@ -92,7 +102,7 @@ def separate(disk: TriangleMesh, one: BoolArray, other: BoolArray, costs: FloatA
     Args:
         disk: a topological disk.
         one, other: (m,) True for the triangles to be separated: two sets, connected each, without a common member.
-        costs: (e,) of each edge, positive.
+        costs: (m, 3) of the side opposite each corner, positive, and the same from both triangles.
     """
     border = disk.halfedge_edges[disk.boundary_walk()]
     both = _both_to_the_border(disk, border, one, other)
@@ -198,14 +208,26 @@ def _cheapest_path(
     costs: FloatArray,
 ) -> IntArray:
     """Return the edges of the cheapest path inside a disk that runs through neither set of triangles."""
-    faces = disk.edge_faces
-    left, right = faces.T
-    passable = ~(disk.is_boundary_edge | (one[left] & one[right]) | (other[left] & other[right]))
     one_end, other_end = np.ascontiguousarray(disk.edges.T)
-    graph = MultiGraph(len(disk.vertices), one_end, other_end, np.where(passable, costs, np.inf))
+    ways = cost_of_edges(disk.edge_halfedges, one, other, costs)
+    graph = MultiGraph(len(disk.vertices), one_end, other_end, ways)
     distance, before, _ = graph.shortest_paths(starts, ends)
     nodes, previous = trace_back(ends[[np.argmin(distance[ends])]], before)
     return graph.edges_between(nodes, previous)
+
+
+@compiled
+def cost_of_edges(
+    edge_halfedges: IntArray, one: BoolArray, other: BoolArray, costs: FloatArray
+) -> FloatArray:
+    """Return (e,) what edges cost with costs (m, 3) of sides: without end on the border and within one set."""
+    found = np.full(len(edge_halfedges), np.inf)
+    for e in range(len(found)):
+        h, t = edge_halfedges[e]
+        left, right = h // 3, t // 3
+        if t >= 0 and not (one[left] and one[right]) and not (other[left] and other[right]):
+            found[e] = costs[left, h % 3]
+    return found
 
 
 def overlap_regions(pairs: ArrayLike, triangles: ArrayLike) -> tuple[int, IntArray]:

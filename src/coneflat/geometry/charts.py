@@ -8,8 +8,9 @@ from typing import TypeVar
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from .._sets import number_sets, unite
 from ..compiled import compiled
-from ..mesh import TriangleMesh, end_corners, label_components
+from ..mesh import TriangleMesh, end_corners
 
 # UV distance over UV edge length at which two sides of an edge count as one.
 JOINED = 1e-6
@@ -51,8 +52,18 @@ def joined_edges(mesh: TriangleMesh, corner_uv: FloatArray) -> BoolArray:
 
 def label_charts(mesh: TriangleMesh, joined: BoolArray) -> tuple[int, IntArray]:
     """Return the number of charts, and (m,) the chart of each triangle; `joined` (e,) are inner edges within charts."""
-    faces = mesh.edge_faces[joined]
-    return label_components(len(mesh.faces), faces[:, 0], faces[:, 1])
+    number, labels = label_across(mesh.edge_halfedges, joined, len(mesh.faces))
+    return int(number), labels
+
+
+@compiled
+def label_across(edge_halfedges: IntArray, joined: BoolArray, count: int) -> tuple[int, IntArray]:
+    """Return how many sets of triangles hang together across joined edges (e,), and the set of each of `count`."""
+    parent = np.arange(count)
+    for e in range(len(joined)):
+        if joined[e]:
+            unite(parent, edge_halfedges[e, 0] // 3, edge_halfedges[e, 1] // 3)
+    return number_sets(parent), parent
 
 
 @compiled

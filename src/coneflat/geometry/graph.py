@@ -29,28 +29,11 @@ class MultiGraph:
     heads: IntArray
     costs: FloatArray
 
-    @cached_property
-    def _simple(self) -> tuple[IntArray, IntArray]:
-        """The cheapest edge of each pair of adjacent nodes, and the sorted keys of the pairs."""
-        keys = self._keys(self.tails, self.heads)
-        if (np.diff(keys) > 0).all() and (self.tails != self.heads).all():  # as the edges of a mesh are
-            return np.arange(len(keys)), keys
-        order, first = sort_pairs(self.tails, self.heads, self.nodes)
-        if not first.all():
-            group = np.cumsum(first)
-            order = order[np.lexsort((self.costs[order], group))]
-        chosen = order[first]
-        chosen = chosen[self.tails[chosen] != self.heads[chosen]]
-        return chosen, self._keys(self.tails[chosen], self.heads[chosen])
-
-    def _keys(self, one: IntArray, two: IntArray) -> IntArray:
-        keys: IntArray = np.minimum(one, two).astype(np.int64) * self.nodes + np.maximum(one, two)
-        return keys
-
     def edges_between(self, one: IntArray, two: IntArray) -> IntArray:
-        """Return the cheapest edge between each pair of adjacent nodes."""
-        chosen, keys = self._simple
-        return chosen[np.searchsorted(keys, self._keys(one, two))]
+        """Return the cheapest edge between each pair of adjacent nodes, of several the first."""
+        edges = np.empty(len(one), dtype=np.int64)
+        find_edges(*self._beside, *self._ends, self.costs, one, two, edges)
+        return edges
 
     @cached_property
     def _beside(self) -> tuple[IntArray, IntArray]:
@@ -99,13 +82,18 @@ class MultiGraph:
 
     def minimum_spanning_tree(self) -> IntArray:
         """Return the edges of a minimum spanning forest."""
-        chosen, _ = self._simple
+        order, first = sort_pairs(self.tails, self.heads, self.nodes)
+        if not first.all():
+            order = order[np.lexsort((self.costs[order], np.cumsum(first)))]
+        chosen = order[first]
+        chosen = chosen[self.tails[chosen] != self.heads[chosen]]
         # Ranks instead of costs: SciPy takes a zero for no edge.
         rank = np.empty(len(chosen))
-        rank[np.lexsort((chosen, self.costs[chosen]))] = np.arange(1, len(chosen) + 1)
+        by_rank = np.lexsort((chosen, self.costs[chosen]))
+        rank[by_rank] = np.arange(1, len(chosen) + 1)
         matrix = csr_matrix((rank, (self.tails[chosen], self.heads[chosen])), shape=(self.nodes, self.nodes))
         tree = minimum_spanning_tree(matrix).tocoo()
-        return self.edges_between(tree.row.astype(np.int64), tree.col.astype(np.int64))
+        return chosen[by_rank[tree.data.astype(np.int64) - 1]]
 
 
 def trace_back(starts: IntArray, predecessor: IntArray) -> tuple[IntArray, IntArray]:
@@ -134,6 +122,30 @@ def list_sides(tails: IntArray, heads: IntArray, starts: IntArray, sides: IntArr
         sides[starts[heads[e]]] = 2 * e + 1
         starts[tails[e]] -= 1
         sides[starts[tails[e]]] = 2 * e
+
+
+@compiled
+def find_edges(
+    starts: IntArray,
+    sides: IntArray,
+    tails: IntArray,
+    heads: IntArray,
+    costs: FloatArray,
+    one: IntArray,
+    two: IntArray,
+    edges: IntArray,
+) -> None:
+    """Fill the cheapest edges between pairs of adjacent nodes, of several the first; for sides see `list_sides`."""
+    for i in range(len(one)):
+        here, there = one[i], two[i]
+        if starts[here + 1] - starts[here] > starts[there + 1] - starts[there]:
+            here, there = there, here
+        least, edges[i] = np.inf, -1
+        for at in range(starts[here], starts[here + 1]):
+            e = sides[at] // 2
+            other = tails[e] if sides[at] % 2 else heads[e]
+            if other == there and (edges[i] < 0 or costs[e] < least):
+                least, edges[i] = costs[e], e
 
 
 @compiled

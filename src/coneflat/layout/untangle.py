@@ -211,7 +211,10 @@ class _Untangling:
         now, then = (
             winding_vertices(sides, self.faces[rows], self.angles, is_free) for sides in (before, after)
         )
-        return np.setdiff1d(then[near[then]], now)
+        # All that are far from the patches are among both.
+        is_new = near
+        is_new[now] = False
+        return then[is_new[then]]
 
 
 def winding_vertices(

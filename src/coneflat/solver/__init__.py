@@ -5,13 +5,14 @@ The ladder, best first: MKL PARDISO (pypardiso) for large systems, CHOLMOD witho
 """
 
 from .back_ends import HermitianFactor, available, factorize, solving, used_again
-from .factors import Factor, NotPositiveDefinite
+from .factors import Factor, NotPositiveDefinite, aligned
 from .memory import fitting_solver
 
 __all__ = [
     "Factor",
     "HermitianFactor",
     "NotPositiveDefinite",
+    "aligned",
     "available",
     "factorize",
     "fitting_solver",

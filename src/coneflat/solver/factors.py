@@ -5,6 +5,7 @@ A matrix is factorized once and solved with often. Each back end loads its packa
 
 from __future__ import annotations
 
+import math
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,6 +18,19 @@ from ..errors import MetricError
 
 class NotPositiveDefinite(ArithmeticError):
     """The matrix has no Cholesky factorization in floating point."""
+
+
+def aligned(shape: tuple[int, ...]) -> FloatArray:
+    """Return room for numbers, in one piece, that starts at a multiple of 64 bytes; MKL counts on it."""
+    size = math.prod(shape)
+    buffer = np.empty(size + 8)
+    start = -(buffer.ctypes.data // 8) % 8
+    return buffer[start : start + size].reshape(shape)
+
+
+def is_aligned(array: FloatArray) -> bool:
+    """Return whether an array is like those of `aligned`."""
+    return array.dtype == np.float64 and array.flags.c_contiguous and array.ctypes.data % 64 == 0
 
 
 class Factor(Protocol):

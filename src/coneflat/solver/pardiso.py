@@ -20,7 +20,7 @@ from scipy.sparse import csc_matrix
 
 from .._arrays import FloatArray
 from ..threads import threads
-from .factors import NotPositiveDefinite
+from .factors import NotPositiveDefinite, aligned, is_aligned
 
 AnyArray: TypeAlias = NDArray[Any]
 
@@ -76,11 +76,11 @@ class PardisoFactor:
         self._rows = np.ascontiguousarray(rows[self._is_lower], dtype=np.int32)
         self._starts = np.zeros(len(starts), dtype=np.int32)
         np.cumsum(np.bincount(columns[self._is_lower], minlength=len(starts) - 1), out=self._starts[1:])
-        self._values = _aligned(matrix.data[self._is_lower])
+        self._values = _copied(matrix.data[self._is_lower])
         self._call(ANALYSE)
 
     def _fill(self, matrix: csc_matrix) -> None:
-        self._values = _aligned(matrix.data[self._is_lower])
+        self._values = _copied(matrix.data[self._is_lower])
         self._call(FACTORIZE)
 
     def solve(self, right: FloatArray) -> FloatArray:
@@ -88,8 +88,10 @@ class PardisoFactor:
         # One after the other in memory; of (k, n) this is a view.
         if right.ndim == 2 and right.shape[1] < TOGETHER:
             return np.stack([self.solve(column) for column in right.T]).T
-        columns = _aligned(right.T)
-        solution = _aligned(columns, with_values=False)
+        columns = right.T
+        if not is_aligned(columns):
+            columns = _copied(columns)
+        solution = aligned(columns.shape)
         self._call(SOLVE, columns, solution)
         return solution.T
 
@@ -120,13 +122,9 @@ class PardisoFactor:
             raise RuntimeError(f"PARDISO failed with code {code} in phase {phase}")
 
 
-def _aligned(array: AnyArray, with_values: bool = True) -> FloatArray:
-    """Return a copy, in one piece, that starts at a multiple of 64 bytes: what MKL's last digits depend on."""
-    buffer = np.empty(array.size + 8)
-    start = -(buffer.ctypes.data // 8) % 8
-    copy = buffer[start : start + array.size].reshape(array.shape)
-    if with_values:
-        copy[...] = array
+def _copied(array: FloatArray) -> FloatArray:
+    copy = aligned(array.shape)
+    copy[...] = array
     return copy
 
 

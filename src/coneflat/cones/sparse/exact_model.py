@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg.blas import daxpy
 
 from ..._arrays import BoolArray, FloatArray, IntArray
 from ...compiled import compiled
+from ...solver import aligned
 from .best_sets import BestSets
 from .dense_model import DenseModel, first_least
 from .limits import Limits
@@ -44,6 +46,7 @@ class ExactModel(DenseModel):
         # The Green's functions of the unknowns, in blocks as they came, and their means.
         self._responses: list[FloatArray] = []
         self._means: list[FloatArray] = []
+        self._sources = np.empty((0, 0))
         self.unknowns: IntArray = np.empty(0, dtype=np.int64)
         if len(required):
             self._add(required, operator.known_responses(required))
@@ -57,10 +60,16 @@ class ExactModel(DenseModel):
     def insert(self, unknowns: IntArray) -> IntArray:
         """Add vertices, if they are not in, and return the places of all."""
         new = np.setdiff1d(unknowns, self.unknowns)
-        if len(new):
-            self._add(new, self._operator.responses(new))
+        for some in self._operator.batches(new):
+            self._add(some, self._operator.responses(some, self._room(len(some))))
         order = np.argsort(self.unknowns, kind="stable")
         return order[np.searchsorted(self.unknowns, unknowns, sorter=order)]
+
+    def _room(self, count: int) -> FloatArray:
+        """Return (count, f) room for sources, the same each time."""
+        if len(self._sources) < count:
+            self._sources = aligned((count, len(self._log_scale)))
+        return self._sources[:count]
 
     def _add(self, new: IntArray, responses: FloatArray) -> None:
         """Add k vertices with their Green's functions (k, f)."""
@@ -81,7 +90,8 @@ class ExactModel(DenseModel):
     def _covariances(self, responses: FloatArray) -> FloatArray:
         """Add the Green's functions (k, f) of k unknowns more; return (k, m + k) their covariances with all."""
         areas = self._operator.areas
-        weighted, means = responses * areas, responses @ areas
+        means = responses @ areas
+        weighted = np.multiply(responses, areas, out=self._room(len(responses)))
         self._responses.append(responses)
         self._means.append(means)
         return np.hstack(
@@ -136,8 +146,8 @@ class ExactModel(DenseModel):
         log_scale = self._log_scale.copy()
         first = 0
         for block in self._responses:
-            inside = (members >= first) & (members < first + len(block))
-            log_scale += curvatures[inside] @ block[members[inside] - first]
+            for i in np.flatnonzero((members >= first) & (members < first + len(block))):
+                daxpy(block[members[i] - first], log_scale, a=curvatures[i])
             first += len(block)
         return self._operator.solve(self._operator.weighted(log_scale))
 

@@ -1,0 +1,45 @@
+"""Sets of nodes that hang together, by union and find."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._arrays import IntArray
+from .compiled import compiled
+
+
+@compiled
+def label_nodes(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
+    """Return the number of connected components of a graph and the component of each node, in the order of nodes."""
+    parent = np.arange(count)
+    for e in range(len(tails)):
+        unite(parent, tails[e], heads[e])
+    return number_sets(parent), parent
+
+
+@compiled
+def unite(parent: IntArray, one: int, two: int) -> None:
+    """Join the trees of two nodes: the root of larger index goes under the other; paths to roots are halved."""
+    while parent[one] != one:
+        parent[one] = parent[parent[one]]
+        one = parent[one]
+    while parent[two] != two:
+        parent[two] = parent[parent[two]]
+        two = parent[two]
+    if one < two:
+        parent[two] = one
+    else:
+        parent[one] = two
+
+
+@compiled
+def number_sets(parent: IntArray) -> int:
+    """Write the number of its tree, in the order of nodes, over the parent of each; return how many there are."""
+    number = 0
+    for v in range(len(parent)):  # a parent comes before its children
+        if parent[v] == v:
+            parent[v] = number
+            number += 1
+        else:
+            parent[v] = parent[parent[v]]
+    return number
