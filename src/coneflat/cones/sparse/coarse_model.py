@@ -16,6 +16,8 @@ from .green import GreenOperator
 
 # E^2 that is zero but for rounding.
 ROUNDING = 1e-18
+# Rows of a product of dense matrices that are computed at a time.
+BLOCK = 320
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +74,8 @@ def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> C
         # Makes it definite, and means the same: what a source has in sum is taken off in proportion to area.
         stiffness += np.outer(weights, weights) * (stiffness.trace() / (weights @ weights) / len(weights))
     green = inverse_of_definite(stiffness)
-    kernel, mean = green @ (coarse.mass @ green), green @ weights
-    kernel = (kernel + kernel.T) / 2 - np.outer(mean, mean)
+    kernel, mean = symmetric_product(green, coarse.mass @ green), green @ weights
+    kernel -= np.outer(mean, mean)
     bare = basis.T @ curvature
     slope = -(kernel @ bare)
     return CoarseModel(basis, kernel, slope, float(-(slope @ bare)))
@@ -87,6 +89,20 @@ def candidates(model: CoarseModel, fitness: FloatArray) -> IntArray:
     if np.count_nonzero(fitness) <= model.basis.shape[1]:
         return np.flatnonzero(fitness)
     return representatives(model.basis, fitness)
+
+
+def symmetric_product(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the product of two matrices (m, m) that is symmetric: what is left of the diagonal is not computed."""
+    product = np.empty_like(one)
+    for start in range(0, len(one), BLOCK):
+        stop = start + BLOCK
+        product[start:stop, start:] = one[start:stop] @ other[:, start:]
+        product[stop:, start:stop] = product[start:stop, stop:].T
+    # The blocks on the diagonal are symmetric but for rounding.
+    for start in range(0, len(one), BLOCK):
+        block = product[start : start + BLOCK, start : start + BLOCK]
+        block[:] = (block + block.T) / 2
+    return product
 
 
 def inverse_of_definite(matrix: FloatArray) -> FloatArray:
