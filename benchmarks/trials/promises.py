@@ -105,13 +105,14 @@ def _check_origin(trial: Trial) -> None:
             trial.outcome.breach("origin: faces are not the input's", "")
         if whole.all() != (result.solve.split_triangles == 0):
             trial.outcome.breach("origin: faces were cut in secret", f"{np.count_nonzero(~whole)} pieces")
+        unit = np.abs(vertices).max()  # so that areas are numbers even where coordinates are 1e200
         pieces = np.bincount(
             result.face_origin[~whole],
-            plane.areas_in_space(result.vertices, result.faces[~whole]),
+            plane.areas_in_space(result.vertices / unit, result.faces[~whole]),
             len(faces),
         )
         cut = np.unique(result.face_origin[~whole])
-        before = plane.areas_in_space(vertices, faces[cut])
+        before = plane.areas_in_space(vertices / unit, faces[cut])
         if not (np.abs(pieces[cut] - before) <= 1e-9 * before.max(initial=0.0)).all():
             trial.outcome.breach(
                 "origin: pieces are not those of their faces", np.abs(pieces[cut] - before).max()

@@ -253,7 +253,8 @@ class ConeSearch:
         Where the coarse model is off, it is off by nearly the same factor for more cones: straight to where that goes.
         """
         coarse = self.coarse.best
-        while self._on_mesh(count) > goal and count < most:
+        # Where there is nothing left on the coarse model, more cones bring nothing.
+        while self._on_mesh(count) > goal and count < most and coarse.energy(count) > 0:
             off = max(self.exact.best.energy(count) / coarse.energy(count), 1.0)
             self.coarse.climb(goal / off, most, count)
             larger = [size for size in coarse.sizes if size > count]
