@@ -181,9 +181,9 @@ def test_what_cannot_be_reached_is_the_best_there_is():
     assert set(found.solution.cones) <= {0, 5, 9, 11}
 
 
-@pytest.mark.parametrize("shape", [shapes.cylinder, shapes.bottle])
-def test_a_distortion_whose_square_is_zero_may_be_asked_for(shape):
-    assert pursue(*shape(), distortion=1e-300).distortion <= pursue(*shape()).distortion
+def test_a_distortion_whose_square_is_zero_may_be_asked_for():
+    cylinder = shapes.cylinder()
+    assert pursue(*cylinder, distortion=1e-300).distortion <= pursue(*cylinder).distortion
 
 
 @pytest.mark.parametrize(
