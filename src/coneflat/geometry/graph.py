@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import minimum_spanning_tree
 
 from .._arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..compiled import compiled
@@ -98,14 +96,10 @@ class MultiGraph:
         return wide
 
     def minimum_spanning_tree(self) -> IntArray:
-        """Return the edges of a minimum spanning forest."""
-        chosen, _ = self._simple
-        # Ranks instead of costs: SciPy takes a zero for no edge.
-        rank = np.empty(len(chosen))
-        rank[np.lexsort((chosen, self.costs[chosen]))] = np.arange(1, len(chosen) + 1)
-        matrix = csr_matrix((rank, (self.tails[chosen], self.heads[chosen])), shape=(self.nodes, self.nodes))
-        tree = minimum_spanning_tree(matrix).tocoo()
-        return self.edges_between(tree.row.astype(np.int64), tree.col.astype(np.int64))
+        """Return the edges of a minimum spanning forest; of equally dear ones the first."""
+        in_tree = np.zeros(len(self.costs), dtype=bool)
+        grow_forest(np.argsort(self.costs, kind="stable"), *self._ends, self.nodes, in_tree)
+        return np.flatnonzero(in_tree)
 
 
 def trace_back(starts: IntArray, predecessor: IntArray) -> tuple[IntArray, IntArray]:
@@ -117,6 +111,27 @@ def trace_back(starts: IntArray, predecessor: IntArray) -> tuple[IntArray, IntAr
             steps[node] = before
             node = before
     return np.array(list(steps.keys()), dtype=np.int64), np.array(list(steps.values()), dtype=np.int64)
+
+
+@compiled
+def grow_forest(order: IntArray, tails: IntArray, heads: IntArray, nodes: int, in_tree: BoolArray) -> None:
+    """Mark the edges, taken in an order, that join what those before them had not (J. B. Kruskal 1956).
+
+    in_tree: (e,) False on entry.
+    """
+    above = np.arange(nodes)
+    for e in order:
+        one, two = tails[e], heads[e]
+        # Paths to the roots are halved on the way.
+        while above[one] != one:
+            above[one] = above[above[one]]
+            one = above[one]
+        while above[two] != two:
+            above[two] = above[above[two]]
+            two = above[two]
+        if one != two:
+            above[max(one, two)] = min(one, two)
+            in_tree[e] = True
 
 
 @compiled
