@@ -3,8 +3,9 @@
 First a single `coneflat flatten` of a model of 13,000 triangles from the command to its end, beside the work in it that
 is left once everything is loaded. Then `coneflat batch` of small meshes with one process and with two, beside the same
 meshes one after the other in one process that has loaded everything; and again with a fifth of them, for the memory.
-Then single meshes of many components with 80 triangles each, or 4, and what each of them takes.
-Seconds of the processor are those of all threads, and tell more where other work is going on beside.
+Then single meshes of many components with 80 triangles each, or 4, and what each of them takes, once with all
+components copies of one. Seconds of the processor are those of all threads, and tell more where other work is going on
+beside: throughput is then that of the cores that were left. `--only batch` takes two minutes on two free cores.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +33,27 @@ start, used = time.perf_counter(), time.process_time()
 for job in jobs:
     assert flatten_file(job)["status"] == "done"
 print(json.dumps([time.perf_counter() - start, time.process_time() - used]))
+"""
+
+# The workers' own processes are those that compute; they end with the workers, unwaited for.
+DASK = """
+import json, sys, time
+from pathlib import Path
+import psutil
+from distributed import LocalCluster
+from coneflat.apps.batch import find_jobs, run_batch
+if __name__ == "__main__":
+    folder, *meshes = sys.argv[1:]
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        start = time.perf_counter()
+        jobs = find_jobs(meshes, Path(folder), ".obj", {}, None)
+        found = run_batch(jobs, Path(folder), dask=cluster.scheduler_address)
+        taken = time.perf_counter() - start
+        assert not found.failed
+        own = psutil.Process()
+        all_times = [each.cpu_times() for each in (own, *own.children(recursive=True))]
+        memory = max(each.memory_info().rss for each in own.children(recursive=True))
+        print(json.dumps([taken, sum(each.user + each.system for each in all_times), memory / 1e6]))
 """
 
 MANY = """
@@ -51,19 +74,30 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=5, help="of the single command; medians count")
     parser.add_argument("--meshes", type=int, default=250)
     parser.add_argument("--components", type=int, default=1000)
+    parser.add_argument("--only", choices=("command", "batch", "components"), help="one of the tables")
     arguments = parser.parse_args()
+    # As installed: else what Python makes of our sources is made anew in each process, a quarter of a second.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    chosen = {arguments.only} if arguments.only else {"command", "batch", "components"}
     with tempfile.TemporaryDirectory() as folder:
-        print("| command | wall, s | processor, s | peak, MB |\n| --- | --- | --- | --- |")
-        model = next(iter(MODELS.glob("fandisk.*")), None) or write(
-            Path(folder) / "sphere.obj", shapes.sphere(5)
-        )
-        for words in (["--help"], ["flatten", str(model), "-o", str(Path(folder) / "flat.obj")]):
-            found = zip(*(costs([*COMMAND, *words]) for _ in range(arguments.runs)), strict=True)
-            wall, used, memory = (statistics.median(each) for each in found)
-            print(f"| {words[0]} | {wall:.2f} | {used:.2f} | {memory:.0f} |")
-        meshes = [write(Path(folder) / f"{i}.obj", small_mesh(i)) for i in range(arguments.meshes)]
-        print_batches(meshes, Path(folder))
-        print_components(arguments.components, Path(folder) / "joined.npz")
+        if "command" in chosen:
+            print_command(Path(folder), arguments.runs)
+        if "batch" in chosen:
+            meshes = [write(Path(folder) / f"{i}.obj", small_mesh(i)) for i in range(arguments.meshes)]
+            print_batches(meshes, Path(folder))
+        if "components" in chosen:
+            print_components(arguments.components, Path(folder) / "joined.npz")
+
+
+def print_command(folder: Path, runs: int) -> None:
+    """Print what a command costs from its start to its end."""
+    print("| command | wall, s | processor, s | peak, MB |\n| --- | --- | --- | --- |")
+    model = next(iter(MODELS.glob("fandisk.*")), None) or write(folder / "sphere.obj", shapes.sphere(5))
+    for words in (["--help"], ["flatten", str(model), "-o", str(folder / "flat.obj")]):
+        costs([*COMMAND, *words])  # the first makes bytecode
+        found = zip(*(costs([*COMMAND, *words]) for _ in range(runs)), strict=True)
+        wall, used, memory = (statistics.median(each) for each in found)
+        print(f"| {words[0]} | {wall:.2f} | {used:.2f} | {memory:.0f} |")
 
 
 def print_batches(meshes: list[Path], folder: Path) -> None:
@@ -73,20 +107,34 @@ def print_batches(meshes: list[Path], folder: Path) -> None:
         [sys.executable, "-c", SINGLE], input="\n".join(jobs), stdout=subprocess.PIPE, text=True
     )
     wall, used = json.loads(alone.stdout)
-    print("\n| meshes | | wall, s | processor, s | throughput | peak of a process, MB |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    print(f"| {len(meshes)} | one after the other, loaded | {wall:.1f} | {used:.1f} | 1 | |")
+    print("\n| meshes | | wall, s | processor, s | each, ms | cores | throughput | peak of a process, MB |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+
+    def print_row(count: int, name: str, taken: float, all_used: float, memory: float) -> None:
+        gain, each = wall * count / len(meshes) / taken, 1000 * all_used / count
+        cells = (
+            f"{taken:.1f} | {all_used:.1f} | {each:.1f} | {all_used / taken:.2f} | {gain:.2f} | {memory:.0f}"
+        )
+        print(f"| {count} | {name} | {cells} |", flush=True)
+
+    print_row(len(meshes), "one after the other, loaded", wall, used, 0.0)
     for count, processes in ((len(meshes), 1), (len(meshes), 2), (len(meshes) // 5, 2)):
         words = ["batch", *map(str, meshes[:count]), "--out", str(folder / f"{count}-{processes}")]
-        taken, all_used, memory = costs([*COMMAND, *words, "--jobs", str(processes), "--quiet"])
-        gain = wall * count / len(meshes) / taken
-        print(f"| {count} | batch, {processes} | {taken:.1f} | {all_used:.1f} | {gain:.2f} | {memory:.0f} |")
+        print_row(
+            count, f"batch, {processes}", *costs([*COMMAND, *words, "--jobs", str(processes), "--quiet"])
+        )
+    if find_spec("distributed") is not None:
+        script = write_script(folder / "cluster.py", DASK)
+        words = [sys.executable, str(script), str(folder / "dask"), *map(str, meshes)]
+        (folder / "dask").mkdir()
+        printed = subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True).stdout
+        print_row(len(meshes), "Dask, 2 workers", *json.loads(printed.splitlines()[-1]))
 
 
 def print_components(count: int, file: Path) -> None:
     """Print what a component takes in meshes of many small ones."""
     print("\n| components | triangles of each | processor, ms each |\n| --- | --- | --- |")
-    for kind in PIECES:
+    for kind in (*PIECES, "copies of a sphere"):
         pieces = [piece(kind, seed) for seed in range(count)]
         starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
         faces = [own + start for (_, own), start in zip(pieces, starts, strict=False)]
@@ -103,13 +151,19 @@ PIECES = "sheets", "spheres", "tori", "tetrahedra"
 
 
 def piece(kind: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a sheet with a hill, a bumpy sphere or torus of 80 triangles, or a tetrahedron; no two of them alike."""
+    """Return a sheet with a hill, a bumpy sphere or torus of 80 triangles, or a tetrahedron; no two of them alike.
+
+    But for copies, which are turned, and mirrored or not.
+    """
     random = np.random.default_rng(seed)
     if kind == "sheets":
         (a, b), c = random.uniform(0.3, 0.7, 2), random.uniform(0.4, 0.8)
         vertices, faces = shapes.grid(8, 5, lambda x, y: c * np.exp(-12 * ((x - a) ** 2 + (y - b) ** 2)))
     elif kind == "spheres":
         vertices, faces = shapes.sphere(1, seed=seed)
+    elif kind == "copies of a sphere":
+        vertices, faces = shapes.sphere(1, seed=0)
+        return vertices @ np.linalg.qr(random.normal(size=(3, 3)))[0].T, faces
     elif kind == "tori":
         vertices, faces = shapes.torus(8, 5, random.uniform(0.3, 0.5))
     else:
@@ -148,6 +202,12 @@ def small_mesh(seed: int) -> tuple[np.ndarray, np.ndarray]:
 def write(path: Path, mesh: tuple[np.ndarray, np.ndarray]) -> Path:
     """Write a mesh as OBJ, and return the path."""
     shapes.write_obj(path, *mesh)
+    return path
+
+
+def write_script(path: Path, text: str) -> Path:
+    """Write a script, and return the path."""
+    path.write_text(text)
     return path
 
 

@@ -18,8 +18,11 @@ def label_nodes(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntA
 
 
 @compiled
-def unite(parent: IntArray, one: int, two: int) -> None:
-    """Join the trees of two nodes: the root of larger index goes under the other; paths to roots are halved."""
+def unite(parent: IntArray, one: int, two: int) -> bool:
+    """Join the trees of two nodes, and return whether they were two.
+
+    The root of larger index goes under the other; paths to roots are halved.
+    """
     while parent[one] != one:
         parent[one] = parent[parent[one]]
         one = parent[one]
@@ -30,6 +33,7 @@ def unite(parent: IntArray, one: int, two: int) -> None:
         parent[two] = one
     else:
         parent[one] = two
+    return one != two
 
 
 @compiled

@@ -16,6 +16,7 @@ from .atlas.overlaid import overlaid
 from .cones.choose import Surface, choose_cones, cone_notes, pursues
 from .errors import CurvatureError, MetricError, SeamError
 from .flat import LaidOut
+from .flat.copies import copied, find_copies
 from .flat.held_cones import split_notes, unheld_notes, with_held_cones
 from .flat.methods import find_metric, turning_meter
 from .flat.more_cones import with_quality
@@ -90,17 +91,23 @@ def flatten_prepared(
     """
     with using_threads(options.threads), solving(solver) as solvers:
         runs = [flatten_component(part, surface_of, options, stages) for part in prepared.components]
-        if early is not None:
-            first = []
-            for i, run in enumerate(runs):
-                with _at_component(prepared, i, stages):
-                    first.append(next(run))
-            early(assemble(prepared, first, replace(options, charts="one"), Stages()))
-        flat = []
-        for i, run in enumerate(runs):
+        copies = find_copies(prepared.components, options)
+
+        def laid_out(i: int, found: list[LaidOut], run: Callable[[Iterator[LaidOut]], LaidOut]) -> LaidOut:
+            copy, same = copies[i], None
             with _at_component(prepared, i, stages):
-                *_, last = run
-            flat.append(last)
+                if copy is not None:
+                    same = copied(found[copy.first], prepared.components[i], copy.scale, options)
+                return run(runs[i]) if same is None else same
+
+        if early is not None:
+            first: list[LaidOut] = []
+            for i in range(len(runs)):
+                first.append(laid_out(i, first, next))
+            early(assemble(prepared, first, replace(options, charts="one"), Stages()))
+        flat: list[LaidOut] = []
+        for i in range(len(runs)):
+            flat.append(laid_out(i, flat, _last))
             stages.end_part()
     return replace(assemble(prepared, flat, options, stages), solvers=tuple(solvers.used))
 
@@ -159,6 +166,12 @@ def flatten_component(
     if options.method in UNFOLDED:
         notes += unheld_notes(layout, part.constraints.names) + split_notes(layout, part.constraints.names)
     yield replace(layout, notes=layout.notes + notes)
+
+
+def _last(layouts: Iterator[LaidOut]) -> LaidOut:
+    """Return the last of a component's layouts."""
+    *_, last = layouts
+    return last
 
 
 @contextmanager

@@ -84,16 +84,15 @@ class Surface:
     def of(cls, mesh: TriangleMesh, lengths: FloatArray, flips: bool = True) -> Surface:
         """Return a mesh with what follows from its lengths.
 
-        On stretched meshes the cotangents of the mesh's own triangles, many of them negative, tell little of the
-        surface, nor of the metric, which is found on the intrinsic Delaunay triangulation: Laplacian and vertex areas
-        are then taken from that.
+        On stretched meshes the cotangents of the mesh's own triangles, many of them negative, tell little of surface
+        and metric, which is found on the intrinsic Delaunay triangulation: Laplacian and areas are then those of that.
 
         flips: the metric is one that may flip edges; else Laplacian and areas are always the mesh's own.
         """
         n, cots = len(mesh.vertices), cotangents(lengths)
-        faces, sides = mesh.faces, lengths
+        faces, sides, delaunay = mesh.faces, lengths, None
         if flips and _far_from_delaunay(mesh, cots):
-            triangulation, done = intrinsic_delaunay(mesh, lengths)
+            triangulation, done = delaunay = intrinsic_delaunay(mesh, lengths)
             if len(done) > STRETCHED * len(mesh.edges):
                 faces, sides = triangulation.faces, triangulation.length.reshape(-1, 3)
                 cots = cotangents(sides)
@@ -105,7 +104,9 @@ class Surface:
             widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
             areas = vertex_areas(faces, sides, n)
             laplacian = weighing.result()
-        return cls(mesh, lengths, laplacian, curvature, areas, widest, flips)
+        surface = cls(mesh, lengths, laplacian, curvature, areas, widest, flips)
+        surface.__dict__.update({} if delaunay is None or len(faces) > HUGE else {"delaunay": delaunay})
+        return surface
 
     @cached_property
     def tie_key(self) -> FloatArray:

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import minimum_spanning_tree
 
 from .._arrays import BoolArray, FloatArray, Int32Array, IntArray
+from .._sets import unite
 from ..compiled import compiled
-from ..mesh import sort_pairs
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,19 +79,10 @@ class MultiGraph:
         return wide
 
     def minimum_spanning_tree(self) -> IntArray:
-        """Return the edges of a minimum spanning forest."""
-        order, first = sort_pairs(self.tails, self.heads, self.nodes)
-        if not first.all():
-            order = order[np.lexsort((self.costs[order], np.cumsum(first)))]
-        chosen = order[first]
-        chosen = chosen[self.tails[chosen] != self.heads[chosen]]
-        # Ranks instead of costs: SciPy takes a zero for no edge.
-        rank = np.empty(len(chosen))
-        by_rank = np.lexsort((chosen, self.costs[chosen]))
-        rank[by_rank] = np.arange(1, len(chosen) + 1)
-        matrix = csr_matrix((rank, (self.tails[chosen], self.heads[chosen])), shape=(self.nodes, self.nodes))
-        tree = minimum_spanning_tree(matrix).tocoo()
-        return chosen[by_rank[tree.data.astype(np.int64) - 1]]
+        """Return the edges of a minimum spanning forest; of equally dear ones the first."""
+        in_tree = np.zeros(len(self.costs), dtype=bool)
+        grow_forest(np.argsort(self.costs, kind="stable"), *self._ends, self.nodes, in_tree)
+        return np.flatnonzero(in_tree)
 
 
 def trace_back(starts: IntArray, predecessor: IntArray) -> tuple[IntArray, IntArray]:
@@ -105,6 +94,17 @@ def trace_back(starts: IntArray, predecessor: IntArray) -> tuple[IntArray, IntAr
             steps[node] = before
             node = before
     return np.array(list(steps.keys()), dtype=np.int64), np.array(list(steps.values()), dtype=np.int64)
+
+
+@compiled
+def grow_forest(order: IntArray, tails: IntArray, heads: IntArray, nodes: int, in_tree: BoolArray) -> None:
+    """Mark the edges, taken in an order, that join what those before them had not (J. B. Kruskal 1956).
+
+    in_tree: (e,) False on entry.
+    """
+    parent = np.arange(nodes)
+    for e in order:
+        in_tree[e] = unite(parent, tails[e], heads[e])
 
 
 @compiled

@@ -24,8 +24,9 @@ def vertex_areas(faces: IntArray, lengths: FloatArray, vertex_count: int) -> Flo
 
 def area_distortion(log_scale: FloatArray, areas: FloatArray) -> float:
     """Return E, the standard deviation of the log scale by area: 0 for a map that scales all alike."""
-    mean = np.average(log_scale, weights=areas)
-    return float(np.sqrt(np.average((log_scale - mean) ** 2, weights=areas)))
+    share = areas / areas.sum()
+    mean = share @ log_scale
+    return float(np.sqrt(share @ (log_scale - mean) ** 2))
 
 
 def weighted_areas(areas: FloatArray, weights: FloatArray | None) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from ..errors import OptionError
 from .declared import (
@@ -127,7 +128,7 @@ class Options(RunOptions, AtlasOptions, SymmetryOptions, SeamOptions, MetricOpti
             return value is not None
         return bool(len(value)) if hasattr(value, "__len__") else bool(value)
 
-    @property
+    @cached_property
     def asks_for_pursuit(self) -> bool:
         """Whether something is said that only the pursuit of cones heeds."""
         return any(self._is_set(name) for name in ASKING)

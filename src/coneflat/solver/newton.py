@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -29,7 +30,7 @@ class Point:
     residual: FloatArray
     is_admissible: bool = True
 
-    @property
+    @cached_property
     def largest(self) -> float:
         """The largest part of the gradient; infinite where it is beyond double precision."""
         largest = float(np.abs(self.residual).max(initial=0.0))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags, identity
+from scipy.sparse import csr_matrix, diags
 
 from ..._arrays import FloatArray, IntArray
 from ...compiled import compiled
@@ -39,13 +39,13 @@ class CoarseBasis:
     """Basis functions and what they make of the operators of the mesh.
 
     Attributes:
-        functions: (n, m).
-        laplacian, mass: (m, m) the same between basis functions.
+        functions: (n, m); None for the identity, whose products take their time.
+        laplacian, mass: (m, m) the same between basis functions; no mass, the areas, for the identity.
     """
 
-    functions: csr_matrix
+    functions: csr_matrix | None
     laplacian: csr_matrix
-    mass: csr_matrix
+    mass: csr_matrix | None
 
 
 def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseBasis:
@@ -56,10 +56,8 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
         areas: (n,) vertex areas.
         size: the number of basis functions wanted.
     """
-    functions: csr_matrix | None = (
-        None  # None for the identity, whose products with large matrices take their time
-    )
-    level, mass = laplacian, csr_matrix(diags(areas))
+    functions: csr_matrix | None = None
+    level, mass = laplacian, None
     order = np.arange(laplacian.shape[0])
     while level.shape[0] > max(1.2 * size, SMALL):
         level = _without_rounding(level, level.diagonal())
@@ -74,12 +72,10 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
             part = _pieces(np.argsort(order, kind="stable") * size // len(order), size)
         transposed = csr_matrix(part.T)
         level = csr_matrix(transposed @ (level @ part))
-        weighted = mass @ part if functions is not None else _with_scaled_rows(part, areas)
+        weighted = mass @ part if mass is not None else _with_scaled_rows(part, areas)
         mass = csr_matrix(transposed @ weighted)
         functions = part if functions is None else csr_matrix(functions @ part)
         order = _order_of_aggregates(part, order)
-    if functions is None:
-        functions = identity(laplacian.shape[0], format="csr")
     return CoarseBasis(functions, level, mass)
 
 

@@ -25,19 +25,26 @@ class CoarseModel:
     """G A G on functions of a coarse basis.
 
     Attributes:
-        basis: (f, m).
+        basis: (f, m); None for the identity, which small meshes have.
         kernel: (m, m).
         slope: (m,) minus the kernel times the curvature, which makes E^2 = constant + 2 slope k + k kernel k.
         constant: E^2 without cones.
     """
 
-    basis: csr_matrix
+    basis: csr_matrix | None
     kernel: FloatArray
     slope: FloatArray
     constant: float
 
+    @property
+    def size(self) -> int:
+        """The number of basis functions."""
+        return len(self.slope)
+
     def at(self, unknowns: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return kernel and slope at vertices of the mesh."""
+        if self.basis is None:
+            return self.kernel[np.ix_(unknowns, unknowns)], self.slope[unknowns]
         rows = self.basis[unknowns]
         return np.asarray((rows @ (rows @ self.kernel).T).T), np.asarray(rows @ self.slope)
 
@@ -53,8 +60,11 @@ class CoarseModel:
 
     def squared_distances(self, one: int, others: IntArray) -> FloatArray:
         """Return (p,) the squared norm of the difference of two Green's functions, for each of the others."""
-        basis = self.basis
-        return squared_distances(basis.indptr, basis.indices, basis.data, self.kernel, one, others)
+        basis, kernel = self.basis, self.kernel
+        if basis is None:
+            apart = kernel[one, one] - 2.0 * kernel[one, others] + kernel[others, others]
+            return np.maximum(apart, 0.0)
+        return squared_distances(basis.indptr, basis.indices, basis.data, kernel, one, others)
 
 
 def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> CoarseModel:
@@ -68,15 +78,16 @@ def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> C
     areas = operator.areas
     coarse = coarse_basis(operator.laplacian, areas, size)
     basis = coarse.functions
-    weights = basis.T @ areas
+    weights = areas if basis is None else basis.T @ areas
     stiffness = coarse.laplacian.toarray()
     if operator.is_closed:
         # Makes it definite, and means the same: what a source has in sum is taken off in proportion to area.
         stiffness += np.outer(weights, weights) * (stiffness.trace() / (weights @ weights) / len(weights))
     green = inverse_of_definite(stiffness)
-    kernel, mean = symmetric_product(green, coarse.mass @ green), green @ weights
+    weighted = areas[:, None] * green if coarse.mass is None else coarse.mass @ green
+    kernel, mean = symmetric_product(green, weighted), green @ weights
     kernel -= np.outer(mean, mean)
-    bare = basis.T @ curvature
+    bare = curvature if basis is None else basis.T @ curvature
     slope = -(kernel @ bare)
     return CoarseModel(basis, kernel, slope, float(-(slope @ bare)))
 
@@ -86,7 +97,7 @@ def candidates(model: CoarseModel, fitness: FloatArray) -> IntArray:
 
     `fitness` (f,) is 0 for those that may not be cones; where it is larger they are preferred to their neighbours.
     """
-    if np.count_nonzero(fitness) <= model.basis.shape[1]:
+    if model.basis is None or np.count_nonzero(fitness) <= model.size:
         return np.flatnonzero(fitness)
     return representatives(model.basis, fitness)
 

@@ -123,7 +123,7 @@ class ExactModel(DenseModel):
         """
         score = self._score(members, curvatures)
         # Some of the coarse model's functions wide: from there on its distances tell nothing.
-        size = max(40, 4 * len(self._usable) // self._coarse.basis.shape[1])
+        size = max(40, 4 * len(self._usable) // self._coarse.size)
         taken = self.unknowns[members]
         targets = []
         for place in range(len(self.fixed), len(members)):

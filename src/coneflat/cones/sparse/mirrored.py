@@ -197,7 +197,7 @@ class MirroredSearch:
         curvatures = carried / np.where(is_pair, 2.0, 1.0)
         both = np.concatenate([own[:, 0], own[is_pair, 1]])
         score = exact._score(exact.insert(both), np.concatenate([curvatures, curvatures[is_pair]]))
-        size = max(40, 4 * len(score) // self.search._coarse_model.basis.shape[1])
+        size = max(40, 4 * len(score) // self.search._coarse_model.size)
         targets = []
         for (s, image), pairs, k in zip(own, is_pair, curvatures, strict=True):
             near = exact.near(int(s), size if pairs else FARTHER * size)

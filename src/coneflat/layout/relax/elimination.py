@@ -1,11 +1,16 @@
-"""Solutions of linear equations with few and small coefficients, by few of the variables each."""
+"""Solutions of small systems of linear equations of which some may depend on others."""
 
 from __future__ import annotations
 
 import numpy as np
+import scipy.linalg
 
 from ..._arrays import FloatArray
 
+# Relative size below which what is left of an equation that depends on others is rounding.
+ROUNDING = 1e-10
+# Coefficients of an orthogonal basis below this are none; what is taken for none is missed by the sides of seams.
+TINY = 1e-15
 # Coefficients below this are rounding: those of quarter turns are whole.
 NONE = 1e-9
 # Part of the largest coefficient of an equation that a pivot has at least.
@@ -57,3 +62,27 @@ def sparse_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, F
     basis[pivots, -1] = work[at, count]
     basis[np.abs(basis) < NONE * max(1.0, float(np.abs(basis).max(initial=0.0)))] = 0.0
     return basis, work[is_open, count]
+
+
+def orthogonal_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (v, k + 1) a basis of the solutions of equations, one of these in the last column, and what was missed.
+
+    Args:
+        rows: (r, v) coefficients, dependent ones among them are no harm.
+        right: (r,).
+
+    Returns:
+        The basis, and (r,) what is left of the right-hand sides: rounding unless equations contradict each other.
+    """
+    q, r, pivots = scipy.linalg.qr(rows, mode="economic", pivoting=True)
+    diagonal = np.abs(np.diag(r))
+    rank = int((diagonal > ROUNDING * max(diagonal[0], 1e-300)).sum())
+    turned = q.T @ right
+    solved = scipy.linalg.solve_triangular(
+        r[:rank, :rank], np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
+    )
+    count = rows.shape[1]
+    basis = np.zeros((count, count - rank + 1))
+    basis[pivots[:rank]] = np.where(np.abs(solved) > TINY, solved, 0.0)
+    basis[pivots[rank:], np.arange(count - rank)] = 1.0
+    return basis, right - q[:, :rank] @ turned[:rank]

@@ -5,18 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from ..._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import OptionError
 from ...mesh import TriangleMesh
 from .constraints import CheckedConstraints
-from .elimination import sparse_solutions
-from .seam_chains import SeamChains, find_chains
+from .elimination import ROUNDING, orthogonal_solutions, sparse_solutions
+from .seam_chains import SeamChains, constrained_chains
 
-# Relative size below which what elimination leaves of an equation is rounding, and of a coefficient. What is taken for
-# none there is missed by the sides of seams.
-ROUNDING, NONE = 1e-10, 1e-15
 # What rounding leaves between the sides of seams is looked at in units of this, in which it is not none.
 FINE = 2.0**-40
 
@@ -47,7 +43,7 @@ class Motions:
         Layouts may shrink a thousand times, and what is rounding of where points were is as much more of a seam then.
         Those that were brought to quarter turns stay as they are.
         """
-        if self.made_by.constraints.quarter_turns:
+        if self.made_by.constraints.quarter_turns or not len(self.made_by.chains.edges):
             return points
         motions = self.made_by.at(points).motions()
         step = np.zeros(motions.count + 1)
@@ -91,23 +87,8 @@ def find_motions(
     """
     vertex = np.zeros(len(points), dtype=np.int64)
     vertex[corners.ravel()] = mesh.faces.ravel()
-    chains = _constrained_chains(mesh, corners, points, vertex, constraints)
+    chains = constrained_chains(mesh, corners, points, vertex, constraints)
     return _Builder(points, vertex, is_free, chains, constraints).motions()
-
-
-def _constrained_chains(
-    mesh: TriangleMesh, corners: IntArray, points: ComplexArray, vertex: IntArray, c: CheckedConstraints
-) -> SeamChains:
-    """Return the seams, with nodes at points that are held but on one line, as left ones within a seam may be."""
-    on, times = np.unique(c.on_line, return_counts=True)
-    nodes = np.concatenate([vertex[c.pinned], vertex[on[times > 1]], c.nodes])
-    chains = find_chains(mesh, corners, points, nodes, quarter_turns=c.quarter_turns)
-    inside = ~chains.is_node[chains.vertices]
-    if not np.isin(on, chains.right[inside]).any():
-        return chains
-    return find_chains(
-        mesh, corners, points, np.concatenate([nodes, vertex[on]]), quarter_turns=c.quarter_turns
-    )
 
 
 def _require_solved(missed: float, right: FloatArray) -> None:
@@ -134,11 +115,11 @@ class _Builder:
         self.entries: list[tuple[IntArray, IntArray, ComplexArray]] = []
         on_seam = np.zeros(len(points), dtype=bool)
         on_seam[chains.left] = on_seam[chains.right] = True
-        twice, times = np.unique(
-            np.concatenate([constraints.pinned, constraints.on_line]), return_counts=True
-        )
         self.is_special = on_seam & chains.is_node[vertex]
-        self.is_special[twice[times > 1]] = True
+        held = np.concatenate([constraints.pinned, constraints.on_line])
+        if len(held):
+            twice, times = np.unique(held, return_counts=True)
+            self.is_special[twice[times > 1]] = True
         self.is_special &= self.is_free
         # Real variables of the small system: two for each special point and each translation, one for each line.
         self.of_point = np.full(len(points), -1)
@@ -224,6 +205,8 @@ class _Builder:
 
     def _add(self, points: IntArray, variables: IntArray, factors: ComplexArray, is_complex: bool) -> None:
         """Have points shifted by variables of the small system, each times a factor."""
+        if not len(points):
+            return
         rows = self._basis[variables] + (1j * self._basis[variables + 1] if is_complex else 0)
         row, column = np.nonzero(rows)
         coefficient = rows[row, column] * factors[row]
@@ -241,6 +224,8 @@ class _Builder:
     def _add_seams(self) -> None:
         """Let the vertices within seams move, both points of each together."""
         chains = self.chains
+        if not len(chains.edges):
+            return
         inside = (~chains.is_node[chains.vertices]) & self.is_free[chains.left]
         left, at = np.unique(chains.left[inside], return_index=True)
         right = chains.right[inside][at]
@@ -266,6 +251,8 @@ class _Builder:
 
     def _add_on_lines(self, left: IntArray, right: IntArray, turn: ComplexArray) -> None:
         """Let left points within seams move along their lines and with these, and the right ones alike."""
+        if not len(left):
+            return
         c = self.constraints
         order = np.argsort(c.on_line, kind="stable")
         at = order[np.searchsorted(c.on_line[order], left)]
@@ -286,6 +273,17 @@ class _Builder:
         """Let all other points move: anywhere, along a line, or to their places."""
         c = self.constraints
         rest = self.is_free & ~self.is_special
+        if len(c.pinned) or len(c.on_line):
+            self._add_held(rest)
+        free = np.flatnonzero(rest)
+        for axis, step in enumerate((1.0, 1j)):
+            directions = np.full(len(free), step, dtype=np.complex128)
+            self._add_unknowns(free, directions, self.count + 2 * np.arange(len(free)) + axis)
+        self.count += 2 * len(free)
+
+    def _add_held(self, rest: BoolArray) -> None:
+        """Let points move to their places or along their lines, if they are among `rest` (u,), and take them out."""
+        c = self.constraints
         pins = np.flatnonzero(rest[c.pinned])
         self._add_offset(c.pinned[pins], self._complex(c.places[pins]) - self.points[c.pinned[pins]])
         rest[c.pinned] = False
@@ -299,11 +297,6 @@ class _Builder:
         shifts = self.of_line[line] >= 0
         self._add(points[shifts], self.of_line[line[shifts]], normal[shifts], is_complex=False)
         rest[c.on_line] = False
-        free = np.flatnonzero(rest)
-        for axis, step in enumerate((1.0, 1j)):
-            directions = np.full(len(free), step, dtype=np.complex128)
-            self._add_unknowns(free, directions, self.count + 2 * np.arange(len(free)) + axis)
-        self.count += 2 * len(free)
 
     def _off_line(self, points: IntArray, line: IntArray) -> FloatArray:
         """Return (q,) by how much each point has to go to the left to its line; a loose one is where its first is."""
@@ -325,29 +318,18 @@ class _Builder:
         rows, right = self._equations()
         if not len(rows):
             return np.concatenate([np.eye(self.size), np.zeros((self.size, 1))], axis=1)
-        if self.constraints.quarter_turns:
-            basis, left = sparse_solutions(rows, right)
+        has_whole = self.constraints.quarter_turns
+        basis, left = sparse_solutions(rows, right) if has_whole else orthogonal_solutions(rows, right)
+        if has_whole or not self.is_closing:  # rounding may contradict itself, between points that stay
             _require_solved(float(np.abs(left).max(initial=0.0)), right)
-            return basis
-        q, r, pivots = scipy.linalg.qr(rows, mode="economic", pivoting=True)
-        diagonal = np.abs(np.diag(r))
-        rank = int((diagonal > ROUNDING * max(diagonal[0], 1e-300)).sum())
-        turned = q.T @ right
-        if not self.is_closing:  # rounding may contradict itself, between points that stay
-            _require_solved(float(np.abs(right - q[:, :rank] @ turned[:rank]).max()), right)
-        solved = scipy.linalg.solve_triangular(
-            r[:rank, :rank], np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
-        )
-        basis = np.zeros((self.size, self.size - rank + 1))
-        basis[pivots[:rank]] = np.where(np.abs(solved) > NONE, solved, 0.0)
-        basis[pivots[rank:], np.arange(self.size - rank)] = 1.0
         return basis
 
     def _equations(self) -> tuple[FloatArray, FloatArray]:
         """Return (r, v) equations between the variables, and their right-hand sides (r,)."""
-        rows: list[FloatArray] = []
-        right: list[float] = []
-        chains, c = self.chains, self.constraints
+        ends, values = self._equations_of_ends()
+        rows: list[FloatArray] = list(ends)
+        right: list[float] = values.tolist()
+        c = self.constraints
 
         def add(terms: list[tuple[int, complex]], value: complex) -> None:
             """Add the sum of complex variables times factors = value as two real equations."""
@@ -360,23 +342,12 @@ class _Builder:
             rows.extend(both)
             right.extend([value.real, value.imag])
 
-        for k, end in np.argwhere(chains.is_node[chains.vertices]).tolist():
-            chain = int(chains.chain[k])
-            terms = [
-                (int(self.of_point[chains.right[k, end]]), 1.0 + 0.0j),
-                (int(self.of_point[chains.left[k, end]]), -complex(chains.rotation[chain])),
-                (int(self.of_chain[chain]), -1.0 + 0.0j),
-            ]
-            terms = [term for term in terms if term[0] >= 0]
-            if terms:
-                ends = chains.left[k, [end]], chains.right[k, [end]], np.array([chain])
-                add(terms, complex(self._missing(*ends)[0]))
         for point, place in zip(c.pinned.tolist(), self._complex(c.places).tolist(), strict=True):
             if self.of_point[point] >= 0:
                 add([(int(self.of_point[point]), 1.0 + 0.0j)], place - complex(self.points[point]))
         for chain, value in self.ties:
             add([(int(self.of_chain[chain]), 1.0 + 0.0j)], value)
-        off = self._off_line(c.on_line, c.line)
+        off = self._off_line(c.on_line, c.line) if len(c.on_line) else np.empty(0)
         for point, line, value in zip(c.on_line.tolist(), c.line.tolist(), off.tolist(), strict=True):
             if self.of_point[point] >= 0:
                 row = np.zeros(self.size)
@@ -387,6 +358,27 @@ class _Builder:
                 rows.append(row)
                 right.append(value)
         return np.array(rows).reshape(-1, self.size), np.array(right)
+
+    def _equations_of_ends(self) -> tuple[FloatArray, FloatArray]:
+        """Return equations (2 q, v) and right-hand sides (2 q,): at ends of chains left points go to right ones."""
+        chains = self.chains
+        edge, end = np.nonzero(chains.is_node[chains.vertices])
+        chain, left, right = chains.chain[edge], chains.left[edge, end], chains.right[edge, end]
+        variables = np.stack([self.of_point[right], self.of_point[left], self.of_chain[chain]], axis=1)
+        some = (variables >= 0).any(axis=1)
+        variables, chain, left, right = variables[some], chain[some], left[some], right[some]
+        factors = np.full(variables.shape, 1.0 + 0.0j)
+        factors[:, 1], factors[:, 2] = -chains.rotation[chain], -1.0
+        rows = np.zeros((len(chain), 2, self.size))
+        for variable, factor in zip(variables.T, factors.T, strict=True):
+            at = np.flatnonzero(variable >= 0)
+            column, factor = variable[at], factor[at]
+            rows[at, 0, column] += factor.real
+            rows[at, 0, column + 1] -= factor.imag
+            rows[at, 1, column] += factor.imag
+            rows[at, 1, column + 1] += factor.real
+        missing = self._missing(left, right, chain)
+        return rows.reshape(-1, self.size), np.stack([missing.real, missing.imag], axis=1).ravel()
 
     def _tie(self, side: int, shift: complex) -> tuple[int, complex]:
         """Return a half-edge's chain, and the change of its translation that makes `shift` of that to the half-edge."""

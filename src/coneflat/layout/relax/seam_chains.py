@@ -10,6 +10,7 @@ from ..._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import SeamError
 from ...geometry.charts import both_sides, point_seams
 from ...mesh import TriangleMesh, label_components
+from .constraints import CheckedConstraints
 
 # Radians by which the rotation between the sides of a seam may change at a vertex without it being a cone. Cones have
 # curvatures of 1e-4 at least; lengths of edges of the plane are good to 1e-9 where they are shortest.
@@ -107,6 +108,24 @@ def find_chains(
     if quarter_turns:
         rotation = _nearest_quarter(rotation)
     return SeamChains(edges, vertices, left, right, halfedges, chain, rotation, is_node)
+
+
+def constrained_chains(
+    mesh: TriangleMesh, corners: IntArray, points: ComplexArray, vertex: IntArray, c: CheckedConstraints
+) -> SeamChains:
+    """Return the seams, with nodes at points that are held but on one line, as left ones within a seam may be."""
+    if not len(c.on_line):
+        nodes = np.concatenate([vertex[c.pinned], c.nodes])
+        return find_chains(mesh, corners, points, nodes, quarter_turns=c.quarter_turns)
+    on, times = np.unique(c.on_line, return_counts=True)
+    nodes = np.concatenate([vertex[c.pinned], vertex[on[times > 1]], c.nodes])
+    chains = find_chains(mesh, corners, points, nodes, quarter_turns=c.quarter_turns)
+    inside = ~chains.is_node[chains.vertices]
+    if not np.isin(on, chains.right[inside]).any():
+        return chains
+    return find_chains(
+        mesh, corners, points, np.concatenate([nodes, vertex[on]]), quarter_turns=c.quarter_turns
+    )
 
 
 def _nearest_quarter(turns: ComplexArray) -> ComplexArray:
