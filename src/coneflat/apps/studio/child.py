@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING
 
 from ...errors import ConeflatError, NonManifoldError, NonOrientableError
 from ...progress import asking
@@ -101,6 +101,9 @@ class Bench:
             told: called with what is being done, and the fraction that is done.
             show: called with the first layout, in the same form, before it is what it is to be.
         """
+        from .choices import Choices
+        from .warnings import noted, strained
+
         self.result = None
         source, flattener = self._open(job["mesh"], job["sha256"], told)
         name, furthest = Path(job["mesh"]).name, 0.0
@@ -114,18 +117,19 @@ class Bench:
             told_on("first view", furthest)
             show(*self._picture(first, name, is_first=True))
 
-        chosen = arguments(source, job["choices"])
-        is_large = len(source.mesh.offsets) - 1 >= self._early_from
-        result = flattener.flatten(early=show_first if is_large else None, progress=told_on, **chosen)
-        result = replace(result, notes=source.notes_of(result.notes))
+        chosen = Choices.from_plain(job["choices"])
+        words, is_large = source.renamed(chosen.keywords()), len(source.mesh.offsets) - 1 >= self._early_from
+        result = flattener.flatten(early=show_first if is_large else None, progress=told_on, **words)
+        result = noted(replace(result, notes=source.notes_of(result.notes)), chosen)
         told("picture", 1.0)
         head, body = self._coloured(job, result, name)
         self.result = result
-        return head, body
+        return {**head, "warnings": strained(chosen, result)}, body
 
     def _coloured(self, job: Head, result: Flattening, name: str) -> tuple[Head, bytes]:
         """Return what the page shows of a result, with colours of the user's own; without, if there are none such."""
         from ...view.own import own_quantity
+        from .wording import in_page
 
         if not job.get("color"):
             return self._picture(result, name)
@@ -133,7 +137,7 @@ class Bench:
             own = own_quantity(result, job["color"])
         except ConeflatError as error:
             head, body = self._picture(result, name)
-            return {**head, "missing": str(error)}, body
+            return {**head, "missing": in_page(str(error))}, body
         return self._picture(result, name, own=own)
 
     def make(self, job: Head, told: Callable[[str, float], None]) -> tuple[Head, bytes]:
@@ -160,6 +164,7 @@ class Bench:
         from ...view.page.content import Model, content_of
         from ...view.page.payload import Told, head_and_block
         from ...view.page.webpage import MOST_TRIANGLES
+        from .wording import in_page
 
         told = None
         if is_first:
@@ -171,6 +176,7 @@ class Bench:
         content = content_of(result, MOST_TRIANGLES, self._model, own)
         show = "checker" if own is None else "own"
         head, block = head_and_block(result, content, None, name, "y", show, told)
+        head["notes"] = [in_page(note) for note in head["notes"]]
         cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
         told_of = {"head": with_prints(head, block), "found": cones.tolist(), "seconds": result.seconds}
         return told_of, block
@@ -185,13 +191,6 @@ class Bench:
             source = read_joined(Path(mesh))
             self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
         return self._source, self._flattener
-
-
-def arguments(source: Joined, choices: dict[str, Any]) -> dict[str, Any]:
-    """Return what `coneflat.flatten` is given for a mesh that was read and choices that JSON holds."""
-    from .choices import Choices
-
-    return source.renamed(Choices.from_plain(choices).keywords())
 
 
 def serve(jobs: Jobs, answers: IO[bytes]) -> None:
@@ -231,12 +230,9 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
 
 def _told_failure(error: ConeflatError) -> Head:
     """Return what the page says of a failure: what a repair would mend, a button does there."""
-    from ...input.validation import REPAIR_ADVICE
+    from .wording import in_page
 
-    return {
-        "error": str(error).replace(REPAIR_ADVICE, "repair the mesh"),
-        "repair": isinstance(error, REPAIRABLE),
-    }
+    return {"error": in_page(str(error)), "repair": isinstance(error, REPAIRABLE)}
 
 
 def main() -> None:

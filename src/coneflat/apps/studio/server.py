@@ -25,6 +25,7 @@ from .guard import MOST_ASKED, Guard
 from .opening import file_within
 from .page import studio_page
 from .session import Session
+from .wording import in_page
 
 MOST_UPLOADED = 512 * 1024 * 1024  # bytes of a mesh
 LONG_POLL = 20.0  # seconds that a question for news waits for some
@@ -176,7 +177,7 @@ def _is_number(text: str) -> bool:
 
 
 async def _said(request: Request, error: Exception) -> Response:
-    return PlainTextResponse(str(error), 400)
+    return PlainTextResponse(in_page(str(error)), 400)
 
 
 async def _garbled(request: Request, error: Exception) -> Response:

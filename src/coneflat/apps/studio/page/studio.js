@@ -186,7 +186,7 @@ class Studio {
     if (control) return this.obey(event, () => this.act({do: name === "z" && !event.shiftKey ? "undo" : "redo"}));
     const tool = [...TOOLS, ...BRUSHES].find(([, , letter]) => letter === name);
     const vertex = this.selectedNumber(), row = this.coneRows().find((one) => one.vertex === vertex);
-    const turn = (step) => () => row && this.setAngle(vertex, Math.max(this.panel.step(), this.panel.snapped(row.degrees + step)));
+    const turn = (step) => () => row && this.setAngle(vertex, Math.min(WIDEST, Math.max(this.panel.step(), this.panel.snapped(row.degrees + step))));
     const keys = {
       u: () => this.act({do: "undo"}), y: () => this.act({do: "redo"}), n: () => this.pickNext(),
       m: () => this.moveToMiddle(), l: () => row && this.act({do: "lock", vertex, locked: !row.locked}),
