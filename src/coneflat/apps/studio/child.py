@@ -15,6 +15,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
+import numpy as np
+
 from ...errors import ConeflatError, NonManifoldError, NonOrientableError
 from ...progress import asking
 from .frames import Head, read_frame, write_frame
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 
 #: Polygons from which on the first layout is shown, too: of smaller meshes the last is there as soon.
 EARLY = 20_000
+#: Triangles up to which the page gets all of a mesh, to paint and draw on, where it shows fewer.
+MOST_WHOLE = 4_000_000
 #: What stands for numbers until they are known, and what the first layout is.
 TO_COME = "…"
 FIRST = "First view: distortion is yet to be evened out, and overlaps to be parted  ·  …"
@@ -89,6 +93,7 @@ class Bench:
         self._source: Joined | None = None
         self._flattener: Flattener | None = None
         self._model: Model | None = None
+        self._most: int | None = None
         self._read: tuple[str, str] | None = None
 
     def flatten(
@@ -104,7 +109,7 @@ class Bench:
         from .choices import Choices
         from .warnings import noted, strained
 
-        self.result = None
+        self.result, self._most = None, job.get("most")
         source, flattener = self._open(job["mesh"], job["sha256"], told)
         name, furthest = Path(job["mesh"]).name, 0.0
 
@@ -173,9 +178,11 @@ class Bench:
             result = replace(result, notes=())
         if self._model is None or not self._model.is_of(result):
             self._model = Model.of(result)
-        content = content_of(result, MOST_TRIANGLES, self._model, own)
+        content = content_of(result, self._most or MOST_TRIANGLES, self._model, own)
         show = "checker" if own is None else "own"
         head, block = head_and_block(result, content, None, name, "y", show, told)
+        if content.left_out and len(result.faces) <= MOST_WHOLE:
+            head, block = with_whole(head, block, self._model, result)
         head["notes"] = [in_page(note) for note in head["notes"]]
         cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
         told_of = {"head": with_prints(head, block), "found": cones.tolist(), "seconds": result.seconds}
@@ -191,6 +198,22 @@ class Bench:
             source = read_joined(Path(mesh))
             self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
         return self._source, self._flattener
+
+
+def with_whole(head: Head, block: bytes, model: Model, result: Flattening) -> tuple[Head, bytes]:
+    """Return what the page shows of a result, and all vertices and triangles of its mesh beside."""
+    from ...view.page.payload import pack
+
+    arrays = {
+        "whole_places": model.places.astype(np.float32),
+        "whole_faces": np.searchsorted(model.used, model.mesh.faces).astype(np.uint32),
+    }
+    numbers = model.used if result.vertex_origin is None else result.vertex_origin[model.used]
+    if not np.array_equal(numbers, np.arange(len(numbers))):
+        arrays["whole_numbers"] = numbers.astype(np.int32)
+    listed, more = pack(arrays)
+    moved = [{**each, "offset": each["offset"] + len(block)} for each in listed]
+    return {**head, "arrays": [*head["arrays"], *moved]}, block + more
 
 
 def serve(jobs: Jobs, answers: IO[bytes]) -> None:

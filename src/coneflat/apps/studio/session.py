@@ -40,18 +40,18 @@ class Session:
 
     Attributes:
         folder: where projects are, and whatever the page names.
-        color: what numbers are shown as colours, if any.
         version: counts what has happened; who has seen a version need not look again.
         layout: the number of the layout that was shown last; no other one gets it, whatever mesh is opened.
         is_early: whether that is the first one of a change, and another will follow.
     """
 
-    def __init__(self, folder: Path, color: str | None = None) -> None:
+    def __init__(self, folder: Path, color: str | None = None, most_triangles: int | None = None) -> None:
         """Args:
         folder: of projects.
         color: what numbers are shown as colours, as of `own_quantity`.
+        most_triangles: of larger meshes fewer are shown; None for as many as the viewer's page shows.
         """
-        self.color = color
+        self._look = {"color": color, "most": most_triangles}
         self.folder = folder.resolve()
         self.version = 0
         self.layout = 0
@@ -185,7 +185,7 @@ class Session:
         self._job += 1
         self._busy = {"stage": "", "fraction": 0.0}
         self._tell()
-        self._worker.send({"do": "flatten", "job": self._job, "color": self.color, **self._of_mesh()})
+        self._worker.send({"do": "flatten", "job": self._job, **self._look, **self._of_mesh()})
 
     def _save(self) -> None:
         """Keep what is chosen, so that nothing is lost whatever happens next."""

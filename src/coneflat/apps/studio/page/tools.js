@@ -13,7 +13,7 @@ const NEAR = 12; // pixels within which a click means what is there
 const BARE = {get: () => false}; // A state in which nothing but triangles is drawn, or picked.
 
 class Tools {
-  /** studio: {viewer, graph, act(action), isBusy(), select(vertex)}. */
+  /** studio: {viewer, pathBetween(vertex, other), act(action), isBusy(), select(vertex)}. */
   constructor(studio) {
     this.studio = studio;
     this.mode = "look";
@@ -89,7 +89,7 @@ class Tools {
     }
     if (this.from === null) return;
     const vertex = this.vertexAt(pane, x, y);
-    this.preview = vertex === null ? [] : this.studio.graph().path(this.from, vertex);
+    this.preview = vertex === null ? [] : this.studio.verticesOf(this.studio.pathBetween(this.from, vertex));
     this.studio.viewer.remark();
   }
 
@@ -108,8 +108,8 @@ class Tools {
   }
 
   drawTo(vertex) {
-    const path = this.from === null ? [] : this.studio.graph().path(this.from, vertex);
-    if (path.length > 1) this.studio.act({do: this.mode, path: path.map((v) => this.studio.numberOf(v))});
+    const path = this.from === null ? [] : this.studio.pathBetween(this.from, vertex);
+    if (path.length > 1) this.studio.act({do: this.mode, path});
     this.from = vertex;
     this.preview = [];
     this.studio.viewer.remark();
