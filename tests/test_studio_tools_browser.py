@@ -356,3 +356,26 @@ def test_what_is_to_be_known_of_cones_is_said(visit):
     visit.run(f"studio.act({{do: 'remove', vertex: {vertex}}})")
     visit.settle()
     assert page.locator("#warnings").is_hidden()
+
+
+def test_the_curve_is_that_of_all_parts(browser, tmp_path):
+    ball, hill = shapes.sphere(2), shapes.hill(8, 8)
+    shapes.write_obj(tmp_path / "two.obj", *shapes.join(ball, (hill[0] + 9, hill[1])))
+    served = Studio(tmp_path)
+    served.session.open(tmp_path / "two.obj")
+    assert served.session.wait_until_idle(PATIENCE / 1000)
+    opened = StudioVisit(browser, served)
+    opened.settle()
+    page = opened.page
+    page.keyboard.press("q")
+    opened.wait("studio.panel.curve.found")
+    assert "for so many cones in each of its 2 parts" in page.inner_text("#curve-of")
+    # Where each part has its own number, none is marked on the curve; where both have one, that is.
+    assert opened.run("studio.panel.curve.current()") is None
+    count = opened.run("studio.panel.curve.found.counts[1]")
+    opened.run(f"studio.setCount({count})")
+    opened.settle()
+    assert opened.run("studio.panel.curve.current()[0]") == count
+    assert page.locator("#curve").is_visible()
+    opened.close()
+    served.close()
