@@ -135,7 +135,7 @@ class Studio {
 
   async save(ending) {
     const name = {json: "report", png: "layout"}[ending] ?? "uv";
-    await this.server.save(`/export/${ending}`, `${this.stem}_${name}.${ending}`).catch((error) => this.refuse(error));
+    await this.server.save(`export/${ending}`, `${this.stem}_${name}.${ending}`).catch((error) => this.refuse(error));
   }
 
   /** Make quads of the mesh, about so many, and hand them to the browser. */
@@ -143,7 +143,7 @@ class Studio {
     this.refused = null;
     this.making = "quads";
     this.panel.show();
-    await this.server.save(`/quads/obj?count=${encodeURIComponent(count)}`, `${this.stem}_quads.obj`).catch((error) => this.refuse(error));
+    await this.server.save(`quads/obj?count=${encodeURIComponent(count)}`, `${this.stem}_quads.obj`).catch((error) => this.refuse(error));
     this.making = "";
     this.panel.show();
   }
