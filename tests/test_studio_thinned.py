@@ -155,3 +155,18 @@ def test_the_whole_mesh_goes_beside_what_is_shown(ball):
     model = Model.of(bench.result)
     head, _ = with_whole({"arrays": []}, b"", model, bench.result)
     assert [each["name"] for each in head["arrays"]] == ["whole_places", "whole_faces", "whole_numbers"]
+
+
+def test_the_view_stays_as_the_layout_changes(thinned):
+    page, box = thinned.page, thinned.box("model")
+    page.mouse.move(box["x"] + 8, box["y"] + box["height"] - 8)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 90, box["y"] + box["height"] - 60, steps=3)
+    page.mouse.up()
+    page.mouse.wheel(0, -200)
+    view = "[coneflat.panes[0].camera.turn.join(), coneflat.panes[0].camera.zoom]"
+    before, faces = thinned.run(view), thinned.run("coneflat.model.arrays.faces.length")
+    thinned.run("studio.setCount(12)")
+    thinned.settle()
+    assert thinned.run("coneflat.model.arrays.faces.length") != faces
+    assert thinned.run(view) == before
