@@ -25,7 +25,7 @@ def save_figure_small(figure: Any, name: str) -> None:
 
 
 def save_small(picture: Image.Image, name: str, *, dither: bool = True) -> None:
-    """Write a picture to the documentation's images: in as few colours as look the same, or fewer where it would be large.
+    """Write a picture to the documentation's images: in as few colours as look the same, or fewer if it is large.
 
     dither: for shaded models; flat grounds stay flat without.
     """
