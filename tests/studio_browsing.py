@@ -23,8 +23,8 @@ TOKEN = "a-token-of-some-length"
 class Studio:
     """A session, served."""
 
-    def __init__(self, folder):
-        self.session = Session(folder)
+    def __init__(self, folder, **options):
+        self.session = Session(folder, **options)
         listener = listening(0)
         port = listener.getsockname()[1]
         self.address = f"http://{HOST}:{port}/?token={TOKEN}"

@@ -7,7 +7,9 @@ from click.testing import CliRunner
 
 import coneflat
 from coneflat.apps.cli.main import cli
+from coneflat.curve import whole_curve
 from coneflat.errors import OptionError
+from coneflat.options import Options
 
 
 def test_the_curve_falls_and_holds_what_it_says():
@@ -72,3 +74,46 @@ def test_the_command_draws_the_curve(model, tmp_path, monkeypatch):
     assert done.exit_code == 0, done.output
     assert "knee" in done.output
     assert (tmp_path / "ball_cones.png").read_bytes().startswith(b"\x89PNG")
+
+
+class TestWhole:
+    """The curve of all parts of a mesh together."""
+
+    def test_of_one_component_it_is_the_same(self):
+        vertices, faces = shapes.genus(1)
+        whole, one = (
+            whole_curve(vertices, faces, Options(), 10),
+            coneflat.cone_curve(vertices, faces, most=10),
+        )
+        assert whole.parts == 1
+        np.testing.assert_array_equal(whole.counts, one.counts)
+        np.testing.assert_allclose(whole.distortions, one.distortions, rtol=1e-12)
+        assert whole.knee == one.knee
+
+    def test_of_several_it_is_what_flatten_has(self):
+        """A ball beside a hill, which needs no cones: at each number those of both count, by area."""
+        ball, hill = shapes.sphere(3), shapes.hill(10, 8)
+        vertices, faces = shapes.join((3 * ball[0] * [1, 1, 1.4], ball[1]), (hill[0] + 20, hill[1]))
+        whole = whole_curve(vertices, faces, Options(), 9)
+        assert whole.parts == 2
+        assert (np.diff(whole.distortions) < 0).all()
+        alone = [coneflat.cone_curve(*each, most=9) for each in ((3 * ball[0] * [1, 1, 1.4], ball[1]), hill)]
+        # A closed surface has no cones fewer than carry its curvature, whatever the other part could do with.
+        assert whole.counts[0] == max(curve.counts[0] for curve in alone)
+        assert set(whole.counts.tolist()) <= set(alone[0].counts.tolist()) | set(alone[1].counts.tolist())
+        for count in whole.counts[[0, -1]].tolist():
+            result = coneflat.flatten(vertices, faces, cone_count=count)
+            at = whole.distortions[whole.counts.tolist().index(count)]
+            assert result.solve.area_distortion_linear == pytest.approx(at, rel=0.1)
+
+    def test_what_seams_cut_off_is_a_part(self):
+        """A ball that is cut along its equator is two disks, which need no cones."""
+        vertices, faces = shapes.sphere(3)
+        mesh = coneflat.TriangleMesh(vertices, faces)
+        low = vertices[:, 2] < -0.01
+        rim = mesh.edges[~low[mesh.edges].any(axis=1)]
+        below = np.isin(np.arange(len(vertices)), faces[low[faces].any(axis=1)]) & ~low
+        seams = rim[below[rim].all(axis=1)]
+        whole = whole_curve(vertices, faces, Options(seams=seams), 6)
+        assert whole.parts == 2
+        assert whole.counts[0] == 0

@@ -186,6 +186,9 @@ def test_a_first_layout_comes_early(mesh):
     np.testing.assert_array_equal(first.cones, result.cones)
     parts = coneflat.TriangleMesh(*mesh).components[0]
     assert label_faces(first.uv_faces, len(first.uv))[0] == parts
+    # Nobody has looked for its overlaps: it does not say that there are none.
+    assert np.isnan(first.distortion.overlap)
+    assert first.distortion.flipped == 0
 
 
 def test_what_is_no_mesh_and_what_makes_no_sense():

@@ -78,7 +78,7 @@ class TestChoices:
             (lambda c: c.moved(5, 6), StudioError, "vertex 5 is no cone"),
             (lambda c: c.removed(5), StudioError, "vertex 5 is no cone"),
             (lambda c: c.locked(5, True), StudioError, "vertex 5 is no cone"),
-            (lambda c: c.angled(4, -1.0), StudioError, "a positive angle, not -57.2"),
+            (lambda c: c.angled(4, -1.0), StudioError, "a positive angle of at most 720 degrees, not -57.2"),
             (lambda c: c.cut((4,)), StudioError, "a path leads from one vertex to others"),
             (lambda c: c.cut((4, 4)), StudioError, "a path leads from one vertex to others"),
             (lambda c: c.with_option("progress", print), OptionError, "the studio sets no option 'progress'"),

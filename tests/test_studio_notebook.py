@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import http.server
 import threading
 import urllib.request
@@ -127,6 +128,89 @@ def test_a_frame_of_a_notebook_shows_it(browser, page):
             assert page.choices["options"] == {"charts": "one"}
     finally:
         context.close()
+
+
+@contextmanager
+def proxy():
+    """Serve ports of this machine under /proxy/, as jupyter-server-proxy does, and a page with a frame of one at /."""
+    content = ""
+
+    class Proxy(http.server.BaseHTTPRequestHandler):
+        def pass_on(self):
+            if self.path == "/":
+                status, headers, body = (
+                    200,
+                    {"content-type": "text/html"},
+                    f"<!doctype html>{content}".encode(),
+                )
+            else:
+                port, _, path = self.path.removeprefix("/proxy/").partition("/")
+                size = int(self.headers.get("content-length") or 0)
+                there = http.client.HTTPConnection("127.0.0.1", int(port), timeout=60)
+                # Headers go on as they are, the host's and the origin's among them.
+                there.request(self.command, f"/{path}", self.rfile.read(size) or None, dict(self.headers))
+                answer = there.getresponse()
+                status, headers, body = answer.status, dict(answer.getheaders()), answer.read()
+                there.close()
+            self.send_response(status)
+            for name, value in headers.items():
+                if name.lower() not in (
+                    "content-length",
+                    "transfer-encoding",
+                    "connection",
+                    "date",
+                    "server",
+                ):
+                    self.send_header(name, value)
+            self.send_header("content-length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        do_GET = do_POST = pass_on
+
+        def log_message(self, *words):
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Proxy)
+    server.daemon_threads = True
+
+    def show(frame):
+        nonlocal content
+        content = frame
+        return f"http://localhost:{server.server_port}/"
+
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield show
+    server.shutdown()
+    server.server_close()
+
+
+def test_a_proxy_shows_it(browser):
+    context = browser.new_context(viewport={"width": 1200, "height": 760}, reduced_motion="reduce")
+    with proxy() as show, coneflat.studio(*shapes.sphere(3), through="/proxy/{port}/") as opened:
+        assert opened.address.startswith("/proxy/")
+        outer = context.new_page()
+        outer.goto(show(opened._repr_html_()))
+        frame = outer.frame_locator("iframe")
+        frame.locator("html[data-settled='true']").wait_for(state="attached", timeout=PATIENCE)
+        frame.locator("#charts").select_option("one")
+        frame.locator("#undo:not([disabled])").wait_for(timeout=PATIENCE)
+        assert opened.choices["options"] == {"charts": "one"}
+        # What is set here is shown there.
+        opened.choices = {"options": {"cone_count": 7}}
+        frame.locator("#cones-by >> option[value=cone_count]:checked").wait_for(
+            state="attached", timeout=PATIENCE
+        )
+        assert frame.locator("#cone-count").input_value() == "7"
+        assert frame.locator("#charts").input_value() == "atlas"
+        # Without the token nobody gets in, by this way either.
+        bare = show("").rstrip("/") + opened.address.split("?")[0]
+        for query in ("", "?token=wrong"):
+            assert outer.request.get(f"{bare}{query}").status == 403
+    context.close()
+    for bad in ("", "/proxy/", "https://hub/user/me/proxy/8000/"):
+        with pytest.raises(OptionError, match="an address with the port in it"):
+            coneflat.studio(*shapes.sphere(1), through=bad)
 
 
 def test_no_other_page_frames_it(browser, page):

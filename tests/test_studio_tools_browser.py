@@ -266,9 +266,9 @@ def test_a_picture_a_report_and_quads_are_saved(hill, tmp_path):
 def test_controls_refuse_in_the_panel_and_keep_the_layout(hill):
     page, layout = hill.page, hill.run("studio.layout")
     for control, value, message in (
-        ("#padding", "4000", "Padding must be from 0 to a quarter"),
-        ("#resolution", "0", "Resolution must be from 1 to"),
-        ("#cone-count", "-3", "Cone_count cannot be negative"),
+        ("#padding", "4000", "“Texels between charts” must be from 0 to a quarter"),
+        ("#resolution", "0", "“Texels a side” must be from 1 to"),
+        ("#cone-count", "-3", "“Number” cannot be negative"),
         ("#sharp", "500", "The sharp angle must be between 0 and pi"),
     ):
         if control == "#cone-count":
@@ -315,5 +315,67 @@ def test_paths_follow_sharp_edges(browser, tmp_path):
     assert sharp_share() == 1
     opened.page.keyboard.press("f")
     assert sharp_share() < 1
+    opened.close()
+    served.close()
+
+
+def test_what_is_to_be_known_of_cones_is_said(visit):
+    page = visit.page
+    visit.settle()
+    # An angle that no cone has is refused; one that leaves nothing for the others is told of, in degrees.
+    for vertex in visit.cones():
+        visit.run(f"studio.setAngle({vertex}, 350)")
+        visit.settle()
+    cones = visit.cones()
+    assert "must sum to 2 pi chi" in page.inner_text("#refusal-text")
+    visit.troubles.clear()
+    # The sample has a handle: whatever its cones are, they lack nothing in all.
+    assert f"in all they are {10 * len(cones)}° too narrow for this surface" in page.inner_text("#angle-sum")
+    field = page.locator(f'#cone-list .cone[data-vertex="{cones[0]}"] input')
+    assert field.get_attribute("max") == "720"
+    field.fill("3000")
+    page.keyboard.press("Enter")
+    refuses(visit, "positive angle of at most 720 degrees, not 3,000")
+    field.fill("")
+    page.keyboard.press("Enter")
+    visit.settle()
+    assert page.locator("#angle-sum").is_hidden()
+
+    # A cone that is set where none are to be is told of while it is there.
+    while visit.run("studio.news.undo"):
+        page.keyboard.press("Escape")
+        visit.run("studio.act({do: 'undo'})")
+        visit.settle()
+    (vertex, *_) = visit.visible_vertices(4)
+    visit.run(f"studio.act({{do: 'paint', layer: 'no_cone', where: '{vertex}'}})")
+    visit.settle()
+    assert page.locator("#warnings").is_hidden()
+    visit.run(f"studio.act({{do: 'add', vertex: {vertex}}})")
+    visit.settle()
+    assert f"as painted: vertex {vertex}." in page.inner_text("#warnings")
+    visit.run(f"studio.act({{do: 'remove', vertex: {vertex}}})")
+    visit.settle()
+    assert page.locator("#warnings").is_hidden()
+
+
+def test_the_curve_is_that_of_all_parts(browser, tmp_path):
+    ball, hill = shapes.sphere(2), shapes.hill(8, 8)
+    shapes.write_obj(tmp_path / "two.obj", *shapes.join(ball, (hill[0] + 9, hill[1])))
+    served = Studio(tmp_path)
+    served.session.open(tmp_path / "two.obj")
+    assert served.session.wait_until_idle(PATIENCE / 1000)
+    opened = StudioVisit(browser, served)
+    opened.settle()
+    page = opened.page
+    page.keyboard.press("q")
+    opened.wait("studio.panel.curve.found")
+    assert "for so many cones in each of its 2 parts" in page.inner_text("#curve-of")
+    # Where each part has its own number, none is marked on the curve; where both have one, that is.
+    assert opened.run("studio.panel.curve.current()") is None
+    count = opened.run("studio.panel.curve.found.counts[1]")
+    opened.run(f"studio.setCount({count})")
+    opened.settle()
+    assert opened.run("studio.panel.curve.current()[0]") == count
+    assert page.locator("#curve").is_visible()
     opened.close()
     served.close()

@@ -55,6 +55,14 @@ SIGHTS = dict.fromkeys(GALLERY, ("y", "front-right", "back-left")) | {
     "fandisk": ("x", "right-front", "left-back"),
     "horse": ("z", "right-back", "left-front"),
 }
+#: Pictures that a browser takes, and of which models.
+SCREENSHOTS = {
+    "viewer": "bunny",
+    "viewer-quads": "spot",
+    "studio": "bunny",
+    "studio-phone": "bunny",
+    "studio-session": "bunny",
+}
 #: Models with their layouts below, and what is up.
 ATLAS_MODELS = {"bunny": "y", "hand": "y", "horse": "z", "rocker-arm": "y", "kitten": "y"}
 #: Shapes that people complain about: title, mesh and options.
@@ -77,7 +85,7 @@ def draw_pictures(measured: Measured, names: list[str]) -> None:
             save_figure_small(draw(measured), name)
     if any(fnmatch("convergence", pattern) for pattern in names):
         _draw_convergence()
-    for name, model in (("viewer", "bunny"), ("viewer-quads", "spot"), ("studio", "bunny")):
+    for name, model in SCREENSHOTS.items():
         if any(fnmatch(name, pattern) for pattern in names) and measured.has(model):
             _take_screenshots(name, model, measured)
 
@@ -94,25 +102,26 @@ def _draw_convergence() -> None:
 
 
 def _take_screenshots(name: str, model: str, measured: Measured) -> None:
-    """Take the pictures of the viewer, where there is a browser."""
+    """Take the pictures of the viewer and of the studio, where there is a browser."""
     if find_spec("playwright") is None:
-        print("playwright is not installed: the pictures of the viewer are left as they are")
+        print(f"playwright is not installed: {name} is left as it is")
         return
-    from screenshots import (
-        browser_path,
-        take_screenshot_of_quads,
-        take_screenshot_of_studio,
-        take_screenshots,
-    )
+    from screenshots import browser_path, take_screenshot_of_quads, take_screenshots
+    from studio_pictures import take_phone, take_session, take_studio
 
+    taken = {
+        "viewer": lambda: take_screenshots(measured.flattening(model)),
+        "viewer-quads": lambda: take_screenshot_of_quads(
+            coneflat.quads(measured.path(model), quads=3000), model
+        ),
+        "studio": lambda: take_studio(measured.path(model)),
+        "studio-phone": lambda: take_phone(measured.path(model)),
+        "studio-session": lambda: take_session(measured.path(model)),
+    }
     if browser_path() is None:
-        print("there is no Chromium: the pictures of the viewer are left as they are")
-    elif name == "viewer":
-        take_screenshots(measured.flattening(model))
-    elif name == "studio":
-        take_screenshot_of_studio(measured.path(model))
+        print(f"there is no Chromium: {name} is left as it is")
     else:
-        take_screenshot_of_quads(coneflat.quads(measured.path(model), quads=3000), model)
+        taken[name]()
 
 
 def curvature_figure(measured: Measured) -> Any:

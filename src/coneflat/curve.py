@@ -12,6 +12,7 @@ from ._arrays import FloatArray, IntArray
 from .cones import ConeSolution
 from .cones.choose import Surface, only_choice, search_on
 from .errors import OptionError
+from .geometry import double_areas
 from .geometry.operators import area_distortion, weighted_areas
 from .input.components import Component, prepare
 from .options import CurveOptions, FindOptions, Options, read_options, takes
@@ -60,9 +61,32 @@ class ConeCurve:
     @property
     def knee(self) -> int:
         """The number of cones beyond which more of them gain least: farthest below the chord of the curve."""
-        counts, distortions = self.counts, self.distortions
-        across, down = np.ptp(counts), np.ptp(distortions)
-        return int(counts[np.argmin(counts / (across or 1) + distortions / (down or 1.0))])
+        return _knee(self.counts, self.distortions)
+
+
+@dataclass(frozen=True, eq=False)
+class WholeCurve:
+    """The area distortion of a whole mesh with up to so many cones in each of its parts.
+
+    Attributes:
+        counts: (k,) cones in each part: as many are allowed as `cone_count` allows.
+        distortions: (k,) E of the linear model of all parts, which falls.
+        parts: how many there are: components, and what marked seams divide them into.
+    """
+
+    counts: IntArray
+    distortions: FloatArray
+    parts: int
+
+    @property
+    def knee(self) -> int:
+        """The number of cones beyond which more of them gain least: farthest below the chord of the curve."""
+        return _knee(self.counts, self.distortions)
+
+
+def _knee(counts: IntArray, distortions: FloatArray) -> int:
+    across, down = np.ptp(counts), np.ptp(distortions)
+    return int(counts[np.argmin(counts / (across or 1) + distortions / (down or 1.0))])
 
 
 @takes(FindOptions)
@@ -77,10 +101,10 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
     chosen = Options(**vars(asked))
     stages = Stages(chosen.progress)
     with using_threads():
-        opened = _open(mesh, faces, chosen, stages)
-        if isinstance(opened, FoundCones):
-            return opened
-        search, part = opened
+        part = _largest(mesh, faces, chosen, stages)
+        search = _open(part, chosen, stages)
+        if isinstance(search, FoundCones):
+            return search
         with stages("cones"):
             count = chosen.cone_count
             found = search.fewest(chosen.distortion) if count is None else search.best_of(count)
@@ -99,31 +123,65 @@ def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Con
     chosen = Options(**{name: value for name, value in vars(asked).items() if name != "most"})
     stages = Stages(chosen.progress)
     with using_threads():
-        opened = _open(mesh, faces, chosen, stages)
-        if isinstance(opened, FoundCones):
-            return ConeCurve((opened,))
-        search, part = opened
-        with stages("cones"):
-            found = search.curve(asked.most)
-    if not found:
-        raise OptionError(f"no set of up to {asked.most} cones carries this surface's curvature; allow more")
-    return ConeCurve(tuple(_named(each.solution, each.distortion, part) for each in found))
+        return _curve(_largest(mesh, faces, chosen, stages), asked.most, chosen, stages)[0]
 
 
-def _open(
-    mesh: Any, faces: ArrayLike | None, options: Options, stages: Stages
-) -> tuple[ConeSearch, Component] | FoundCones:
-    """Return a search on the largest component, or what there is where no vertex of it may be a cone."""
+def whole_curve(mesh: Any, faces: ArrayLike | None, options: Options, most: int) -> WholeCurve:
+    """Search for the best cones of every number of them, on all parts of a mesh.
+
+    Args:
+        mesh, faces: as for `coneflat.flatten`, and so are the errors.
+        options: of `coneflat.flatten`, that have been read; their number of cones does not matter.
+        most: the largest number of cones, in each part.
+    """
+    stages = Stages(options.progress)
+    with using_threads(options.threads):
+        with stages("check"):
+            parts = prepare(mesh, faces, options).components
+        total, curves = sum(len(part.faces) for part in parts), []
+        for part in parts:
+            stages.share = len(part.faces) / total
+            curves.append(_curve(part, most, options, stages))
+            stages.end_part()
+    least = max(curve.counts[0] for curve, _ in curves)
+    counts = np.unique(np.concatenate([[least], *(curve.counts for curve, _ in curves)]))
+    counts = counts[counts >= least]
+    # With so many cones allowed a part has the best set of so many or fewer.
+    each = [curve.distortions[np.searchsorted(curve.counts, counts, side="right") - 1] for curve, _ in curves]
+    areas = [area for _, area in curves]
+    whole = np.sqrt(np.average(np.square(each), axis=0, weights=areas))
+    return WholeCurve(counts, whole, len(parts))
+
+
+def _largest(mesh: Any, faces: ArrayLike | None, options: Options, stages: Stages) -> Component:
+    """Return the largest component of a mesh, which then is all that there is to do."""
     with stages("check"):
         part = max(prepare(mesh, faces, options).components, key=lambda each: len(each.faces))
+    stages.share = 1.0
+    return part
+
+
+def _curve(part: Component, most: int, options: Options, stages: Stages) -> tuple[ConeCurve, float]:
+    """Return the curve of a component, and its area, twice."""
+    area, search = float(double_areas(part.lengths).sum()), _open(part, options, stages)
+    if isinstance(search, FoundCones):
+        return ConeCurve((search,)), area
+    with stages("cones"):
+        found = search.curve(most)
+    if not found:
+        raise OptionError(f"no set of up to {most} cones carries this surface's curvature; allow more")
+    return ConeCurve(tuple(_named(each.solution, each.distortion, part) for each in found)), area
+
+
+def _open(part: Component, options: Options, stages: Stages) -> ConeSearch | FoundCones:
+    """Return a search on a component, or what there is where no vertex of it may be a cone."""
     surface = Surface.of(part.mesh, part.lengths)
     only = only_choice(surface, part.constraints, options)
     if only is not None:
         share = weighted_areas(surface.areas, part.constraints.weights)
         return _named(only, area_distortion(only.log_scale, share), part)
-    stages.share = 1.0
     with stages("cones", 0.3):
-        return search_on(surface, part.constraints, options, stages), part
+        return search_on(surface, part.constraints, options, stages)
 
 
 def _named(solution: ConeSolution, distortion: float, part: Component) -> FoundCones:

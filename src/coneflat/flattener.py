@@ -49,7 +49,7 @@ class Flattener:
 
         Args:
             early: called with the first layout that there is: one chart for each component, as the metric unfolds,
-                before triangles are relaxed and overlaps parted.
+                before triangles are relaxed and overlaps parted; its own overlaps are not measured.
             options: those of `coneflat.flatten`.
         """
         return self.flatten_as(read_options(options), early)

@@ -22,6 +22,7 @@ from .flat.methods import find_metric, turning_meter
 from .flat.more_cones import with_quality
 from .flat.relaxed import relaxed, relaxes
 from .geometry.operators import weighted_areas
+from .geometry.overlap import NOT_LOOKED_FOR
 from .input.components import Component, Prepared, prepare
 from .input.symmetry import SymmetryUse, are_mirrored, check_symmetry, find_symmetry, symmetry_notes
 from .layout.disk import cutting
@@ -87,7 +88,7 @@ def flatten_prepared(
         options: that have been read.
         stages: the stopwatch.
         early: called with the first layout, one chart for each component, before triangles are relaxed and overlaps
-            parted.
+            parted, which are not looked for.
     """
     with using_threads(options.threads), solving(solver) as solvers:
         runs = [flatten_component(part, surface_of, options, stages) for part in prepared.components]
@@ -104,7 +105,7 @@ def flatten_prepared(
             first: list[LaidOut] = []
             for i in range(len(runs)):
                 first.append(laid_out(i, first, next))
-            early(assemble(prepared, first, replace(options, charts="one"), Stages()))
+            early(assemble(prepared, first, replace(options, charts="one"), Stages(), NOT_LOOKED_FOR))
         flat: list[LaidOut] = []
         for i in range(len(runs)):
             flat.append(laid_out(i, flat, _last))

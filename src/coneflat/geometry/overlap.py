@@ -39,6 +39,10 @@ class Overlaps:
     complete: bool = True
 
 
+#: Of a layout of which nobody asks: they may be many, and take long to be found.
+NOT_LOOKED_FOR = Overlaps(np.empty((0, 2), dtype=np.int64), float("nan"), float("nan"), complete=False)
+
+
 def find_overlaps(
     points: ArrayLike, triangles: ArrayLike | None = None, *, limit: int | None = None
 ) -> Overlaps:

@@ -64,8 +64,8 @@ class Joined:
     def notes_of(self, notes: Sequence[str]) -> tuple[str, ...]:
         """Return these notes and those on a result; vertices that another is used for are not left out."""
         kept = [note for note in notes if not (self.merged and is_left_out(note))]
-        lone = len(self.used) - len(np.unique(self.mesh.corners)) - self.merged
-        return (*self.notes(), *kept, *[left_out(lone)] * (self.merged > 0 and lone > 0))
+        lone = len(self.used) - len(np.unique(self.mesh.corners)) - self.merged if self.merged else 0
+        return (*self.notes(), *kept, *[left_out(lone)] * (lone > 0))
 
     def renamed(self, options: Mapping[str, Any]) -> dict[str, Any]:
         """Return arguments of `coneflat.flatten` with the vertices that are used for those that they name.

@@ -14,6 +14,7 @@ from ..atlas import part_touching
 from ..atlas.arrange import arrange_charts
 from ..atlas.chart_seams import numbered
 from ..atlas.mirrored import ChartMirrors, mirrors_of
+from ..geometry.overlap import Overlaps
 from ..geometry.planar import sides_between
 from ..input.numbering import result_numbering, turn_corners
 from ..input.polygons import Polygons
@@ -123,13 +124,20 @@ class _Curvature:
     residual: FloatArray
 
 
-def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, stages: Stages) -> Flattening:
+def assemble(
+    prepared: Prepared,
+    laid_out: Sequence[LaidOut],
+    options: Options,
+    stages: Stages,
+    overlaps: Overlaps | None = None,
+) -> Flattening:
     """Arrange the pieces in the unit square, number everything as in the input, and measure.
 
     Args:
         prepared: the input.
         laid_out: its flattened components.
         options, stages: what the result tells about itself.
+        overlaps: of its triangles; None where they are to be found.
     """
     checked = prepared.checked
     numbering = _number_vertices(prepared, laid_out)
@@ -148,7 +156,7 @@ def assemble(prepared: Prepared, laid_out: Sequence[LaidOut], options: Options, 
     curvature = _curvature(prepared, laid_out, numbering, options)
     cones = numbering.renumber([one.cones for one in laid_out])
     with stages("measure"):
-        layout, distortion = _measure(prepared, laid_out, mesh, layout, curvature, cones, options)
+        layout, distortion = _measure(prepared, laid_out, mesh, layout, curvature, cones, options, overlaps)
         rotations = _rotations(laid_out, layout.uv[layout.own], options)
     result = Flattening(
         vertices=numbering.positions,
@@ -308,6 +316,7 @@ def _measure(
     curvature: _Curvature,
     cones: IntArray,
     options: Options,
+    overlaps: Overlaps | None,
 ) -> tuple[_Layout, Distortion]:
     """Return the measures of a layout, and the layout, in which triangles of an atlas that only touch are apart."""
     residual = curvature.residual
@@ -319,12 +328,12 @@ def _measure(
         prescribed=curvature.prescribed,
         lengths=prepared.own_lengths,
     )
-    distortion = measured(layout.uv[layout.corners])
+    distortion = measured(layout.uv[layout.corners], overlaps=overlaps)
     is_meant = any(one.lies_on is not None for one in laid_out)
     if options.charts == "atlas" and distortion.overlapping_pairs and not is_meant:
-        parted, overlaps = part_touching(layout.uv, layout.corners)
-        if len(overlaps.pairs) < distortion.overlapping_pairs:
-            return replace(layout, uv=parted), measured(parted[layout.corners], overlaps=overlaps)
+        parted, left = part_touching(layout.uv, layout.corners)
+        if len(left.pairs) < distortion.overlapping_pairs:
+            return replace(layout, uv=parted), measured(parted[layout.corners], overlaps=left)
     return layout, distortion
 
 

@@ -158,7 +158,7 @@ def as_rows(result: Flattening) -> list[Row]:
     if untangled:
         of_map["flipped"] = (*of_map["flipped"][:2], untangled)
     return [
-        ("triangles", f"{len(result.faces):,}", f"{len(np.unique(result.faces)):,} vertices{added}"),
+        ("triangles", f"{len(result.faces):,}", f"{_used(result):,} vertices{added}"),
         ("cones", cones, "singular vertices, and their curvatures"),
         (
             "curvature error",
@@ -179,6 +179,13 @@ def as_rows(result: Flattening) -> list[Row]:
         *_rotation_rows(result),
         *_symmetry_rows(result),
     ]
+
+
+def _used(result: Flattening) -> int:
+    """Return how many vertices have triangles."""
+    is_used = np.zeros(len(result.vertices), dtype=bool)
+    is_used[result.faces] = True
+    return int(np.count_nonzero(is_used))
 
 
 def map_rows(d: Distortion) -> dict[str, Row]:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ...options import Options, declarations
 from .options import check_combinations, flag_of, is_given, keywords, option_flags, paper_option
 from .shared import checking, input_options, measures_alone, require_option, verbosity_options
+
+if TYPE_CHECKING:
+    from ...result.flattening import Flattening
 
 
 @click.command(
@@ -85,8 +89,9 @@ def flatten(
 
     requirements = parse_requirements(measures_alone(required), REPORTED)
     check_combinations(context)
+    noted = None
     if project is not None:
-        mesh, options = of_project(context, project)
+        mesh, options, noted = of_project(context, project)
     elif mesh is None:
         raise click.MissingParameter(ctx=context, param_hint="'MESH'", param_type="argument")
     else:
@@ -105,12 +110,16 @@ def flatten(
         verbosity=verbosity,
         ending=ending,
         requirements=requirements,
+        noted=noted,
     )
 
 
-def of_project(context: click.Context, project: Path) -> tuple[Path, dict[str, Any]]:
-    """Return the mesh of a project, and the keyword arguments of `coneflat.flatten` that it holds."""
+def of_project(
+    context: click.Context, project: Path
+) -> tuple[Path, dict[str, Any], Callable[[Flattening], Flattening]]:
+    """Return the mesh of a project, the keyword arguments of `coneflat.flatten` that it holds, and what notes them."""
     from ..studio.project import read_project
+    from ..studio.warnings import noted
 
     taken = [name for name in (*declarations(Options), "mesh", "paper", "weld") if name in context.params]
     for name in taken:
@@ -119,4 +128,4 @@ def of_project(context: click.Context, project: Path) -> tuple[Path, dict[str, A
             raise click.UsageError(f"a project has its own mesh and options: leave out {what}", context)
     opened = read_project(project)
     opened.check_mesh()
-    return opened.mesh, opened.choices.keywords()
+    return opened.mesh, opened.choices.keywords(), lambda result: noted(result, opened.choices)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from io import BytesIO
@@ -43,6 +43,7 @@ def run(
     verbosity: str | None = None,
     ending: str = ".obj",
     requirements: Sequence[Requirement] = (),
+    noted: Callable[[Flattening], Flattening] | None = None,
 ) -> None:
     """Flatten a mesh file, write the result and its report, and print what came out.
 
@@ -57,6 +58,7 @@ def run(
         verbosity: how much to print, see `verbosity_options`.
         ending: format of what goes to standard output, or of a file without a name.
         requirements: what measures must be; the files are written in any case.
+        noted: gives a result with more notes.
     """
     output = named_output(mesh, ending) if output is None else output
     # What can fail at the end is looked at before the work.
@@ -67,6 +69,7 @@ def run(
 
     with _kept_apart(output) as stdout, Console(verbosity) as console:
         result = flatten_file(mesh, console, options, weld)
+        result = result if noted is None else noted(result)
         result = save(result, console, output, report, texture, stdout, ending)
         console.finish([path for path in (output, report) if path is not None and path != PIPE], result)
     check_required(requirements, result.report(), str(output))

@@ -20,8 +20,17 @@ from .shared import QUIET, VERBOSE, color_option, verbosity_options
 )
 @click.option("--no-open", is_flag=True, help="Print the page's address, and open no browser.")
 @color_option
+@click.option(
+    "--most-triangles",
+    type=click.IntRange(1),
+    default=500_000,
+    show_default=True,
+    help="Thin a larger mesh to so many, for display only.",
+)
 @verbosity_options
-def studio(file: Path | None, port: int, no_open: bool, color: str | None, verbosity: str | None) -> None:
+def studio(
+    file: Path | None, port: int, no_open: bool, color: str | None, most_triangles: int, verbosity: str | None
+) -> None:
     """Move cones and draw seams on a mesh, and see at once what comes of it.
 
     The page is at an address of this machine that nobody else can use; it is printed first. What is chosen is kept in
@@ -42,4 +51,4 @@ def studio(file: Path | None, port: int, no_open: bool, color: str | None, verbo
             click.echo(line)
 
     tell = click.echo if verbosity == VERBOSE else None
-    run_studio(file, port, opens=not no_open, say=say, tell=tell, color=color)
+    run_studio(file, port, opens=not no_open, say=say, tell=tell, color=color, most_triangles=most_triangles)

@@ -13,7 +13,9 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING
+
+import numpy as np
 
 from ...errors import ConeflatError, NonManifoldError, NonOrientableError
 from ...progress import asking
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 
 #: Polygons from which on the first layout is shown, too: of smaller meshes the last is there as soon.
 EARLY = 20_000
+#: Triangles up to which the page gets all of a mesh, to paint and draw on, where it shows fewer.
+MOST_WHOLE = 4_000_000
 #: What stands for numbers until they are known, and what the first layout is.
 TO_COME = "…"
 FIRST = "First view: distortion is yet to be evened out, and overlaps to be parted  ·  …"
@@ -89,6 +93,7 @@ class Bench:
         self._source: Joined | None = None
         self._flattener: Flattener | None = None
         self._model: Model | None = None
+        self._most: int | None = None
         self._read: tuple[str, str] | None = None
 
     def flatten(
@@ -101,7 +106,10 @@ class Bench:
             told: called with what is being done, and the fraction that is done.
             show: called with the first layout, in the same form, before it is what it is to be.
         """
-        self.result = None
+        from .choices import Choices
+        from .warnings import noted, strained
+
+        self.result, self._most = None, job.get("most")
         source, flattener = self._open(job["mesh"], job["sha256"], told)
         name, furthest = Path(job["mesh"]).name, 0.0
 
@@ -114,18 +122,19 @@ class Bench:
             told_on("first view", furthest)
             show(*self._picture(first, name, is_first=True))
 
-        chosen = arguments(source, job["choices"])
-        is_large = len(source.mesh.offsets) - 1 >= self._early_from
-        result = flattener.flatten(early=show_first if is_large else None, progress=told_on, **chosen)
-        result = replace(result, notes=source.notes_of(result.notes))
+        chosen = Choices.from_plain(job["choices"])
+        words, is_large = source.renamed(chosen.keywords()), len(source.mesh.offsets) - 1 >= self._early_from
+        result = flattener.flatten(early=show_first if is_large else None, progress=told_on, **words)
+        result = noted(replace(result, notes=source.notes_of(result.notes)), chosen)
         told("picture", 1.0)
         head, body = self._coloured(job, result, name)
         self.result = result
-        return head, body
+        return {**head, "warnings": strained(chosen, result)}, body
 
     def _coloured(self, job: Head, result: Flattening, name: str) -> tuple[Head, bytes]:
         """Return what the page shows of a result, with colours of the user's own; without, if there are none such."""
         from ...view.own import own_quantity
+        from .wording import in_page
 
         if not job.get("color"):
             return self._picture(result, name)
@@ -133,7 +142,7 @@ class Bench:
             own = own_quantity(result, job["color"])
         except ConeflatError as error:
             head, body = self._picture(result, name)
-            return {**head, "missing": str(error)}, body
+            return {**head, "missing": in_page(str(error))}, body
         return self._picture(result, name, own=own)
 
     def make(self, job: Head, told: Callable[[str, float], None]) -> tuple[Head, bytes]:
@@ -160,6 +169,7 @@ class Bench:
         from ...view.page.content import Model, content_of
         from ...view.page.payload import Told, head_and_block
         from ...view.page.webpage import MOST_TRIANGLES
+        from .wording import in_page
 
         told = None
         if is_first:
@@ -168,9 +178,12 @@ class Bench:
             result = replace(result, notes=())
         if self._model is None or not self._model.is_of(result):
             self._model = Model.of(result)
-        content = content_of(result, MOST_TRIANGLES, self._model, own)
+        content = content_of(result, self._most or MOST_TRIANGLES, self._model, own)
         show = "checker" if own is None else "own"
         head, block = head_and_block(result, content, None, name, "y", show, told)
+        if content.left_out and len(result.faces) <= MOST_WHOLE:
+            head, block = with_whole(head, block, self._model, result)
+        head["notes"] = [in_page(note) for note in head["notes"]]
         cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
         told_of = {"head": with_prints(head, block), "found": cones.tolist(), "seconds": result.seconds}
         return told_of, block
@@ -187,11 +200,20 @@ class Bench:
         return self._source, self._flattener
 
 
-def arguments(source: Joined, choices: dict[str, Any]) -> dict[str, Any]:
-    """Return what `coneflat.flatten` is given for a mesh that was read and choices that JSON holds."""
-    from .choices import Choices
+def with_whole(head: Head, block: bytes, model: Model, result: Flattening) -> tuple[Head, bytes]:
+    """Return what the page shows of a result, and all vertices and triangles of its mesh beside."""
+    from ...view.page.payload import pack
 
-    return source.renamed(Choices.from_plain(choices).keywords())
+    arrays = {
+        "whole_places": model.places.astype(np.float32),
+        "whole_faces": np.searchsorted(model.used, model.mesh.faces).astype(np.uint32),
+    }
+    numbers = model.used if result.vertex_origin is None else result.vertex_origin[model.used]
+    if not np.array_equal(numbers, np.arange(len(numbers))):
+        arrays["whole_numbers"] = numbers.astype(np.int32)
+    listed, more = pack(arrays)
+    moved = [{**each, "offset": each["offset"] + len(block)} for each in listed]
+    return {**head, "arrays": [*head["arrays"], *moved]}, block + more
 
 
 def serve(jobs: Jobs, answers: IO[bytes]) -> None:
@@ -231,12 +253,9 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
 
 def _told_failure(error: ConeflatError) -> Head:
     """Return what the page says of a failure: what a repair would mend, a button does there."""
-    from ...input.validation import REPAIR_ADVICE
+    from .wording import in_page
 
-    return {
-        "error": str(error).replace(REPAIR_ADVICE, "repair the mesh"),
-        "repair": isinstance(error, REPAIRABLE),
-    }
+    return {"error": in_page(str(error)), "repair": isinstance(error, REPAIRABLE)}
 
 
 def main() -> None:

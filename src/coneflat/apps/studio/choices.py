@@ -27,6 +27,8 @@ NUMBERS = ("distortion", "cone_count")
 BOUNDARIES = ("free", "lengths", "disk", "straight", "rectangle")
 #: What the file's unit of length may be; "" is not known. It changes nothing but the lengths that are shown.
 UNITS = ("", "mm", "cm", "m", "inch")
+#: Radians: no cone has a wider angle, as of searches; triangles have no room for more.
+WIDEST = 4 * math.pi
 
 Path = tuple[int, ...]
 
@@ -119,11 +121,11 @@ class Choices:
         """Return choices with a cone more.
 
         Raises:
-            StudioError: there is one already.
+            StudioError: there is one already, or no cone has such an angle.
         """
         if vertex in self._by_vertex():
             raise StudioError(f"vertex {vertex} is a cone already")
-        return self._with_cones(cones=self._by_vertex() | {vertex: Cone(vertex, angle)})
+        return self._with_cones(cones=self._by_vertex() | {vertex: Cone(vertex, _checked_angle(angle))})
 
     def moved(self, vertex: int, to: int) -> Choices:
         """Return choices with a cone elsewhere.
@@ -155,9 +157,8 @@ class Choices:
         Raises:
             StudioError: there is no cone, or no cone has such an angle.
         """
-        if angle is not None and not 0 < angle < math.inf:
-            raise StudioError(f"a cone has a positive angle, not {math.degrees(angle):g} degrees")
-        return self._with_cones(cones=self._by_vertex() | {vertex: replace(self._cone(vertex), angle=angle)})
+        cone = replace(self._cone(vertex), angle=_checked_angle(angle))
+        return self._with_cones(cones=self._by_vertex() | {vertex: cone})
 
     def locked(self, vertex: int, locked: bool) -> Choices:
         """Return choices in which searches keep a cone where it is, or need not; one that was found is kept by this."""
@@ -273,9 +274,7 @@ class Choices:
             angle = None if each["angle"] is None else as_number("a cone's angle", each["angle"])
             if vertex in cones:
                 raise StudioError(f"vertex {vertex} is a cone twice")
-            if angle is not None and not 0 < angle < math.inf:
-                raise StudioError(f"a cone has a positive angle, not {angle:g}")
-            cones[vertex] = Cone(vertex, angle, each["locked"] is True)
+            cones[vertex] = Cone(vertex, _checked_angle(angle), each["locked"] is True)
         chosen = chosen._with_cones(by_hand=plain["by_hand"] is True, cones=cones)
         for path in plain["cuts"]:
             chosen = chosen.cut(tuple(path))
@@ -301,6 +300,14 @@ class Choices:
         by_hand = self.by_hand if by_hand is None else by_hand
         # In order of their vertices: the same cones are the same choices, however they came about.
         return replace(self, by_hand=by_hand, cones=tuple(cones[v] for v in sorted(cones)))
+
+
+def _checked_angle(angle: float | None) -> float | None:
+    if angle is not None and not 0 < angle <= WIDEST * (1 + 1e-12):
+        raise StudioError(
+            f"a cone has a positive angle of at most {math.degrees(WIDEST):g} degrees, not {math.degrees(angle):,g}"
+        )
+    return angle
 
 
 def _checked(path: Iterable[Any]) -> Path:

@@ -21,12 +21,12 @@ _HEADERS = (
     (b"cross-origin-resource-policy", b"same-origin"),
     (b"cross-origin-opener-policy", b"same-origin"),
 )
-#: In no frame; or in those of notebooks on this machine, Jupyter's and VS Code's.
+#: In no frame; or in those of notebooks on this machine, Jupyter's and VS Code's, and of where a proxy has it.
 _ALONE = ((b"x-frame-options", b"DENY"), (b"content-security-policy", b"frame-ancestors 'none'"))
 _FRAMED = (
     (
         b"content-security-policy",
-        b"frame-ancestors http://localhost:* http://127.0.0.1:* vscode-webview: vscode-file:",
+        b"frame-ancestors http://localhost:* http://127.0.0.1:* 'self' vscode-webview: vscode-file:",
     ),
 )
 
@@ -34,13 +34,17 @@ _FRAMED = (
 class Guard:
     """Refuses requests by others, before anything looks at them."""
 
-    def __init__(self, app: ASGIApp, token: str, port: int, framed: bool = False) -> None:
+    def __init__(
+        self, app: ASGIApp, token: str, port: int, framed: bool = False, proxied: bool = False
+    ) -> None:
         """Args:
         app: what answers.
         token: that every request must have.
         port: the only one that requests may name.
         framed: notebooks of this machine may show the page in a frame.
+        proxied: requests come through a proxy, which names itself as the host: the token alone tells who asks.
         """
+        self._proxied = proxied
         self._headers = (*_HEADERS, *(_FRAMED if framed else _ALONE))
         self._app, self._token = app, token
         self._hosts = {f"{host}:{port}" for host in HOSTS} | (set(HOSTS) if port == 80 else set())
@@ -69,9 +73,11 @@ class Guard:
         for name, value in scope["headers"]:
             headers.setdefault(name.decode("latin-1").lower(), []).append(value.decode("latin-1"))
         host, origin = headers.get("host", []), headers.get("origin", [])
-        if len(host) != 1 or host[0].lower() not in self._hosts:
+        if not self._proxied and (len(host) != 1 or host[0].lower() not in self._hosts):
             return "this is another host"
-        if any(each.lower() not in {f"http://{name}" for name in self._hosts} for each in origin):
+        if not self._proxied and any(
+            each.lower() not in {f"http://{name}" for name in self._hosts} for each in origin
+        ):
             return "this comes from another page"
         given = headers.get(TOKEN_HEADER, [])
         if scope["path"] == "/" and not given:

@@ -49,13 +49,14 @@ def _rectangle(boundary: str, chosen: Choices) -> dict[str, Any]:
 
 
 def _painted(chosen: Choices) -> dict[str, Any]:
-    """Return what is painted, as far as it means something: cones placed by hand lie where they were put."""
+    """Return what is painted, as far as it means something: cones placed by hand or locked lie where they are."""
     paint = chosen.paint
     words: dict[str, Any] = {}
     if paint.no_seam:
         words["seamless"] = paint.no_seam.vertices()
     if paint.no_cone and not chosen.by_hand:
-        words["forbidden_cones"] = paint.no_cone.vertices()
+        locked = {cone.vertex for cone in chosen.cones}
+        words["forbidden_cones"] = [v for v in paint.no_cone.vertices() if v not in locked]
     # Where all angles are given there is nothing to weigh.
     if paint.importance and (not chosen.by_hand or any(cone.angle is None for cone in chosen.cones)):
         words["weights"] = paint.weights()

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...errors import ArrayShapeError, StudioError
+from ...errors import ArrayShapeError, OptionError, StudioError
 from ...files.atomic import atomic_write
 from ...files.obj_write import lines_of
 from ...input.arrays import as_input
+from ...text import shown
 from .serve import address_of, listening, studio_server
 from .session import PATIENCE, Session
 
@@ -31,12 +32,12 @@ HEIGHT = 720  # pixels
 class Studio:
     """A studio that this process serves, until it is closed or the process ends.
 
-    The last line of a notebook's cell shows its page in a frame, which the browser loads from this machine: Jupyter and
-    VS Code show it where they and the browser run on the machine that the kernel runs on, and a kernel elsewhere needs
-    a tunnel to the port of `address`. A saved notebook holds no picture of it.
+    The last line of a notebook's cell shows its page in a frame, which the browser loads from this machine; or, where
+    the kernel runs elsewhere, from the notebook's server by a proxy. A saved notebook holds no picture of it.
 
     Attributes:
-        address: of the page, for any browser on this machine; who knows it may change what is chosen.
+        address: of the page, for any browser on this machine, or as the notebook has it through a proxy; who knows it
+            may change what is chosen.
         project: the file in which everything that is chosen is kept.
         height: of the frame, pixels.
     """
@@ -49,6 +50,7 @@ class Studio:
         folder: str | PathLike[str] | None = None,
         color: str | None = None,
         height: int = HEIGHT,
+        through: str | None = None,
     ) -> None:
         """Args:
             mesh: a file or a project; or vertices (n, 3) if `faces` is given, a pair (vertices, faces), or a mesh of
@@ -58,11 +60,13 @@ class Studio:
                 arrays a new one that goes with the studio.
             color: numbers that are shown as colours, see `coneflat view --color`.
             height: of the frame, pixels.
+            through: where a proxy has a port of this machine, as the browser sees it: "/proxy/{port}/" with
+                jupyter-server-proxy, "/user/NAME/proxy/{port}/" on a hub. Then the token alone keeps others out.
 
         Raises:
             ArrayShapeError: it is no mesh.
             MeshFileError, ProjectError: the file cannot be read.
-            OptionError: the extra `studio` is not installed.
+            OptionError: the extra `studio` is not installed, or `through` names no port.
         """
         server_class = studio_server()
         self.height = height
@@ -77,8 +81,8 @@ class Studio:
             self._session.open(file)
             token, listener = secrets.token_urlsafe(24), listening(0)
             port = listener.getsockname()[1]
-            self.address = address_of(port, token)
-            self._server = server_class(self._session, token, port, framed=True)
+            self.address = address_of(port, token) if through is None else _proxied(through, port, token)
+            self._server = server_class(self._session, token, port, framed=True, proxied=through is not None)
         except BaseException:
             self._session.close()
             raise
@@ -174,6 +178,19 @@ class Studio:
 
     def __repr__(self) -> str:
         return f"<Studio of {self.project.name} at {self.address.split('?')[0]}>"
+
+
+def _proxied(through: str, port: int, token: str) -> str:
+    """Return the address of the page as a proxy has it.
+
+    Raises:
+        OptionError: that has no place for the port.
+    """
+    if "{port}" not in through:
+        raise OptionError(
+            f"through is an address with the port in it, such as /proxy/{{port}}/, not {shown(through)}"
+        )
+    return f"{through.replace('{port}', str(port)).rstrip('/')}/?token={token}"
 
 
 def studio(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Studio:

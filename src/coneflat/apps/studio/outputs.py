@@ -20,7 +20,9 @@ EXPORTS = (".obj", ".ply", ".glb", ".npz", ".svg", ".png", ".json")
 QUADS = (".obj", ".ply", ".glb")
 MOST_QUADS = 1_000_000
 #: Options that a search for any number of cones heeds, and those that quads heed.
-OF_CURVES = ("required_cones", "forbidden_cones", "weights", "repair")
+OF_CURVES = (
+    "required_cones", "forbidden_cones", "weights", "seams", "forbidden_seams", "seamless", "sharp_angle", "repair",
+)  # fmt: skip
 OF_QUADS = ("forbidden_cones", "weights", "sharp_angle", "stretch", "repair")
 #: Cones to look at: as many as this, and so many more than are locked.
 MOST_CONES, MORE = 30, 12
@@ -84,14 +86,18 @@ def quads_of(source: Joined, choices: Choices, count: int, ending: str, told: To
 def curve_of(source: Joined, choices: Choices, told: Told) -> dict[str, Any]:
     """Return the least distortion found for each number of cones around those that are locked, as plain values.
 
-    That of the largest component, before it is cut along marked seams.
+    That of the whole, with so many cones in each of its parts: components, and what is between marked seams.
     """
-    from ...curve import cone_curve
+    from ...curve import whole_curve
+    from ...options import read_options
 
-    options = curve_options(choices)
-    most = max(MOST_CONES, len(options.get("required_cones", ())) + MORE)
-    found = cone_curve(source.mesh, most=most, progress=told, **source.renamed(options))
-    return {"counts": found.counts.tolist(), "distortions": found.distortions.tolist(), "knee": found.knee}
+    words = curve_options(choices)
+    most = max(MOST_CONES, len(words.get("required_cones", ())) + MORE)
+    found = whole_curve(
+        source.mesh, None, read_options({**source.renamed(words), "cone_count": most, "progress": told}), most
+    )
+    curve = {"counts": found.counts.tolist(), "distortions": found.distortions.tolist()}
+    return {**curve, "knee": found.knee, "parts": found.parts}
 
 
 def curve_options(choices: Choices) -> dict[str, Any]:

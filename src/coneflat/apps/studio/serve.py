@@ -25,6 +25,7 @@ def run_studio(
     say: Callable[[str], None],
     tell: Callable[[str], None] | None = None,
     color: str | None = None,
+    most_triangles: int | None = None,
 ) -> None:
     """Serve a session until it is interrupted.
 
@@ -35,6 +36,7 @@ def run_studio(
         say: is told the page's address first.
         tell: is told of every layout and every failure, if anybody wants to know.
         color: what numbers of the user's own are shown as colours.
+        most_triangles: of larger meshes fewer are shown.
 
     Raises:
         OptionError: the extra `studio` is not installed.
@@ -45,7 +47,7 @@ def run_studio(
     from .session import Session
 
     is_project = file is not None and file.suffix.lower() == ".json"
-    session = Session(file.parent if file is not None and is_project else Path(), color)
+    session = Session(file.parent if file is not None and is_project else Path(), color, most_triangles)
     with listening(port) as listener:
         port = listener.getsockname()[1]
         token = secrets.token_urlsafe(24)

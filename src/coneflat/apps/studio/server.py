@@ -25,6 +25,7 @@ from .guard import MOST_ASKED, Guard
 from .opening import file_within
 from .page import studio_page
 from .session import Session
+from .wording import in_page
 
 MOST_UPLOADED = 512 * 1024 * 1024  # bytes of a mesh
 LONG_POLL = 20.0  # seconds that a question for news waits for some
@@ -34,10 +35,12 @@ TYPES = {".svg": "image/svg+xml", ".obj": "text/plain", ".json": "application/js
 class StudioServer(uvicorn.Server):
     """Serves a session until it is interrupted; then nobody waits for news any more."""
 
-    def __init__(self, session: Session, token: str, port: int, framed: bool = False) -> None:
+    def __init__(
+        self, session: Session, token: str, port: int, framed: bool = False, proxied: bool = False
+    ) -> None:
         super().__init__(
             uvicorn.Config(
-                studio_app(session, token, port, framed=framed),
+                studio_app(session, token, port, framed=framed, proxied=proxied),
                 log_level="error",
                 access_log=False,  # It would hold the token.
                 server_header=False,
@@ -82,7 +85,12 @@ class Bell:
 
 
 def studio_app(
-    session: Session, token: str, port: int, most_uploaded: int = MOST_UPLOADED, framed: bool = False
+    session: Session,
+    token: str,
+    port: int,
+    most_uploaded: int = MOST_UPLOADED,
+    framed: bool = False,
+    proxied: bool = False,
 ) -> ASGIApp:
     """Return the server's application.
 
@@ -92,6 +100,7 @@ def studio_app(
         port: at which it is served: the only one that requests may name.
         most_uploaded: bytes of a mesh that may be dropped on the page.
         framed: notebooks of this machine may show the page in a frame.
+        proxied: requests come through a proxy.
     """
     bell = Bell()
     session.listen(bell.ring)
@@ -162,7 +171,7 @@ def studio_app(
             ClientDisconnect: _garbled,
         },
     )
-    return Guard(app, token, port, framed)
+    return Guard(app, token, port, framed, proxied)
 
 
 def _number(text: str) -> object:
@@ -176,7 +185,7 @@ def _is_number(text: str) -> bool:
 
 
 async def _said(request: Request, error: Exception) -> Response:
-    return PlainTextResponse(str(error), 400)
+    return PlainTextResponse(in_page(str(error)), 400)
 
 
 async def _garbled(request: Request, error: Exception) -> Response:

@@ -20,17 +20,19 @@ from .outputs import EXPORTS, MOST_QUADS, QUADS, curve_options
 from .project import Project
 from .replay import Replay
 from .steps import STEPS
+from .warnings import misplaced
 from .worker import Worker
 
 PATIENCE = 600.0  # seconds that saving waits for the flattening before it
 
 
 class _Layout(NamedTuple):
-    """What is shown, the cones of it, and the seconds that it took."""
+    """What is shown, the cones of it, the seconds that it took, and what is to be known of it."""
 
     shown: tuple[Head, bytes] | None
     found: list[int]
     seconds: dict[str, float]
+    warnings: list[str]
 
 
 class Session:
@@ -38,18 +40,18 @@ class Session:
 
     Attributes:
         folder: where projects are, and whatever the page names.
-        color: what numbers are shown as colours, if any.
         version: counts what has happened; who has seen a version need not look again.
         layout: the number of the layout that was shown last; no other one gets it, whatever mesh is opened.
         is_early: whether that is the first one of a change, and another will follow.
     """
 
-    def __init__(self, folder: Path, color: str | None = None) -> None:
+    def __init__(self, folder: Path, color: str | None = None, most_triangles: int | None = None) -> None:
         """Args:
         folder: of projects.
         color: what numbers are shown as colours, as of `own_quantity`.
+        most_triangles: of larger meshes fewer are shown; None for as many as the viewer's page shows.
         """
-        self.color = color
+        self._look = {"color": color, "most": most_triangles}
         self.folder = folder.resolve()
         self.version = 0
         self.layout = 0
@@ -67,6 +69,8 @@ class Session:
         self._trouble: dict[str, Any] | None = None
         self._found: list[int] = []
         self._seconds: dict[str, float] = {}
+        self._warnings: list[str] = []
+        self._misplaced: tuple[int, tuple[str, ...]] = 0, ()  # of the choices of a number
         self._shown: tuple[Head, bytes] | None = None
         self._known = Known()
         self._last: _Layout | None = None  # of an earlier change, while one on the way is shown
@@ -104,7 +108,7 @@ class Session:
             self._history = History(project.choices)
             self._opened += 1
             self._chosen += 1
-            self._found, self._shown = [], None
+            self._found, self._shown, self._warnings = [], None, []
             self.is_early, self._last = False, None
             self._flatten()
 
@@ -181,7 +185,7 @@ class Session:
         self._job += 1
         self._busy = {"stage": "", "fraction": 0.0}
         self._tell()
-        self._worker.send({"do": "flatten", "job": self._job, "color": self.color, **self._of_mesh()})
+        self._worker.send({"do": "flatten", "job": self._job, **self._look, **self._of_mesh()})
 
     def _save(self) -> None:
         """Keep what is chosen, so that nothing is lost whatever happens next."""
@@ -221,6 +225,7 @@ class Session:
                 "early": self.is_early,
                 "found": self._found,
                 "seconds": sum(self._seconds.values()),
+                "warnings": [*self._told_misplaced(), *self._warnings],
                 **({} if known == self._chosen else self._told_choices()),
             }
 
@@ -231,6 +236,11 @@ class Session:
     def _told_choices(self) -> dict[str, Any]:
         chosen, name = self._history.now, None if self._mesh is None else self._mesh.name
         return {"choices": chosen.as_plain(), **self._replay.of(name, self._project_name, chosen)}
+
+    def _told_misplaced(self) -> tuple[str, ...]:
+        if self._misplaced[0] != self._chosen:
+            self._misplaced = self._chosen, misplaced(self._history.now)
+        return self._misplaced[1]
 
     def picture(self, known: int = 0) -> tuple[Head, bytes] | None:
         """Return the layout that is shown: numbers and texts, and arrays; None where there is none yet.
@@ -334,7 +344,7 @@ class Session:
             if "stage" in head:
                 self._busy = {"stage": head["stage"], "fraction": head["fraction"]}
             elif "early" in head:
-                self._last = self._last or _Layout(self._shown, self._found, self._seconds)
+                self._last = self._last or _Layout(self._shown, self._found, self._seconds, self._warnings)
                 self._show(head["early"], body)
                 self.is_early = True
             elif "error" in head:
@@ -351,13 +361,14 @@ class Session:
     def _show(self, told: Head, body: bytes) -> None:
         self.layout += 1
         self._found, self._seconds = told["found"], told["seconds"]
+        self._warnings = told.get("warnings", [])
         self._shown = self._known.numbered((told["head"], body))
 
     def _go_back(self) -> None:
         """Work no more, and show the last layout that was finished instead of one on the way."""
         self._busy = None
         if self.is_early and self._last is not None and self._last.shown is not None:
-            self._shown, self._found, self._seconds = self._last
+            self._shown, self._found, self._seconds, self._warnings = self._last
             self.layout += 1
             self.is_early, self._last = False, None
 

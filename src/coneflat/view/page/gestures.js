@@ -4,10 +4,11 @@ const TURN_SPEED = 0.008; // radians per pixel
 const WHEEL_SPEED = 0.0015; // of the logarithm of the zoom, per pixel of the wheel
 const STILL = 5; // pixels within which a press is a click
 const CLICK_TIME = 600; // milliseconds
+const FINGER = 16; // pixels that a finger may be off what it means
 
 class Gestures {
-  /** pane: {element, camera}; hears: {hover(pane, x, y), leave(pane), pick(pane, x, y), grab(pane, x, y), use(pane)};
-   *  grab returns null, or who takes a drag, {move(x, y), drop(), stop()}, of which stop comes last in any case. */
+  /** pane: {element, camera}; hears: {hover(pane, x, y), leave(pane), pick(pane, x, y, reach), grab(pane, x, y, reach),
+   *  use(pane)}; reach: pixels that what is meant may be off. grab returns null, or who takes a drag, {move(x, y), drop(), stop()}, of which stop comes last in any case. */
   constructor(pane, hears) {
     this.pane = pane;
     this.hears = hears;
@@ -35,7 +36,7 @@ class Gestures {
     this.fingers.set(event.pointerId, this.at(event));
     if (this.fingers.size === 1) {
       this.press = {...this.at(event), time: event.timeStamp, still: true};
-      if (!event.button && !event.shiftKey) this.grabbed = this.hears.grab(this.pane, this.press.x, this.press.y);
+      if (!event.button && !event.shiftKey) this.grabbed = this.hears.grab(this.pane, this.press.x, this.press.y, reachOf(event));
     } else {
       this.letGo();
       if (this.press) this.press.still = false;
@@ -81,7 +82,7 @@ class Gestures {
     this.cancel(event);
     if (!press?.still || event.timeStamp - press.time > CLICK_TIME || event.button > 0) return;
     const {x, y} = this.at(event);
-    this.hears.pick(this.pane, x, y);
+    this.hears.pick(this.pane, x, y, reachOf(event));
   }
 
   cancel(event) {
@@ -103,4 +104,8 @@ class Gestures {
     // A pinch on a touchpad comes as a wheel with ctrl, in small steps.
     this.pane.camera.zoomAt(Math.exp(-WHEEL_SPEED * pixels * (event.ctrlKey ? 6 : 1)), x, y);
   }
+}
+
+function reachOf(event) {
+  return event.pointerType === "touch" ? FINGER : 0;
 }

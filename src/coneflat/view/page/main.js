@@ -46,7 +46,7 @@ class Viewer {
       new Pane("layout", new Camera(this.flatPlaces(), [1, 0, 0, 0, 1, 0, 0, 0, 1], false), true, this),
     ];
     this.used = this.panes[0];
-    this.tool = null; // What clicks and drags do instead: {hover(pane, x, y), pick(pane, x, y), grab(pane, x, y)}.
+    this.tool = null; // What clicks and drags do instead: {hover(pane, x, y), pick(pane, x, y, reach), grab(pane, x, y, reach)}.
     this.moving = this.slowFrames = 0;
     this.renderer = new Renderer(document.getElementById("scene"), model);
     if (picture) this.renderer.setPicture(picture);
@@ -83,13 +83,15 @@ class Viewer {
   takeModel(model) {
     const [space, plane] = this.panes.map((pane) => pane.camera);
     const isSame = model.hasSurfaceOf(this.model);
+    // Of a large surface other triangles may be drawn now.
+    const stays = isSame || (model.head.name === this.model.head.name && model.head.radius === this.model.head.radius);
     this.renderer.takeModel(model);
     this.model = this.marks.model = model;
     const picked = this.state.get("picked");
     this.state.set({hovered: null, picked: isSame && picked?.kind === "triangle" ? picked : null});
     this.marks.seen.clear();
     plane.showOthers(this.flatPlaces());
-    if (!isSame) {
+    if (!stays) {
       space.home = model.head.turn.flat();
       space.measure(model.arrays.places);
       space.fit();
@@ -190,16 +192,16 @@ class Viewer {
   }
 
   /** Return who hears of a drag that begins here instead of the camera, {move(x, y), drop()}, or null. */
-  grab(pane, x, y) {
-    return this.tool?.grab(pane, x, y) ?? null;
+  grab(pane, x, y, reach) {
+    return this.tool?.grab(pane, x, y, reach) ?? null;
   }
 
   leave() {
     this.state.set({hovered: null});
   }
 
-  pick(pane, x, y) {
-    if (this.tool?.pick(pane, x, y)) return;
+  pick(pane, x, y, reach = 0) {
+    if (this.tool?.pick(pane, x, y, reach)) return;
     this.find(this.renderer.pick(pane, x, y, this.state), pane);
   }
 

@@ -14,7 +14,7 @@ POLICY = (
     "base-uri 'none'; form-action 'none'"
 )
 # In the order in which they must run: names are shared.
-_SCRIPTS = ("server", "graph", "paint", "tools", "overlay", "sizes", "curve", "panel", "studio")
+_SCRIPTS = ("server", "surface", "graph", "paint", "tools", "overlay", "sizes", "curve", "panel", "studio")
 
 
 @cache

@@ -6,7 +6,7 @@ class ConeCurve {
   constructor(studio) {
     this.studio = studio;
     this.part = (id) => document.getElementById(id);
-    this.found = null; // {counts, distortions, knee, key}
+    this.found = null; // {counts, distortions, knee, parts, key}
     this.asking = false;
     this.part("curve-ask").addEventListener("click", () => this.ask());
     this.part("curve").addEventListener("click", (event) => this.pick(event));
@@ -15,9 +15,9 @@ class ConeCurve {
 
   /** What a curve depends on: other changes leave it as it is. */
   key() {
-    const {choices, news} = this.studio, {paint = {}, options} = choices;
+    const {choices, news} = this.studio, {paint = {}, options, cuts, kept} = choices;
     const locked = choices.cones.filter((cone) => cone.locked).map((cone) => cone.vertex);
-    return JSON.stringify([news?.mesh, locked, paint.no_cone, paint.importance, options.repair]);
+    return JSON.stringify([news?.mesh, locked, paint, cuts, kept, options.seams, options.sharp_angle, options.repair]);
   }
 
   async ask() {
@@ -41,7 +41,11 @@ class ConeCurve {
     this.part("curve-ask").hidden = isKnown;
     this.part("curve-ask").disabled = this.asking || !this.studio.viewer;
     this.part("curve-ask").textContent = this.asking ? "Comparing numbers of cones…" : "Compare numbers of cones";
-    if (isKnown) this.draw();
+    this.part("curve-of").hidden = !isKnown;
+    if (!isKnown) return;
+    const {parts} = this.found;
+    this.part("curve-of").textContent = `Distortion of the whole${parts > 1 ? `, for so many cones in each of its ${grouped(parts)} parts` : ""}. Click to choose a number.`;
+    this.draw();
   }
 
   /** Where a number of cones and a distortion lie, in pixels. */
@@ -108,7 +112,9 @@ class ConeCurve {
   /** The number of cones that there are and the distortion of so many; null where that is off the curve. */
   current() {
     if (this.studio.choices.by_hand) return null; // Those that were moved have another distortion.
-    const {counts, distortions} = this.found, count = this.studio.coneRows().length, at = counts.findLastIndex((one) => one <= count);
+    const {counts, distortions, parts} = this.found, asked = this.studio.choices.options.cone_count;
+    if (parts > 1 && asked === undefined) return null; // Each part has a number of its own.
+    const count = parts > 1 ? asked : this.studio.coneRows().length, at = counts.findLastIndex((one) => one <= count);
     return at < 0 || count > counts[counts.length - 1] ? null : [count, distortions[at]];
   }
 

@@ -4,65 +4,78 @@
 const [SMOOTH, SHARP, CHEAPEST] = [Math.PI / 9, Math.PI / 3, 0.1];
 
 class EdgeGraph {
-  constructor(model) {
-    this.model = model;
-    const count = model.arrays.places.length / 3, corners = model.arrays.faces.length;
-    const start = new Uint32Array(count + 1);
-    for (let c = 0; c < corners; c++) start[model.vertexAt(c) + 1] += 2;
+  /** surface: {places, corners, count, numberOf(vertex), normals()}. */
+  constructor(surface) {
+    this.surface = surface;
+    const {corners, count} = surface, start = new Uint32Array(count + 1);
+    for (let c = 0; c < corners.length; c++) start[corners[c] + 1] += 2;
     for (let v = 0; v < count; v++) start[v + 1] += start[v];
-    const next = start.slice(), ends = new Uint32Array(2 * corners);
-    // Inner edges are there twice, from both of their triangles, which does no harm.
-    for (let c = 0; c < corners; c++) {
-      const one = model.vertexAt(c), two = model.vertexAt(c - (c % 3) + ((c + 1) % 3));
+    const next = start.slice(), ends = new Uint32Array(2 * corners.length), faces = new Uint32Array(2 * corners.length);
+    // Inner edges are there twice, from both of their triangles.
+    const note = (one, two, face) => {
+      faces[next[one]] = face;
       ends[next[one]++] = two;
-      ends[next[two]++] = one;
+    };
+    for (let c = 0; c < corners.length; c++) {
+      const face = Math.floor(c / 3), one = corners[c], two = corners[3 * face + ((c + 1) % 3)];
+      note(one, two, face);
+      note(two, one, face);
     }
-    [this.start, this.ends] = [start, ends];
+    Object.assign(this, {start, ends, faces});
     this.from = -1;
-    this.sharpness = null;
+    this.shares = null; // how sharp the edge of each entry is, 0 to 1
   }
 
   /** Whether paths follow sharp edges, which then cost less than their lengths. */
   follow(sharp) {
-    this.sharpness = sharp ? (this.found ??= sharpEdges(this.model)) : null;
+    this.shares = sharp ? (this.found ??= sharpEdges(this)) : null;
     this.from = -1;
   }
 
-  cost(one, two) {
-    const share = this.sharpness?.get(one < two ? one * this.start.length + two : two * this.start.length + one) ?? 0;
-    return this.length(one, two) * CHEAPEST ** share;
+  /** What the edge of an entry of a vertex costs. */
+  cost(vertex, k) {
+    const length = this.length(vertex, this.ends[k]);
+    return this.shares?.[k] ? length * CHEAPEST ** this.shares[k] : length;
   }
 
   length(one, two) {
-    const p = this.model.arrays.places;
+    const p = this.surface.places;
     return Math.hypot(p[3 * one] - p[3 * two], p[3 * one + 1] - p[3 * two + 1], p[3 * one + 2] - p[3 * two + 2]);
   }
 
   /** The vertices of the shortest path from one to another, both included; empty where none leads there. */
   path(from, to) {
-    if (from !== this.from) this.spread(from);
-    if (!Number.isFinite(this.far[to])) return [];
+    if (from !== this.from) this.begin(from);
+    this.reach(to);
+    if (!this.isSettled[to]) return [];
     const path = [to];
     while (path[path.length - 1] !== from) path.push(this.before[path[path.length - 1]]);
     return path.reverse();
   }
 
-  /** Find how far all vertices are from one, and by which way (Dijkstra). */
-  spread(from) {
-    const count = this.start.length - 1;
+  begin(from) {
+    const {count} = this.surface;
     this.from = from;
     this.far = new Float64Array(count).fill(Infinity);
     this.before = new Int32Array(count).fill(-1);
+    this.isSettled = new Uint8Array(count);
     this.far[from] = 0;
-    const heap = new Heap();
-    heap.push(0, from);
-    while (heap.size) {
-      const [far, vertex] = heap.pop();
-      if (far > this.far[vertex]) continue;
+    this.heap = new Heap();
+    this.heap.push(0, from);
+  }
+
+  /** Find how far vertices are from where paths begin, and by which way, until one is reached (Dijkstra). */
+  reach(to) {
+    const {heap, far, isSettled, surface} = this;
+    while (heap.size && !isSettled[to]) {
+      const [at, vertex] = heap.pop();
+      if (isSettled[vertex]) continue;
+      isSettled[vertex] = 1;
       for (let k = this.start[vertex]; k < this.start[vertex + 1]; k++) {
-        const other = this.ends[k], sum = far + this.cost(vertex, other);
-        if (sum >= this.far[other]) continue;
-        this.far[other] = sum;
+        const other = this.ends[k], sum = at + this.cost(vertex, k);
+        // A vertex that was added, where triangles were cut, is none of the user's.
+        if (sum >= far[other] || surface.numberOf(other) < 0) continue;
+        far[other] = sum;
         this.before[other] = vertex;
         heap.push(sum, other);
       }
@@ -70,23 +83,22 @@ class EdgeGraph {
   }
 }
 
-/** How sharp edges are, 0 to 1, of those that are: by the smaller vertex times their number plus one, plus the other. */
-function sharpEdges(model) {
-  const {faces, places} = model.arrays, base = places.length / 3 + 1;
-  const normals = faceNormals(cornerPlaces(model)), sides = new Map(), found = new Map();
-  for (let c = 0; c < faces.length; c++) {
-    const face = Math.floor(c / 3), one = model.vertexAt(c), two = model.vertexAt(3 * face + ((c + 1) % 3));
-    const key = one < two ? one * base + two : two * base + one, other = sides.get(key);
-    if (other === undefined) {
-      sides.set(key, face);
-      continue;
+/** How sharp the edge of each entry of a graph is, 0 to 1. */
+function sharpEdges({surface, start, ends, faces}) {
+  const normals = surface.normals(), shares = new Float32Array(ends.length);
+  const dot = (a, b) => normals[3 * a] * normals[3 * b] + normals[3 * a + 1] * normals[3 * b + 1] + normals[3 * a + 2] * normals[3 * b + 2];
+  for (let vertex = 0; vertex + 1 < start.length; vertex++) {
+    for (let k = start[vertex]; k < start[vertex + 1]; k++) {
+      let other = start[vertex];
+      while (other < k && ends[other] !== ends[k]) other++;
+      if (other === k) continue; // the first of its two sides, or the only one
+      const [a, b] = [faces[other], faces[k]];
+      const cosine = dot(a, b) / (Math.sqrt(dot(a, a) * dot(b, b)) || 1);
+      const share = (Math.acos(Math.min(Math.max(cosine, -1), 1)) - SMOOTH) / (SHARP - SMOOTH);
+      if (share > 0) shares[k] = shares[other] = Math.min(share, 1);
     }
-    const [a, b] = [face, other].map((f) => normals.subarray(3 * f, 3 * f + 3));
-    const cosine = (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) / (Math.hypot(...a) * Math.hypot(...b) || 1);
-    const share = (Math.acos(Math.min(Math.max(cosine, -1), 1)) - SMOOTH) / (SHARP - SMOOTH);
-    if (share > 0) found.set(key, Math.min(share, 1));
   }
-  return found;
+  return shares;
 }
 
 /** A binary heap, the least key first. */

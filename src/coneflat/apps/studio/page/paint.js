@@ -33,7 +33,7 @@ function* regionNumbers(text) {
 class Paint {
   constructor(studio) {
     this.studio = studio;
-    this.shown = this.preview = null; // {layer, weight, vertices}: of the stroke that is not yet chosen
+    this.shown = this.preview = null; // {layer, weight, numbers}: of the stroke that is not yet chosen
   }
 
   /** Show what is chosen, where that has changed, and a stroke. */
@@ -41,8 +41,8 @@ class Paint {
     const {viewer, choices} = this.studio;
     if (!viewer) return;
     const key = JSON.stringify(choices.paint ?? {});
-    if (this.shown?.model === viewer.model && this.shown.key === key && this.shown.preview === this.preview?.vertices.size) return;
-    this.shown = {model: viewer.model, key, preview: this.preview?.vertices.size};
+    if (this.shown?.model === viewer.model && this.shown.key === key && this.shown.preview === this.preview?.numbers.size) return;
+    this.shown = {model: viewer.model, key, preview: this.preview?.numbers.size};
     viewer.renderer.setMarks(this.isBare() ? null : this.marks());
     viewer.redraw();
   }
@@ -76,7 +76,7 @@ class Paint {
     const chosen = (text) => this.studio.verticesOf([...regionNumbers(text)]);
     for (const flag of ["no_cone", "no_seam"]) if (paint[flag]) set(chosen(paint[flag]), flag);
     for (const [weight, text] of Object.entries(paint.importance ?? {})) set(chosen(text), "importance", Number(weight));
-    if (this.preview) set(this.preview.vertices, this.preview.layer, this.preview.weight);
+    if (this.preview) set(this.studio.verticesOf([...this.preview.numbers]), this.preview.layer, this.preview.weight);
     const out = new Uint8Array(4 * arrays.faces.length);
     for (let c = 0; c < arrays.faces.length; c++) {
       const vertex = 3 * arrays.point_vertex[arrays.faces[c]];
@@ -116,15 +116,16 @@ class Brush {
     this.studio.viewer?.remark();
   }
 
-  /** The vertices under the brush: those that hang together with what is in its middle, or those in the plane. */
-  verticesAt(pane, x, y) {
-    const {tools, viewer} = this.studio, {model} = viewer;
+  /** The numbers of the vertices under the brush: those that hang together with what is in its middle, or those in the plane. */
+  numbersAt(pane, x, y) {
+    const {studio} = this, {tools} = studio;
     const nearest = tools.vertexAt(pane, x, y);
     if (nearest === null) return [];
     const far = this.radius / pane.camera.scale;
-    const found = pane.inPlane ? this.inPlane(pane, x, y, far) : this.around(tools.placeAt(pane, x, y), tools.cornersAt(pane, x, y), far);
-    found.add(nearest);
-    return [...found].filter((vertex) => model.vertexNumber(vertex) >= 0);
+    const found = pane.inPlane
+      ? studio.standingFor(this.inPlane(pane, x, y, far).add(nearest))
+      : this.around(tools.placeAt(pane, x, y), studio.inSurface(tools.cornersAt(pane, x, y)), far);
+    return [studio.numberOf(nearest), ...[...found].map((vertex) => studio.surface().numberOf(vertex))].filter((number) => number >= 0);
   }
 
   inPlane(pane, x, y, far) {
@@ -138,7 +139,7 @@ class Brush {
   }
 
   around(middle, corners, far) {
-    const graph = this.studio.graph(), {places} = this.studio.viewer.model.arrays;
+    const graph = this.studio.graph(), {places} = this.studio.surface();
     const isNear = (v) => Math.hypot(places[3 * v] - middle[0], places[3 * v + 1] - middle[1], places[3 * v + 2] - middle[2]) <= far;
     const found = new Set(corners.filter(isNear)), waiting = [...found];
     while (waiting.length) {
@@ -172,15 +173,15 @@ class Brush {
 class Stroke {
   constructor(brush, pane, x, y) {
     Object.assign(this, {brush, pane, studio: brush.studio, layer: brush.studio.tools.mode});
-    this.vertices = new Set();
+    this.numbers = new Set(); // of vertices
     this.last = [x, y];
     this.add(x, y);
   }
 
   add(x, y) {
-    for (const vertex of this.brush.verticesAt(this.pane, x, y)) this.vertices.add(vertex);
+    for (const number of this.brush.numbersAt(this.pane, x, y)) this.numbers.add(number);
     this.brush.at = {pane: this.pane, x, y};
-    this.studio.paint.preview = {layer: this.layer, weight: this.brush.weight, vertices: this.vertices};
+    this.studio.paint.preview = {layer: this.layer, weight: this.brush.weight, numbers: this.numbers};
     this.studio.paint.show();
     this.studio.viewer.remark();
   }
@@ -193,7 +194,7 @@ class Stroke {
 
   drop() {
     const {studio, brush, layer} = this;
-    const where = regionText([...this.vertices].map((vertex) => studio.numberOf(vertex)));
+    const where = regionText(this.numbers);
     if (!where) return;
     studio.paint.preview.sent = true;
     studio.act({do: "paint", layer, where, ...(layer === "importance" ? {weight: brush.weight} : {})});

@@ -1,5 +1,6 @@
 // The panel beside the panes: shows what is chosen, and changes it.
 
+const WIDEST = 720; // degrees, as in `choices.py`
 const LEAST_STEP = 5; // degrees that the keys change an angle by where it snaps to nothing
 
 class Panel {
@@ -136,6 +137,7 @@ class Panel {
     this.part("kept-in").textContent = news?.project ? `Kept in ${news.project}.` : "";
     this.showWork();
     this.showRefusal();
+    this.showWarnings();
     this.showTool();
     this.showCorners();
     this.showCones();
@@ -163,6 +165,15 @@ class Panel {
     this.part("refusal-text").textContent = trouble.text[0].toUpperCase() + trouble.text.slice(1) + ".";
     this.part("repair").hidden = !trouble.repair;
     this.part("again").hidden = Boolean(trouble.repair) || Boolean(this.studio.refused);
+  }
+
+  /** Show what is to be known of what is chosen. */
+  showWarnings() {
+    const warnings = this.studio.news?.warnings ?? [], key = JSON.stringify(warnings);
+    if (key === this.warningsShown) return;
+    this.warningsShown = key;
+    this.part("warnings").hidden = !warnings.length;
+    this.part("warnings").replaceChildren(...warnings.map((text) => Object.assign(document.createElement("li"), {textContent: text})));
   }
 
   /** Show what the tool can be set to. */
@@ -194,9 +205,24 @@ class Panel {
     if (key === this.conesShown) return;
     this.conesShown = key;
     this.part("cone-names").hidden = !rows.length;
+    this.part("angle-sum").textContent = this.sumText(rows);
+    this.part("angle-sum").hidden = !this.part("angle-sum").textContent;
     const typing = document.activeElement?.closest?.("#cone-list .cone")?.dataset.vertex;
     this.part("cone-list").replaceChildren(...rows.map((row) => this.coneRow(row, row.vertex === picked)));
     if (typing !== undefined) this.angleField(typing)?.focus();
+  }
+
+  /** What is wrong with the sum of angles that are all typed; nothing where one takes what is left, as the boundary does. */
+  sumText(rows) {
+    const {viewer, choices, news} = this.studio;
+    const isWhole = viewer?.model.arrays.cones.length === news?.found.length; // A thinned model may show some of them alone.
+    if (!isWhole || this.studio.hasBoundary() || !choices.by_hand || !rows.length || rows.some((row) => !row.chosen)) return "";
+    // Whatever cones there are, on a closed surface they lack the same in all.
+    const lacking = viewer.model.head.cone_curvatures.reduce((sum, curvature) => sum + (curvature * 180) / Math.PI, 0);
+    const off = rows.reduce((sum, row) => sum + row.degrees, 0) - (360 * rows.length - lacking);
+    if (Math.abs(off) < 0.05) return "";
+    const much = Number(Math.abs(off).toFixed(1)).toLocaleString("en-US");
+    return `All angles are typed, and in all they are ${much}° too ${off > 0 ? "wide" : "narrow"} for this surface. Clear one, and it gets what the others leave.`;
   }
 
   coneRow({vertex, degrees, chosen, locked}, isPicked) {
@@ -205,7 +231,7 @@ class Panel {
     row.dataset.vertex = vertex;
     if (isPicked) row.setAttribute("aria-current", "true");
     const angle = Object.assign(document.createElement("input"), {
-      type: "number", step: this.step(), min: 1, value: degrees === null ? "" : Number(degrees.toFixed(1)), className: chosen ? "" : "computed",
+      type: "number", step: this.step(), min: 1, max: WIDEST, value: degrees === null ? "" : Number(degrees.toFixed(1)), className: chosen ? "" : "computed",
       title: "Cone angle in degrees; empty: the best one",
     });
     angle.setAttribute("aria-label", `Angle of cone ${vertex}, degrees`);

@@ -1,4 +1,4 @@
-// What the page asks of the server, always with the token of its address.
+// What the page asks of the server, always with the token of its address, and where that is: perhaps behind a proxy.
 
 class Server {
   constructor() {
@@ -15,7 +15,7 @@ class Server {
 
   /** Return what there is to know, once it is newer than what was known; choices that are the same are taken from that. */
   async state(known) {
-    const news = await (await this.ask(`/state?after=${known?.version ?? ""}&chosen=${known?.chosen ?? ""}`)).json();
+    const news = await (await this.ask(`state?after=${known?.version ?? ""}&chosen=${known?.chosen ?? ""}`)).json();
     if (news.choices) return news;
     const {choices, command, python} = known;
     return {...news, choices, command, python};
@@ -23,7 +23,7 @@ class Server {
 
   /** Return the layout that is shown now; arrays that a model from here has, too, are taken from that. */
   async layout(known) {
-    const block = await (await this.ask(`/layout?known=${known?.head.number ?? ""}`)).arrayBuffer();
+    const block = await (await this.ask(`layout?known=${known?.head.number ?? ""}`)).arrayBuffer();
     const size = new DataView(block).getUint32(0, true);
     const head = JSON.parse(new TextDecoder().decode(new Uint8Array(block, 4, size)));
     return modelOf(head, block, 4 + size, known);
@@ -31,7 +31,7 @@ class Server {
 
   /** Do something, after what was asked for before. */
   act(action) {
-    const sent = this.queue.then(() => this.ask("/act", {method: "POST", body: JSON.stringify(action)}));
+    const sent = this.queue.then(() => this.ask("act", {method: "POST", body: JSON.stringify(action)}));
     this.queue = sent.catch(() => {});
     return sent;
   }
@@ -39,7 +39,7 @@ class Server {
   /** Return how distortion falls with more cones: {counts, distortions, knee}. */
   async curve() {
     await this.queue;
-    return (await this.ask("/curve", {method: "POST"})).json();
+    return (await this.ask("curve", {method: "POST"})).json();
   }
 
   /** Hand what is at a path, the result or quads, to the browser as a file. */
@@ -53,7 +53,7 @@ class Server {
 
   /** Send a mesh or a project, to work on it. */
   open(file) {
-    return this.ask(`/mesh?name=${encodeURIComponent(file.name)}`, {method: "POST", body: file});
+    return this.ask(`mesh?name=${encodeURIComponent(file.name)}`, {method: "POST", body: file});
   }
 }
 

@@ -73,8 +73,10 @@ class Studio {
   /** Show a layout. */
   take(model) {
     const isSame = this.viewer && model.hasSurfaceOf(this.viewer.model);
-    if (!isSame) this.edges = this.byNumber = this.boundary = null;
-    this.points = null;
+    const selected = !isSame && model.arrays.whole_faces === this.viewer?.model.arrays.whole_faces ? this.selectedNumber() : null;
+    if (!isSame) this.byNumber = this.boundary = null;
+    if (!isSame && this.whole?.key !== Surface.keyOf(model)) this.whole = this.edges = null;
+    this.points = this.nearest = null;
     this.repicking = true; // A pick that ends because things have other numbers now is no letting go.
     if (this.viewer) this.viewer.takeModel(model);
     else {
@@ -84,7 +86,7 @@ class Studio {
       this.viewer.marks.overlay = (pen, pane) => this.overlay.draw(pen, pane);
       this.viewer.state.listen((names) => names.has("picked") && this.notePick());
     }
-    if (!isSame) this.selected = null;
+    if (!isSame) this.selected = selected === null ? null : (this.verticesOf([selected])[0] ?? null);
     this.repicking = false;
     this.pickSelected();
     const {asked, news} = this;
@@ -133,7 +135,7 @@ class Studio {
 
   async save(ending) {
     const name = {json: "report", png: "layout"}[ending] ?? "uv";
-    await this.server.save(`/export/${ending}`, `${this.stem}_${name}.${ending}`).catch((error) => this.refuse(error));
+    await this.server.save(`export/${ending}`, `${this.stem}_${name}.${ending}`).catch((error) => this.refuse(error));
   }
 
   /** Make quads of the mesh, about so many, and hand them to the browser. */
@@ -141,7 +143,7 @@ class Studio {
     this.refused = null;
     this.making = "quads";
     this.panel.show();
-    await this.server.save(`/quads/obj?count=${encodeURIComponent(count)}`, `${this.stem}_quads.obj`).catch((error) => this.refuse(error));
+    await this.server.save(`quads/obj?count=${encodeURIComponent(count)}`, `${this.stem}_quads.obj`).catch((error) => this.refuse(error));
     this.making = "";
     this.panel.show();
   }
@@ -164,8 +166,9 @@ class Studio {
   }
 
   setTool(mode) {
-    if (!["look", "cone"].includes(mode) && this.viewer?.model.head.left_out) {
-      this.refuse(new Refusal("a mesh that is thinned for display has too few vertices here to draw or paint on"));
+    const {head, arrays} = this.viewer?.model ?? {};
+    if (!["look", "cone"].includes(mode) && head?.left_out && !arrays.whole_faces) {
+      this.refuse(new Refusal(`a mesh of ${grouped(head.triangles)} triangles is too large to draw or paint on here`));
       return;
     }
     this.tools.set(mode);
@@ -186,7 +189,7 @@ class Studio {
     if (control) return this.obey(event, () => this.act({do: name === "z" && !event.shiftKey ? "undo" : "redo"}));
     const tool = [...TOOLS, ...BRUSHES].find(([, , letter]) => letter === name);
     const vertex = this.selectedNumber(), row = this.coneRows().find((one) => one.vertex === vertex);
-    const turn = (step) => () => row && this.setAngle(vertex, Math.max(this.panel.step(), this.panel.snapped(row.degrees + step)));
+    const turn = (step) => () => row && this.setAngle(vertex, Math.min(WIDEST, Math.max(this.panel.step(), this.panel.snapped(row.degrees + step))));
     const keys = {
       u: () => this.act({do: "undo"}), y: () => this.act({do: "redo"}), n: () => this.pickNext(),
       m: () => this.moveToMiddle(), l: () => row && this.act({do: "lock", vertex, locked: !row.locked}),
@@ -321,12 +324,40 @@ class Studio {
     return this.points.get(vertex) ?? [];
   }
 
+  /** The mesh, of which the page may draw fewer triangles. */
+  surface() {
+    return (this.whole ??= new Surface(this.viewer.model));
+  }
+
   graph() {
     if (!this.edges) {
-      this.edges = new EdgeGraph(this.viewer.model);
+      this.edges = new EdgeGraph(this.surface());
       this.edges.follow(this.follows);
     }
     return this.edges;
+  }
+
+  /** The vertices of the mesh that some of the page are; without those that were added, where it is thinned. */
+  inSurface(vertices) {
+    const surface = this.surface();
+    return surface.isThinned ? vertices.map((vertex) => surface.vertexOf(this.numberOf(vertex))).filter((vertex) => vertex >= 0) : vertices;
+  }
+
+  /** The numbers of the vertices of the shortest path between two vertices of the page. */
+  pathBetween(...ends) {
+    const [from, to] = this.inSurface(ends);
+    return to === undefined ? [] : this.graph().path(from, to).map((vertex) => this.surface().numberOf(vertex));
+  }
+
+  /** The vertices of the mesh that some of the page are drawn for: they are nearest to these. */
+  standingFor(vertices) {
+    const surface = this.surface(), chosen = new Set(this.inSurface([...vertices]));
+    if (!surface.isThinned) return chosen;
+    const drawn = new Set(this.viewer.model.arrays.point_vertex);
+    this.nearest ??= surface.nearest(this.inSurface([...drawn]), this.graph());
+    const found = new Set();
+    this.nearest.forEach((one, vertex) => chosen.has(one) && found.add(vertex));
+    return found;
   }
 
   setFollowing(follows) {

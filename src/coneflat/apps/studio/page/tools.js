@@ -13,7 +13,7 @@ const NEAR = 12; // pixels within which a click means what is there
 const BARE = {get: () => false}; // A state in which nothing but triangles is drawn, or picked.
 
 class Tools {
-  /** studio: {viewer, graph, act(action), isBusy(), select(vertex)}. */
+  /** studio: {viewer, pathBetween(vertex, other), act(action), isBusy(), select(vertex)}. */
   constructor(studio) {
     this.studio = studio;
     this.mode = "look";
@@ -89,13 +89,26 @@ class Tools {
     }
     if (this.from === null) return;
     const vertex = this.vertexAt(pane, x, y);
-    this.preview = vertex === null ? [] : this.studio.graph().path(this.from, vertex);
+    this.preview = vertex === null ? [] : this.studio.verticesOf(this.studio.pathBetween(this.from, vertex));
     this.studio.viewer.remark();
   }
 
-  pick(pane, x, y) {
-    const {viewer} = this.studio, thing = viewer.renderer.pick(pane, x, y, viewer.state);
-    if (this.mode === "look" || (this.mode === "cone" && thing?.kind === "cone")) return false;
+  /** The cone at a pixel, or, within so many, the nearest one in sight; null where there is none. */
+  coneAt(pane, x, y, reach) {
+    const {viewer} = this.studio, {model} = viewer;
+    const thing = viewer.renderer.pick(pane, x, y, viewer.state);
+    if (thing?.kind === "cone") return thing;
+    if (!reach || !viewer.state.get("cones")) return null;
+    const off = (index) => Math.min(...this.studio.overlay.places(pane, model.arrays.cones[index]).map(([px, py]) => Math.hypot(px - x, py - y)));
+    const isNear = (index) => off(index) <= reach && viewer.marks.isSeen(pane, {kind: "cone", index}, viewer.state);
+    const index = leastOf(Array.from({length: model.coneCount}, (_, one) => one).filter(isNear), off);
+    return index === null ? null : {kind: "cone", index};
+  }
+
+  pick(pane, x, y, reach) {
+    const cone = ["look", "cone"].includes(this.mode) ? this.coneAt(pane, x, y, reach) : null;
+    if (cone) this.studio.viewer.find(cone, pane);
+    if (cone || this.mode === "look") return Boolean(cone);
     const vertex = this.vertexAt(pane, x, y);
     if (vertex !== null && this.draws) this.drawTo(vertex);
     if (vertex !== null && this.paints) this.studio.brush.dab(pane, x, y);
@@ -108,8 +121,8 @@ class Tools {
   }
 
   drawTo(vertex) {
-    const path = this.from === null ? [] : this.studio.graph().path(this.from, vertex);
-    if (path.length > 1) this.studio.act({do: this.mode, path: path.map((v) => this.studio.numberOf(v))});
+    const path = this.from === null ? [] : this.studio.pathBetween(this.from, vertex);
+    if (path.length > 1) this.studio.act({do: this.mode, path});
     this.from = vertex;
     this.preview = [];
     this.studio.viewer.remark();
@@ -121,13 +134,11 @@ class Tools {
     else this.studio.act({do: "corner", vertex: this.studio.numberOf(vertex)});
   }
 
-  grab(pane, x, y) {
-    const {viewer} = this.studio;
+  grab(pane, x, y, reach) {
     if (this.paints) return this.vertexAt(pane, x, y) === null ? null : new Stroke(this.studio.brush, pane, x, y);
     if (this.draws || this.mode === "corner") return null;
-    const thing = viewer.renderer.pick(pane, x, y, viewer.state);
-    if (thing?.kind !== "cone") return null;
-    return new Drag(this, pane, viewer.model.arrays.cones[thing.index]);
+    const cone = this.coneAt(pane, x, y, reach);
+    return cone && new Drag(this, pane, this.studio.viewer.model.arrays.cones[cone.index]);
   }
 }
 
