@@ -12,7 +12,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 
 from .archive import CheckedArrays, number, read_archive
-from .atomic import as_path, atomic_write, check_target, known_ending
+from .atomic import as_path, atomic_write, checked_target, known_ending
 from .gltf.quads import write_quads_glb
 from .obj_write import lines_of
 
@@ -33,10 +33,7 @@ def check_quads_output(path: str | PathLike[str]) -> Path:
         UnknownFormatError: the ending is not one of `QUAD_FORMATS`.
         MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
     """
-    path = as_path(path)
-    known_ending(path, QUAD_FORMATS, "quads are written as")
-    check_target(path)
-    return path
+    return checked_target(path, QUAD_FORMATS, "quads are written as")
 
 
 def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import OptionError
-from ...files.atomic import as_path, atomic_write, check_target, known_ending
+from ...files.atomic import atomic_write, checked_target
 from ...files.texture import read_picture
 from ...text import shown
 from ..own import own_quantity
@@ -101,10 +101,7 @@ def check_page(path: str | PathLike[str]) -> Path:
         UnknownFormatError: it does not end with .html or .htm.
         MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
     """
-    path = as_path(path)
-    known_ending(path, ENDINGS, "pages are written as")
-    check_target(path)
-    return path
+    return checked_target(path, ENDINGS, "pages are written as")
 
 
 def write_page(page: str, path: str | PathLike[str] | None) -> Path:
