@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from ..errors import OptionError, UnknownFormatError
+from ..options.outputs import FORMATS
 from .atomic import atomic_write, checked_target
 from .gltf.write import write_glb
 from .npz import write_npz
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 #: Endings of the files that `write_flattening` writes.
-OUTPUT_FORMATS = (".obj", ".ply", ".glb", ".npz")
+OUTPUT_FORMATS = tuple(f".{name}" for name in FORMATS)
 
 
 def check_output(path: str | PathLike[str], texture: str | PathLike[str] | None = None) -> Path:

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from ...options import Options, declarations
+from ...options.outputs import FORMATS
 from .options import check_combinations, flag_of, is_given, keywords, option_flags, paper_option
 from .shared import checking, input_options, measures_alone, require_option, verbosity_options
 
@@ -27,7 +28,7 @@ from .shared import checking, input_options, measures_alone, require_option, ver
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["obj", "ply", "glb", "npz"]),
+    type=click.Choice(FORMATS),
     help="Of standard output, and without -o: what to write.  [default: obj]",
 )
 @paper_option

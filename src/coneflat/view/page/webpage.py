@@ -18,6 +18,7 @@ import numpy as np
 from ...errors import OptionError
 from ...files.atomic import atomic_write, checked_target
 from ...files.texture import read_picture
+from ...options.outputs import SHOWS
 from ...text import shown
 from ..own import own_quantity
 from ..quantity import Quantity
@@ -26,9 +27,6 @@ from .payload import Told, payload_of
 
 if TYPE_CHECKING:
     from ...result.flattening import Flattening
-
-SHOWS = ("checker", "picture", "charts", "qc", "area", "curvature", "flat", "plain")
-"""What a page can show first."""
 
 MOST_TRIANGLES = 500_000
 """On a page; larger meshes are thinned for display, or the browser would turn them haltingly."""
