@@ -15,13 +15,13 @@ from .archive import CheckedArrays, number, read_archive
 from .atomic import as_path, atomic_write, checked_target, known_ending
 from .gltf.quads import write_quads_glb
 from .obj_write import lines_of
+from .ply_write import write_parts
 
 if TYPE_CHECKING:
     from ..grid import QuadMesh
 
 #: Endings of the files that `write_quads` writes.
 QUAD_FORMATS = (".obj", ".ply", ".glb", ".npz")
-_FACE = np.dtype([("count", "u1"), ("corners", "<i4", 4)])
 #: Arrays from which a mesh of quads is made again.
 _NAMES = ("vertices", "quads", "faces", "barycentric", "surface_vertices", "surface_faces", "report")
 
@@ -75,22 +75,8 @@ def _write_obj(mesh: QuadMesh, stream: IO[bytes]) -> None:
 
 
 def _write_ply(mesh: QuadMesh, stream: IO[bytes]) -> None:
-    faces = np.empty(len(mesh.quads), _FACE)
-    faces["count"] = 4
-    faces["corners"] = mesh.quads
-    header = [
-        "ply",
-        "format binary_little_endian 1.0",
-        "comment quads by coneflat",
-        f"element vertex {len(mesh.vertices)}",
-        *(f"property double {axis}" for axis in "xyz"),
-        f"element face {len(faces)}",
-        "property list uchar int vertex_indices",
-        "end_header",
-    ]
-    stream.write(("\n".join(header) + "\n").encode("ascii"))
-    stream.write(np.ascontiguousarray(mesh.vertices, "<f8").data)
-    stream.write(faces.data)
+    places = np.ascontiguousarray(mesh.vertices, "<f8")
+    write_parts(stream, "quads by coneflat", [f"double {axis}" for axis in "xyz"], places, mesh.quads)
 
 
 def _write_npz(mesh: QuadMesh, stream: IO[bytes]) -> None:

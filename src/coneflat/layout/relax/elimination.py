@@ -1,15 +1,38 @@
-"""Solutions of linear equations with few and small coefficients, by few of the variables each."""
+"""All solutions of linear equations that may depend on each other."""
 
 from __future__ import annotations
 
 import numpy as np
+import scipy.linalg
 
 from ..._arrays import FloatArray
 
-# Coefficients below this are rounding: those of quarter turns are whole.
-NONE = 1e-9
+# Relative size below which what elimination leaves of an equation is rounding, and of a coefficient. What is taken for
+# none there is missed by the sides of seams.
+ROUNDING, NONE = 1e-10, 1e-15
+# Coefficients below this are rounding where turns are quarter turns, and they are whole.
+NOT_WHOLE = 1e-9
 # Part of the largest coefficient of an equation that a pivot has at least.
 PIVOT = 0.5
+
+
+def exact_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the same as `sparse_solutions` by orthogonal elimination, as exactly as can be, with (r,) what was missed.
+
+    The free variables are those that the pivots of a QR decomposition leave.
+    """
+    count = rows.shape[1]
+    q, r, pivots = scipy.linalg.qr(rows, mode="economic", pivoting=True)
+    diagonal = np.abs(np.diag(r))
+    rank = int((diagonal > ROUNDING * max(diagonal[0], 1e-300)).sum())
+    turned = q.T @ right
+    solved = scipy.linalg.solve_triangular(
+        r[:rank, :rank], np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
+    )
+    basis = np.zeros((count, count - rank + 1))
+    basis[pivots[:rank]] = np.where(np.abs(solved) > NONE, solved, 0.0)
+    basis[pivots[rank:], np.arange(count - rank)] = 1.0
+    return basis, right - q[:, :rank] @ turned[:rank]
 
 
 def sparse_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -32,7 +55,7 @@ def sparse_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, F
     is_open = np.ones(len(rows), dtype=bool)
     solved: list[tuple[int, int]] = []
     while True:
-        filled = np.abs(work[:, :count]) > NONE
+        filled = np.abs(work[:, :count]) > NOT_WHOLE
         sizes = np.where(is_open, filled.sum(axis=1), count + 1)
         sizes[is_open & (sizes == 0)] = count + 1
         row = int(np.argmin(sizes))
@@ -55,5 +78,5 @@ def sparse_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, F
     basis[free, np.arange(len(free))] = 1.0
     basis[pivots, :-1] = -work[np.ix_(at, free)]
     basis[pivots, -1] = work[at, count]
-    basis[np.abs(basis) < NONE * max(1.0, float(np.abs(basis).max(initial=0.0)))] = 0.0
+    basis[np.abs(basis) < NOT_WHOLE * max(1.0, float(np.abs(basis).max(initial=0.0)))] = 0.0
     return basis, work[is_open, count]

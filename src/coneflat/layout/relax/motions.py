@@ -5,18 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from ..._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import OptionError
 from ...mesh import TriangleMesh
 from .constraints import CheckedConstraints
-from .elimination import sparse_solutions
+from .elimination import ROUNDING, exact_solutions, sparse_solutions
 from .seam_chains import SeamChains, find_chains
 
-# Relative size below which what elimination leaves of an equation is rounding, and of a coefficient. What is taken for
-# none there is missed by the sides of seams.
-ROUNDING, NONE = 1e-10, 1e-15
 # What rounding leaves between the sides of seams is looked at in units of this, in which it is not none.
 FINE = 2.0**-40
 
@@ -325,22 +321,10 @@ class _Builder:
         rows, right = self._equations()
         if not len(rows):
             return np.concatenate([np.eye(self.size), np.zeros((self.size, 1))], axis=1)
-        if self.constraints.quarter_turns:
-            basis, left = sparse_solutions(rows, right)
-            _require_solved(float(np.abs(left).max(initial=0.0)), right)
-            return basis
-        q, r, pivots = scipy.linalg.qr(rows, mode="economic", pivoting=True)
-        diagonal = np.abs(np.diag(r))
-        rank = int((diagonal > ROUNDING * max(diagonal[0], 1e-300)).sum())
-        turned = q.T @ right
+        solve = sparse_solutions if self.constraints.quarter_turns else exact_solutions
+        basis, left = solve(rows, right)
         if not self.is_closing:  # rounding may contradict itself, between points that stay
-            _require_solved(float(np.abs(right - q[:, :rank] @ turned[:rank]).max()), right)
-        solved = scipy.linalg.solve_triangular(
-            r[:rank, :rank], np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
-        )
-        basis = np.zeros((self.size, self.size - rank + 1))
-        basis[pivots[:rank]] = np.where(np.abs(solved) > NONE, solved, 0.0)
-        basis[pivots[rank:], np.arange(self.size - rank)] = 1.0
+            _require_solved(float(np.abs(left).max(initial=0.0)), right)
         return basis
 
     def _equations(self) -> tuple[FloatArray, FloatArray]:

@@ -23,7 +23,7 @@ from ...text import shown
 from ..own import own_quantity
 from ..quantity import Quantity
 from .content import content_of
-from .payload import Told, payload_of
+from .payload import Told, as_payload, head_and_block
 
 if TYPE_CHECKING:
     from ...result.flattening import Flattening
@@ -87,7 +87,7 @@ def page_of(
     content = content_of(result, most_triangles, own=own)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
-    payload = payload_of(result, content, picture, name, up, show, told)
+    payload = as_payload(*head_and_block(result, content, picture, name, up, show, told))
     before_head, after_head, after_arrays = _template()
     return "".join((before_head, payload.head, after_head, payload.arrays, after_arrays))
 
