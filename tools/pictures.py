@@ -34,6 +34,7 @@ from coneflat.view.quantity import ColorScale, Quantity, curvature
 
 sys.path.insert(0, str(ROOT / "tests"))
 import shapes
+from chromium import browser_path
 
 DPI = 170.0
 GALLERY_DPI = 110.0
@@ -98,12 +99,7 @@ def _take_screenshots(name: str, model: str, measured: Measured) -> None:
     if find_spec("playwright") is None:
         print("playwright is not installed: the pictures of the viewer are left as they are")
         return
-    from screenshots import (
-        browser_path,
-        take_screenshot_of_quads,
-        take_screenshot_of_studio,
-        take_screenshots,
-    )
+    from screenshots import take_screenshot_of_quads, take_screenshot_of_studio, take_screenshots
 
     if browser_path() is None:
         print("there is no Chromium: the pictures of the viewer are left as they are")

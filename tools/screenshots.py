@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import tempfile
 import threading
 from collections.abc import Sequence
@@ -11,6 +9,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from chromium import ARGUMENTS, browser_path
 from palette import save_small
 from PIL import Image
 from playwright.sync_api import sync_playwright
@@ -22,8 +21,6 @@ from coneflat.apps.studio.session import Session
 from coneflat.view.page.quads import page_of_quads
 from coneflat.view.page.webpage import write_page
 
-ARGUMENTS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 WIDE, NARROW = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
 STUDIO_SIZE = {"width": 1000, "height": 560}
 #: The highest of the cones in front is picked.
@@ -50,11 +47,6 @@ SHOTS = (
     ("viewer-phone-dark", NARROW, "dark", "coneflat.state.set({show: 'area'})"),
 )
 SHOTS_OF_QUADS = (("viewer-quads", {"width": 1100, "height": 620}, "light", "null"),)
-
-
-def browser_path() -> str | None:
-    """Return where a Chromium is, or None."""
-    return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
 
 
 #: What is painted in the picture of the studio, and where: parts of the pane's width and height.
