@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MODELS = ROOT.parent / "shared" / "meshes"
 sys.path.insert(0, str(ROOT / "tests"))
 
+import chromium  # noqa: E402, F401 - for those that open a page
 import shapes  # noqa: E402
 
 from coneflat import Flattening, check_mesh, flatten, read_mesh  # noqa: E402

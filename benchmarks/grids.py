@@ -9,11 +9,10 @@ breach; the exit code is 1 if there is any. `--case 17` runs one alone in this p
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 
-from hostile import run_alone, summary
+from hostile import run_alone, summary, trial_parser
 from trials.outcome import Outcome
 from trials.workers import run_all
 
@@ -23,12 +22,7 @@ WORK = 120.0
 
 def main() -> int:
     """Run the cases, print the summary, and return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", type=int, default=200)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--case", metavar="SEED")
-    chosen = parser.parse_args()
+    chosen = trial_parser(__doc__, 200, "SEED").parse_args()
     if chosen.case:
         return run_alone(f"grid:{chosen.case}")
     outcomes: list[Outcome] = []

@@ -122,16 +122,22 @@ def run_alone(case: str) -> int:
     return int(outcome.status == "breach")
 
 
-def main() -> int:
-    """Run the cases, print the summary, and return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", type=int, default=10_000)
+def trial_parser(doc: str, cases: int, case: str) -> argparse.ArgumentParser:
+    """Return the options of a trial: doc says what it tries, case what one is called."""
+    parser = argparse.ArgumentParser(description=doc.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=cases)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--case", metavar=case)
+    return parser
+
+
+def main() -> int:
+    """Run the cases, print the summary, and return the exit code."""
+    parser = trial_parser(__doc__, 10_000, "KIND:SEED")
     parser.add_argument("--kinds", default=",".join(SHARES))
     parser.add_argument("--out", type=Path)
     parser.add_argument("--again", type=Path, help="only the breaches of a file that --out wrote")
-    parser.add_argument("--case", metavar="KIND:SEED")
     chosen = parser.parse_args()
     if chosen.case:
         return run_alone(chosen.case)

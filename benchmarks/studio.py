@@ -9,7 +9,6 @@ too: after the first layout, and after all moves.
 from __future__ import annotations
 
 import os
-import shutil
 import statistics
 import sys
 import tempfile
@@ -17,14 +16,13 @@ import threading
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from common import model
+from common import chromium, model
 
 from coneflat.apps.studio.serve import listening
 from coneflat.apps.studio.server import StudioServer
 from coneflat.apps.studio.session import Session
 
 SIZE = {"width": 1366, "height": 768}
-NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 MOVES = 8
 FLATTENED = ("check", "cones", "metric")  # stages until the metric is there
 PATIENCE = 300_000  # milliseconds
@@ -115,7 +113,6 @@ def measure(browser: object, name: str, splits: int, count: int, folder: Path) -
 def main(words: list[str]) -> None:
     from playwright.sync_api import sync_playwright
 
-    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
     columns = (
         "model",
         "triangles",
@@ -129,9 +126,7 @@ def main(words: list[str]) -> None:
     print("| " + " | ".join((*columns, "memory before, MB", "after, MB")) + " |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     with sync_playwright() as driver, tempfile.TemporaryDirectory() as folder:
-        browser = driver.chromium.launch(
-            executable_path=path, args=["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-        )
+        browser = driver.chromium.launch(executable_path=chromium.browser_path(), args=chromium.ARGUMENTS)
         for word in words or ["fandisk:0", "horse:0", "horse:1"]:
             name, splits, count, *_ = [*word.split(":"), "", ""]
             print(measure(browser, name, int(splits or 0), int(count or MOVES), Path(folder)), flush=True)

@@ -7,20 +7,17 @@ graphics card the processor draws, which says least about the last.
 
 from __future__ import annotations
 
-import os
-import shutil
 import statistics
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-from common import model
+from common import chromium, model
 
 import coneflat
 
 SIZE = {"width": 1366, "height": 768}
-NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 # Turns the model by a little, frame after frame, and returns the milliseconds that each took.
 TURN = """
 new Promise((done) => {
@@ -57,13 +54,10 @@ def load(browser: object, path: Path) -> tuple[float, float]:
 def main(words: list[str]) -> None:
     from playwright.sync_api import sync_playwright
 
-    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
     print("| model | triangles | page, MB | written, s | loaded, s | frame, ms |")
     print("| --- | --- | --- | --- | --- | --- |")
     with sync_playwright() as driver, tempfile.TemporaryDirectory() as folder:
-        browser = driver.chromium.launch(
-            executable_path=path, args=["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-        )
+        browser = driver.chromium.launch(executable_path=chromium.browser_path(), args=chromium.ARGUMENTS)
         for word in words or ["fandisk:0", "horse:0", "horse:1"]:
             name, _, splits = word.partition(":")
             result = coneflat.flatten(*model(name, int(splits or 0)), charts="atlas")

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import io
-import os
-import shutil
 
 import numpy as np
 import pytest
 import shapes
+from chromium import ARGUMENTS, browser_path
 
 import coneflat
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-ARGUMENTS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # no graphics card is needed
 WIDE, NARROW = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
 SMALL = {"width": 1200, "height": 700}  # Drawn quickly without a graphics card.
 PATIENCE = 60_000  # milliseconds, for a machine with much else to do
@@ -35,7 +32,7 @@ coneflat.panes.forEach((pane) => pane.camera.fit());
 @pytest.fixture(scope="module")
 def browser():
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+    path = browser_path()
     if path is None:
         pytest.skip("there is no Chromium here; CHROMIUM=/path/to/it says where it is")
     with playwright.sync_playwright() as driver:

@@ -113,8 +113,9 @@ def head_of(page):
 
 def test_the_page_of_quads():
     mesh = quads_of(L_SHAPE)
-    result = as_flattening(mesh)
-    assert result.distortion.charts == len(find_domains(mesh).sides)
+    domains = find_domains(mesh)
+    result = as_flattening(mesh, domains)
+    assert result.distortion.charts == len(domains.sides)
     assert result.distortion.flipped == 0
     assert result.distortion.overlap == 0
     # Gauss-Bonnet: a quarter turn for each quad that is missing.

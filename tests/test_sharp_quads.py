@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapes
+from grid_maps import L_SHAPE, polycube
 from test_integer_grid import check_laws
 
 from coneflat import errors, flatten, integer_grid, quads
@@ -29,23 +30,8 @@ def prism(corners: int):
 
 def l_block(size: int = 2):
     """Three unit cubes in the form of an L, their square faces split alike."""
-    points, squares = [], []
-    cubes = {(0, 0, 0), (1, 0, 0), (0, 1, 0)}
-    for cube in sorted(cubes):
-        for axis in range(3):
-            for step in (1, -1):
-                beside = list(cube)
-                beside[axis] += step
-                if tuple(beside) in cubes:
-                    continue
-                base = np.array(cube)
-                base[axis] += step > 0
-                p, q = np.eye(3, dtype=int)[[(axis + 1) % 3, (axis + 2) % 3]]
-                ring = [base, base + p, base + p + q, base + q]
-                squares.append(np.arange(4) + 4 * len(squares))
-                points.extend(ring if step > 0 else ring[::-1])
-    vertices, number = np.unique(np.array(points, dtype=float), axis=0, return_inverse=True)
-    a, b, c, d = number.ravel()[np.array(squares)].T
+    vertices, squares = polycube(L_SHAPE)
+    a, b, c, d = squares.T
     faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     for _ in range(size):
         vertices, faces = shapes.subdivide(vertices, faces)

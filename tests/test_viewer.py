@@ -19,10 +19,11 @@ import coneflat
 from coneflat.errors import ArrayShapeError, MeshError, MeshFileError, OptionError, UnknownFormatError
 from coneflat.files.texture import read_picture
 from coneflat.mesh import end_corners
+from coneflat.options.outputs import SHOWS
 from coneflat.view import colours
 from coneflat.view.figures.raster import rasterise
 from coneflat.view.page.content import content_of, outline_halfedges
-from coneflat.view.page.webpage import MOST_IN_NOTEBOOK, SHOWS, notebook_html, open_page, page_of
+from coneflat.view.page.webpage import MOST_IN_NOTEBOOK, notebook_html, open_page, page_of
 from coneflat.view.quantity import ColorScale
 
 TYPES = {"f4": "<f4", "u4": "<u4", "i4": "<i4", "u2": "<u2", "u1": "u1"}

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from browsing import NARROW, WIDE, Visit, thing
 
+from coneflat.options.outputs import SHOWS
 from coneflat.view.page.content import content_of
-from coneflat.view.page.webpage import SHOWS, notebook_html, page_of
+from coneflat.view.page.webpage import notebook_html, page_of
 
 CELL = "1 / coneflat.state.get('squares') * coneflat.model.head.uv_side"
 

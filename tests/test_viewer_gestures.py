@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from browsing import NARROW, Visit, thing
 
-from coneflat.view.page.webpage import SHOWS
+from coneflat.options.outputs import SHOWS
 
 
 def near(visit, pane, x, y, reach=16):

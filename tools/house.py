@@ -41,7 +41,7 @@ HOLDS = {
     "compiled": "the decorator of kernels",
     "threads": "cores, two stages at once",
     "progress": "stages timed and told",
-    "kept": "what was computed last",
+    "kept": "what has been computed",
     "mesh": "half-edges, borders, components, genus",
     "options": "every option, declared once",
     "geometry": "lengths, angles, flips, predicates, overlap",

@@ -34,6 +34,7 @@ from coneflat.view.quantity import ColorScale, Quantity, curvature
 
 sys.path.insert(0, str(ROOT / "tests"))
 import shapes
+from chromium import browser_path
 
 DPI = 170.0
 GALLERY_DPI = 110.0
@@ -106,7 +107,7 @@ def _take_screenshots(name: str, model: str, measured: Measured) -> None:
     if find_spec("playwright") is None:
         print(f"playwright is not installed: {name} is left as it is")
         return
-    from screenshots import browser_path, take_screenshot_of_quads, take_screenshots
+    from screenshots import take_screenshot_of_quads, take_screenshots
     from studio_pictures import take_phone, take_session, take_studio
 
     taken = {

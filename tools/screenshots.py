@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import tempfile
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from chromium import ARGUMENTS, browser_path
 from palette import save_small
 from PIL import Image
 from playwright.sync_api import sync_playwright
@@ -18,8 +17,6 @@ import coneflat
 from coneflat.view.page.quads import page_of_quads
 from coneflat.view.page.webpage import write_page
 
-ARGUMENTS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 WIDE, NARROW = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
 #: Name, size, theme, and what is done on the page first.
 SHOTS = (
@@ -34,11 +31,6 @@ SHOTS = (
     ("viewer-phone-dark", NARROW, "dark", "coneflat.state.set({show: 'area'})"),
 )
 SHOTS_OF_QUADS = (("viewer-quads", {"width": 1100, "height": 620}, "light", "null"),)
-
-
-def browser_path() -> str | None:
-    """Return where a Chromium is, or None."""
-    return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
 
 
 def take_screenshots(result: coneflat.Flattening) -> None:

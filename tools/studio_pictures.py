@@ -10,10 +10,11 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from chromium import ARGUMENTS, browser_path
 from palette import IMAGES, MOST, save_small
 from PIL import Image
 from playwright.sync_api import sync_playwright
-from screenshots import ARGUMENTS, NARROW, browser_path
+from screenshots import NARROW
 
 from coneflat.apps.studio.serve import listening
 from coneflat.apps.studio.server import StudioServer

@@ -1,4 +1,4 @@
-"""What was computed last, until something else is asked for."""
+"""What has been computed, kept: with what it follows from, or until something else is asked for."""
 
 from __future__ import annotations
 
@@ -6,6 +6,18 @@ from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
 Value = TypeVar("Value")
+
+
+def kept_with(owner: object, name: str, compute: Callable[[], Value]) -> Value:
+    """Return what follows from an object that does not change, computed once and kept with it.
+
+    It is a `cached_property` for rooms above the one that the object's class is in.
+    """
+    known = owner.__dict__
+    if name not in known:
+        known[name] = compute()
+    value: Value = known[name]
+    return value
 
 
 class Last(Generic[Value]):

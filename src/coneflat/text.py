@@ -7,6 +7,7 @@ from itertools import islice
 
 # Elements of an array, and characters of anything, that a message shows.
 FEW_SHOWN, MOST_SHOWN = 4, 80
+MOST_LISTED = 5
 
 
 def plural(count: int, noun: str, nouns: str | None = None) -> str:
@@ -14,11 +15,11 @@ def plural(count: int, noun: str, nouns: str | None = None) -> str:
     return f"{count:,} {noun if count == 1 else nouns or noun + 's'}"
 
 
-def list_some(items: Iterable[object], total: int | None = None, most: int = 5) -> str:
+def list_some(items: Iterable[object], total: int | None = None) -> str:
     """Return the first few items, and dots if there are more."""
-    shown = list(islice(iter(items), most + 1))
-    more = len(shown) > most or (total is not None and total > most)
-    return ", ".join(str(item) for item in shown[:most]) + (", ..." if more else "")
+    shown = list(islice(iter(items), MOST_LISTED + 1))
+    more = len(shown) > MOST_LISTED or (total is not None and total > MOST_LISTED)
+    return ", ".join(str(item) for item in shown[:MOST_LISTED]) + (", ..." if more else "")
 
 
 def printable(text: str) -> str:

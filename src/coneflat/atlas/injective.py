@@ -81,20 +81,37 @@ def injective_charts(
         found.append((rank, len(found), layout))
         if rank[1] == 1 or (not rank[0] and len(corners) > LARGE):
             break
-    (slivers, count, _), _, best = min(found, key=lambda one: one[:2])
-    if symmetry is not None:
-        # Whatever is most alike on both sides.
-        partner = symmetry.mirror.partner
-        off = mirror_charts(mesh, best, partner).off
-        for part in LEAST_PARTS if off > SEEN else ():
-            least = part * float(np.abs(areas).sum())
-            alike = split_alike(mesh, whole, lengths, np.abs(areas), pairs, symmetry, least)
-            if alike is None:
-                continue
-            more_slivers, more, _ = _rank(mesh, alike, np.abs(areas), lengths)
-            alike_off = mirror_charts(mesh, alike, partner).off
-            if more_slivers <= slivers and more <= count + MORE_ALIKE and alike_off < off:
-                best, off = alike, alike_off
+    best = min(found, key=lambda one: one[:2])[2]
+    if symmetry is None:
+        return best
+    return _most_alike(mesh, best, whole, lengths, np.abs(areas), pairs, symmetry)
+
+
+def _most_alike(
+    mesh: TriangleMesh,
+    best: Layout,
+    whole: Layout,
+    lengths: FloatArray,
+    areas: FloatArray,
+    pairs: IntArray,
+    symmetry: Symmetry,
+) -> Layout:
+    """Return a layout whose charts are more alike on both sides of a plane of symmetry, or the best as it is.
+
+    It has no more slivers, and few more charts; the other arguments are those of `split_alike`.
+    """
+    slivers, count, _ = _rank(mesh, best, areas, lengths)
+    most = count + MORE_ALIKE
+    partner = symmetry.mirror.partner
+    off = mirror_charts(mesh, best, partner).off
+    for part in LEAST_PARTS if off > SEEN else ():
+        alike = split_alike(mesh, whole, lengths, areas, pairs, symmetry, part * float(areas.sum()))
+        if alike is None:
+            continue
+        more_slivers, more, _ = _rank(mesh, alike, areas, lengths)
+        alike_off = mirror_charts(mesh, alike, partner).off
+        if more_slivers <= slivers and more <= most and alike_off < off:
+            best, off = alike, alike_off
     return best
 
 

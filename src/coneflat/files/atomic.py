@@ -74,6 +74,19 @@ def check_target(path: str | PathLike[str]) -> Path:
     return target
 
 
+def checked_target(path: str | PathLike[str], endings: Collection[str], what: str) -> Path:
+    """Return a path if a file can be expected to be written there that has one of some endings, see `known_ending`.
+
+    Raises:
+        UnknownFormatError: it has another ending.
+        MeshFileError: as of `check_target`.
+    """
+    path = as_path(path)
+    known_ending(path, endings, what)
+    check_target(path)
+    return path
+
+
 def make_folder(path: Path) -> None:
     """Make a folder, and those that it is in, if they are missing.
 

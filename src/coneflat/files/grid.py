@@ -15,7 +15,7 @@ import numpy as np
 from .._arrays import FloatArray, IntArray
 from ..errors import MeshError, MeshFileError
 from .archive import CheckedArrays, number, read_archive
-from .atomic import as_path, atomic_write, check_target, known_ending
+from .atomic import as_path, atomic_write, checked_target, known_ending
 from .obj import parse_obj
 from .obj_write import lines_of
 from .raw import read_bytes
@@ -57,10 +57,7 @@ def check_grid_output(path: str | PathLike[str]) -> Path:
         UnknownFormatError: the ending is not one of `GRID_FORMATS`.
         MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
     """
-    path = as_path(path)
-    known_ending(path, GRID_FORMATS, "integer grids are written as")
-    check_target(path)
-    return path
+    return checked_target(path, GRID_FORMATS, "integer grids are written as")
 
 
 def write_grid(path: str | PathLike[str], grid: IntegerGrid) -> Path:

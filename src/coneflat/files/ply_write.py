@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import IO, TYPE_CHECKING
+from collections.abc import Sequence
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,6 @@ from .uv_split import split_at_seams
 
 if TYPE_CHECKING:
     from ..result.flattening import Flattening
-
-_FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
 
 
 def write_ply(result: Flattening, stream: IO[bytes]) -> None:
@@ -41,24 +40,42 @@ def write_ply(result: Flattening, stream: IO[bytes]) -> None:
     vertices["doubles"] = np.concatenate(list(doubles.values()), axis=1)
     vertices["source_vertex"] = mesh.origin
     vertices["colours"] = colours
-    faces = np.empty(len(mesh.faces), _FACE)
-    faces["count"] = 3
-    faces["corners"] = mesh.faces
+    properties = [
+        *(f"double {name}" for name in names),
+        "int source_vertex",
+        *(f"uchar {name}" for name in COLOURS[: colours.shape[1]]),
+    ]
+    write_parts(stream, "flattened by coneflat", properties, vertices, mesh.faces)
+
+
+def write_parts(
+    stream: IO[bytes], comment: str, properties: Sequence[str], vertices: NDArray[Any], faces: IntArray
+) -> None:
+    """Write vertices and faces as binary little-endian PLY.
+
+    Args:
+        stream: a binary file.
+        comment: a line of the header.
+        properties: of a vertex: "double x", say.
+        vertices: (n, ...) as they lie in the file, with these properties.
+        faces: (m, k) vertex indices.
+    """
+    rows = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", faces.shape[1])])
+    rows["count"] = faces.shape[1]
+    rows["corners"] = faces
     header = [
         "ply",
         "format binary_little_endian 1.0",
-        "comment flattened by coneflat",
+        f"comment {comment}",
         f"element vertex {len(vertices)}",
-        *(f"property double {name}" for name in names),
-        "property int source_vertex",
-        *(f"property uchar {name}" for name in COLOURS[: colours.shape[1]]),
+        *(f"property {one}" for one in properties),
         f"element face {len(faces)}",
         "property list uchar int vertex_indices",
         "end_header",
     ]
     stream.write(("\n".join(header) + "\n").encode("ascii"))
     stream.write(vertices.data)
-    stream.write(faces.data)
+    stream.write(rows.data)
 
 
 def _colours(result: Flattening, vertices: IntArray) -> NDArray[np.uint8]:

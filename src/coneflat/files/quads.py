@@ -12,16 +12,16 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 
 from .archive import CheckedArrays, number, read_archive
-from .atomic import as_path, atomic_write, check_target, known_ending
+from .atomic import as_path, atomic_write, checked_target, known_ending
 from .gltf.quads import write_quads_glb
 from .obj_write import lines_of
+from .ply_write import write_parts
 
 if TYPE_CHECKING:
     from ..grid import QuadMesh
 
 #: Endings of the files that `write_quads` writes.
 QUAD_FORMATS = (".obj", ".ply", ".glb", ".npz")
-_FACE = np.dtype([("count", "u1"), ("corners", "<i4", 4)])
 #: Arrays from which a mesh of quads is made again.
 _NAMES = ("vertices", "quads", "faces", "barycentric", "surface_vertices", "surface_faces", "report")
 
@@ -33,10 +33,7 @@ def check_quads_output(path: str | PathLike[str]) -> Path:
         UnknownFormatError: the ending is not one of `QUAD_FORMATS`.
         MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
     """
-    path = as_path(path)
-    known_ending(path, QUAD_FORMATS, "quads are written as")
-    check_target(path)
-    return path
+    return checked_target(path, QUAD_FORMATS, "quads are written as")
 
 
 def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
@@ -78,22 +75,8 @@ def _write_obj(mesh: QuadMesh, stream: IO[bytes]) -> None:
 
 
 def _write_ply(mesh: QuadMesh, stream: IO[bytes]) -> None:
-    faces = np.empty(len(mesh.quads), _FACE)
-    faces["count"] = 4
-    faces["corners"] = mesh.quads
-    header = [
-        "ply",
-        "format binary_little_endian 1.0",
-        "comment quads by coneflat",
-        f"element vertex {len(mesh.vertices)}",
-        *(f"property double {axis}" for axis in "xyz"),
-        f"element face {len(faces)}",
-        "property list uchar int vertex_indices",
-        "end_header",
-    ]
-    stream.write(("\n".join(header) + "\n").encode("ascii"))
-    stream.write(np.ascontiguousarray(mesh.vertices, "<f8").data)
-    stream.write(faces.data)
+    places = np.ascontiguousarray(mesh.vertices, "<f8")
+    write_parts(stream, "quads by coneflat", [f"double {axis}" for axis in "xyz"], places, mesh.quads)
 
 
 def _write_npz(mesh: QuadMesh, stream: IO[bytes]) -> None:

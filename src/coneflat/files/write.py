@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from ..errors import OptionError, UnknownFormatError
-from .atomic import as_path, atomic_write, check_target, known_ending
+from ..options.outputs import FORMATS
+from .atomic import atomic_write, checked_target
 from .gltf.write import write_glb
 from .npz import write_npz
 from .obj_write import write_obj
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 #: Endings of the files that `write_flattening` writes.
-OUTPUT_FORMATS = (".obj", ".ply", ".glb", ".npz")
+OUTPUT_FORMATS = tuple(f".{name}" for name in FORMATS)
 
 
 def check_output(path: str | PathLike[str], texture: str | PathLike[str] | None = None) -> Path:
@@ -35,10 +36,8 @@ def check_output(path: str | PathLike[str], texture: str | PathLike[str] | None 
             image that can be read.
         OptionError: files of this ending carry no texture, or Pillow is not installed.
     """
-    path = as_path(path)
-    ending = known_ending(path, OUTPUT_FORMATS, "results are written as")
-    check_target(path)
-    _check_texture(path, ending, texture)
+    path = checked_target(path, OUTPUT_FORMATS, "results are written as")
+    _check_texture(path, path.suffix.lower(), texture)
     if texture is not None:
         find_texture(texture)
     return path

@@ -38,6 +38,13 @@ def point_seams(mesh: TriangleMesh, corners: IntArray, among: IntArray | None = 
     return np.flatnonzero(find_split(mesh.edge_halfedges, np.ascontiguousarray(corners)))
 
 
+def point_vertices(faces: IntArray, corners: IntArray, count: int) -> IntArray:
+    """Return (u,) the vertex of each of so many points; faces, corners: (m, 3) the vertex and the point at corners."""
+    vertex = np.zeros(count, dtype=np.int64)
+    vertex[corners.ravel()] = faces.ravel()
+    return vertex
+
+
 def uv_seams(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
     """Return the inner edges whose two sides lie apart in the plane; `corner_uv` is (m, 3, 2)."""
     return np.flatnonzero(~joined_edges(mesh, corner_uv) & ~mesh.is_boundary_edge)

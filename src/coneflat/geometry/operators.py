@@ -115,9 +115,8 @@ def fill_laplacian(
         for c in range(3):
             i, j, w = faces[f, (c + 1) % 3], faces[f, (c + 2) % 3], cots[f, c] / 2
             rows[place[i]], values[place[i]] = j, -w
-            place[i] += (
-                1  # before the next: an edge of an intrinsic triangulation may lead back to its vertex
-            )
+            # Before the next entry: an edge of an intrinsic triangulation may lead back to its vertex.
+            place[i] += 1
             rows[place[j]], values[place[j]] = i, -w
             place[j] += 1
     # Its own transpose, made column after column, has sorted rows.

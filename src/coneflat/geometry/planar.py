@@ -1,4 +1,4 @@
-"""Triangles of the plane, which may be upside down: column i of sides is the side opposite corner i."""
+"""Points and triangles of the plane, which may be upside down: column i of sides is the side opposite corner i."""
 
 from __future__ import annotations
 
@@ -7,6 +7,17 @@ import numpy as np
 from .._arrays import ComplexArray, FloatArray, IntArray
 from ..compiled import compiled
 from ..mesh import NEXT, PREVIOUS
+
+
+def as_complex(places: FloatArray) -> ComplexArray:
+    """Return (k,) points x + i y, given as (k, 2)."""
+    points: ComplexArray = places[:, 0] + 1j * places[:, 1]
+    return points
+
+
+def as_pairs(points: ComplexArray) -> FloatArray:
+    """Return (k, 2) points, given as (k,) x + i y."""
+    return np.stack([points.real, points.imag], axis=1)
 
 
 def signed_double_areas(corners: FloatArray) -> FloatArray:

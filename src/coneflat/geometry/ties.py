@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import FloatArray, dots
+from ..kept import kept_with
 from ..mesh import TriangleMesh
 
 # Relative to the range of the values: far above what rounding makes of equal ones, far below what tells others
@@ -72,10 +73,7 @@ def tie_key(vertices: FloatArray) -> FloatArray:
 
 def mesh_tie_key(mesh: TriangleMesh) -> FloatArray:
     """Return the key (n,) of a mesh, which is not computed again."""
-    key: FloatArray | None = mesh.__dict__.get("_tie_key")
-    if key is None:
-        key = mesh.__dict__["_tie_key"] = tie_key(mesh.vertices)
-    return key
+    return kept_with(mesh, "_tie_key", lambda: tie_key(mesh.vertices))
 
 
 def argmax_tied(values: FloatArray, key: FloatArray) -> int:

@@ -9,7 +9,8 @@ import numpy as np
 from .._arrays import ComplexArray, FloatArray, IntArray
 from ..errors import GridError
 from ..geometry import mollify
-from ..geometry.planar import signed_double_areas
+from ..geometry.charts import point_vertices
+from ..geometry.planar import as_complex, signed_double_areas
 from ..geometry.triangles import double_areas, edge_lengths
 from ..layout.relax.seam_chains import SeamChains, find_chains
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
@@ -71,7 +72,7 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Layo
         assert quads is not None
         size = float(np.sqrt(area / quads))
     scale = np.sqrt(area / size**2 / (flat.sum() / 2))
-    points = scale * (result.uv[:, 0] + 1j * result.uv[:, 1])
+    points = scale * as_complex(result.uv)
     cones = np.asarray(result.cones, dtype=np.int64)
     cones = cones[~mesh.is_boundary_vertex[cones]]
     layout = Layout(mesh, lengths, result.uv_faces, points, cones, Sides(), size)
@@ -122,8 +123,7 @@ def joined_charts(
 
 def origins(layout: Layout, component: IntArray) -> ComplexArray:
     """Return (c,) the place of the first cone or corner of each component, or else of the first point on a side."""
-    vertex = np.zeros(len(layout.points), dtype=np.int64)
-    vertex[layout.corners.ravel()] = layout.mesh.faces.ravel()
+    vertex = point_vertices(layout.mesh.faces, layout.corners, len(layout.points))
     at = np.concatenate([first_points(vertex)[layout.whole], layout.sides.points])[::-1]
     origins = np.zeros(int(component.max(initial=-1)) + 1, dtype=np.complex128)
     origins[component[at]] = layout.points[at]  # the first one stays, as the last to be written

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .._arrays import ComplexArray, FloatArray, IntArray
+from .._arrays import ComplexArray, IntArray
 from ..errors import ConvergenceError, GridError, OptionError
-from ..geometry.planar import map_factors, sides_between, signed_angles, signed_double_areas
+from ..geometry.planar import as_complex, as_pairs, map_factors, sides_between, signed_double_areas
 from ..geometry.triangles import double_areas
 from ..layout.relax import Lines, PointConstraints, Relaxed, StretchEnergy, relax
 from ..layout.relax.relax import rest_sides
@@ -17,7 +17,7 @@ from .aligned import Layout
 from .integer_map import IntegerGrid
 from .motions import find_motions
 from .rounding import Rounding, find_rounding
-from .sides import Sides
+from .sides import Sides, quarters_around
 from .transitions import Transitions, find_transitions
 
 # Lattice points that are tried, one after the other.
@@ -49,7 +49,7 @@ def attempt(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None, 
             tries, why = tries + 1, str(error)
             continue
         points = _snapped(found, transitions, values)
-        if (signed_double_areas(_pairs(points)[corners]) > 0).all():
+        if (signed_double_areas(as_pairs(points)[corners]) > 0).all():
             return _described(layout, smooth, points, found, transitions, tries), ""
         tries, why = tries + 1, "a triangle so small was left that rounding turned it over"
     return None, why
@@ -64,7 +64,7 @@ def _displaced(
     """
     shift = rounding.stiffness.displacement((values - rounding.smooth)[:, None])[:, 0]
     moved = transitions.places(smooth + shift[0::2] + 1j * shift[1::2], values.astype(np.float64))
-    before, after = (signed_double_areas(_pairs(points)[layout.corners]) for points in (smooth, moved))
+    before, after = (signed_double_areas(as_pairs(points)[layout.corners]) for points in (smooth, moved))
     return moved if (after > LEAST_START * before).all() else smooth
 
 
@@ -82,7 +82,7 @@ def _relaxed(
     _, one_of = np.unique(chains.chain, return_index=True)
     constraints = PointConstraints(
         pinned=pinned,
-        places=_pairs(places[pinned]),
+        places=as_pairs(places[pinned]),
         lines=_lines(layout.sides, pinned, values),
         tied=chains.halfedges[one_of, 1],
         translations=values[:count].reshape(-1, 2),
@@ -90,7 +90,7 @@ def _relaxed(
     highest = HOPELESS * float(energy.values(np.ones(1), np.ones(1))[0]) * _model_area(layout)
     return relax(
         layout.mesh,
-        _pairs(smooth),
+        as_pairs(smooth),
         layout.corners,
         energy,
         constraints,
@@ -105,11 +105,9 @@ def _lines(sides: Sides, pinned: IntArray, values: IntArray) -> Lines | None:
     if not len(sides.axis):
         return None
     loose = ~np.isin(sides.points, pinned)
-    is_upright = sides.axis == 0
     # To the left of upwards is where x falls.
-    offsets = np.where(is_upright, -1.0, 1.0) * values[len(values) - len(sides.axis) :]
-    directions = np.stack([~is_upright, is_upright], axis=1).astype(np.float64)
-    return Lines(sides.points[loose], sides.side[loose], directions, offsets)
+    offsets = np.where(sides.axis == 0, -1.0, 1.0) * values[len(values) - len(sides.axis) :]
+    return Lines(sides.points[loose], sides.side[loose], sides.directions, offsets)
 
 
 def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> ComplexArray:
@@ -119,9 +117,8 @@ def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> Comp
     """
     largest = float(np.abs(found.points).max(initial=1.0)) + float(np.abs(values).max(initial=0))
     bits = min(BITS, 50 - int(np.ceil(np.log2(largest))))
-    z = found.points[:, 0] + 1j * found.points[:, 1]
-    rounded = np.ldexp(np.rint(np.ldexp(_pairs(z), bits)), -bits)
-    return transitions.places(rounded[:, 0] + 1j * rounded[:, 1], values.astype(np.float64))
+    rounded = np.ldexp(np.rint(np.ldexp(found.points, bits)), -bits)
+    return transitions.places(as_complex(rounded), values.astype(np.float64))
 
 
 def _described(
@@ -133,10 +130,11 @@ def _described(
     tries: int,
 ) -> IntegerGrid:
     mesh, corners = layout.mesh, layout.corners
-    turns, shifts, _ = find_motions(mesh, _pairs(points)[corners])
-    angles = signed_angles(sides_between(_pairs(points)[corners]))
-    sums = np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
-    quarters = np.rint(sums / (np.pi / 2)).astype(np.int64)
+    corner_grid = as_pairs(points)[corners]
+    turns, shifts, _ = find_motions(mesh, corner_grid)
+    quarters = quarters_around(mesh, sides_between(corner_grid))
+    qc_before, _ = _distortion(layout, smooth)
+    qc_mean, least_area = _distortion(layout, points)
     move_rms, move_max = _moves(layout, smooth, points)
     notes = []
     if tries:
@@ -147,7 +145,7 @@ def _described(
     return IntegerGrid(
         vertices=mesh.vertices,
         faces=mesh.faces,
-        corner_grid=_pairs(points)[corners],
+        corner_grid=corner_grid,
         turns=turns,
         shifts=shifts,
         cones=layout.cones,
@@ -159,9 +157,9 @@ def _described(
         move_max=move_max,
         energy_before=found.energy_before,
         energy=found.energy,
-        qc_before=_distortion(layout, smooth)[0],
-        qc_mean=_distortion(layout, points)[0],
-        least_area=_distortion(layout, points)[1],
+        qc_before=qc_before,
+        qc_mean=qc_mean,
+        least_area=least_area,
         notes=tuple(notes),
     )
 
@@ -200,8 +198,4 @@ def scaled(layout: Layout, factor: float) -> Layout:
 
 def area_of(layout: Layout) -> float:
     """Return how many squares a layout covers."""
-    return float(signed_double_areas(_pairs(layout.points)[layout.corners]).sum()) / 2
-
-
-def _pairs(points: ComplexArray) -> FloatArray:
-    return np.stack([points.real, points.imag], axis=-1)
+    return float(signed_double_areas(as_pairs(layout.points)[layout.corners]).sum()) / 2

@@ -6,7 +6,8 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..geometry.ties import tie_key
-from ..mesh import TriangleMesh, label_components
+from ..mesh import TriangleMesh
+from .features import lengths_along, patches_of
 
 # Rounds at most: each halves edges.
 ROUNDS = 30
@@ -62,14 +63,11 @@ def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
 
 def _too_long(mesh: TriangleMesh, edges: IntArray, longest: float) -> BoolArray:
     """Return (e,) the edges longer than what their patches allow."""
-    inner = ~mesh.is_boundary_edge
-    inner[edges] = False
-    pairs = mesh.edge_faces[inner]
-    count, patch = label_components(len(mesh.faces), pairs[:, 0], pairs[:, 1])
+    count, patch = patches_of(mesh, edges)
     corners = mesh.vertices[mesh.faces]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     allowed = np.minimum(longest, np.sqrt(np.bincount(patch, areas, count)) / ACROSS)[patch]
-    lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
+    lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
     one, two = mesh.edge_faces.T
     too_long: BoolArray = lengths > np.minimum(allowed[one], np.where(two < 0, np.inf, allowed[two]))
     return too_long
@@ -101,7 +99,7 @@ def _longest_sides(mesh: TriangleMesh, among: BoolArray) -> IntArray:
 
     Of equal ones it is the same, whatever the numbering.
     """
-    lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
+    lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
     key = tie_key(mesh.vertices)[mesh.edges].sum(axis=1)
     rounded = np.round(lengths / lengths.max(initial=1e-300), 9)
     rank = np.empty(len(lengths), dtype=np.int64)

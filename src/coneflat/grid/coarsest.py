@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import sqrt
 
-import numpy as np
-
 from ..errors import GridError
 from ..layout.relax import StretchEnergy
 from ..text import plural
@@ -15,6 +13,7 @@ from .aligned import Layout
 from .attempt import area_of, attempt, scaled
 from .extract import extract_quads
 from .integer_map import IntegerGrid
+from .quad_mesh import used_euler
 
 # Grids that are tried at most, and squares of one that does over those of one that does not at which the search ends.
 TRIES, CLOSE = 14, 1.15
@@ -72,9 +71,7 @@ def coarsest_grid(layout: Layout, energy: StretchEnergy, tell: Callable[[float, 
 
 def fewest_squares(layout: Layout) -> int:
     """Return the least number of quads that a mesh with a vertex at each cone may have, by Euler's formula."""
-    mesh = layout.mesh
-    unused = len(mesh.vertices) - len(np.unique(mesh.faces))
-    return max(1, len(layout.cones) - (mesh.euler_characteristic - unused))
+    return max(1, len(layout.cones) - used_euler(layout.mesh))
 
 
 class _Search:

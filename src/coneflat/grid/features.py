@@ -22,13 +22,18 @@ def sharp_edges(mesh: TriangleMesh, angle: float) -> IntArray:
     return np.flatnonzero(np.abs(dihedral_angles(mesh)) > angle)
 
 
+def lengths_along(mesh: TriangleMesh, edges: IntArray) -> FloatArray:
+    """Return (k,) the lengths of edges."""
+    return np.linalg.norm(np.diff(mesh.vertices[mesh.edges[edges]], axis=1)[:, 0], axis=1)
+
+
 def without_stubs(mesh: TriangleMesh, edges: IntArray, least: float) -> IntArray:
     """Return which of some edges (k,) are kept when stubs are dropped.
 
     A stub ends where no other one goes on, in less than two edges or before it is as long as is asked.
     """
     kept = np.arange(len(edges))
-    lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges[edges]], axis=1)[:, 0], axis=1)
+    lengths = lengths_along(mesh, edges)
     while True:
         chain, ends = feature_chains(mesh, edges[kept])
         count = int(chain.max(initial=-1)) + 1
@@ -69,7 +74,7 @@ def border_of(mesh: TriangleMesh, edges: IntArray, number: int) -> IntArray:
     if not len(parting):
         return np.flatnonzero(beside)
     chain, _ = feature_chains(mesh, edges)
-    lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges[edges]], axis=1)[:, 0], axis=1)
+    lengths = lengths_along(mesh, edges)
     longest = int(np.argmax(np.bincount(chain[parting], lengths[parting])))
     return parting[chain[parting] == longest]
 

@@ -6,13 +6,14 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..errors import GridError
-from ..geometry.planar import sides_between, signed_angles, signed_double_areas
+from ..geometry.planar import sides_between, signed_double_areas
 from ..geometry.triangles import double_areas, edge_lengths
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from ..text import list_some, plural
 from .exact_grid import LOOSE
 from .integer_map import IntegerGrid
 from .motions import find_motions
+from .sides import quarters_around
 
 
 def grid_of_corners(
@@ -46,7 +47,7 @@ def grid_of_corners(
             f"the sides of a seam miss each other by {off:.2g} squares, up to quarter turns and whole translations: "
             "this is no integer-grid map"
         )
-    quarters = _quarters(mesh, corner_grid)
+    quarters = quarters_around(mesh, sides_between(corner_grid))
     cones = np.flatnonzero((quarters != 4) & ~mesh.is_boundary_vertex & _used(mesh))
     corners = np.flatnonzero((quarters != 2) & _between_sides(mesh, corner_grid))
     area = float(double_areas(edge_lengths(vertices, faces)).sum())
@@ -65,13 +66,6 @@ def grid_of_corners(
         corner_quarters=quarters[corners],
         **{"size": float(np.sqrt(area / flat.sum())), **nothing, **known},  # type: ignore[arg-type]
     )
-
-
-def _quarters(mesh: TriangleMesh, corner_grid: FloatArray) -> IntArray:
-    """Return (n,) the angle around each vertex in quarter turns, rounded."""
-    angles = signed_angles(sides_between(corner_grid))
-    sums = np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
-    return np.rint(sums / (np.pi / 2)).astype(np.int64)
 
 
 def _used(mesh: TriangleMesh) -> BoolArray:

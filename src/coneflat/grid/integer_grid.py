@@ -15,6 +15,8 @@ from ..input.arrays import as_input
 from ..input.validation import check_mesh
 from ..layout.relax import StretchEnergy
 from ..mesh import NEXT
+from ..options.kinds import WordOrVertices
+from ..options.quads import QUADS
 from ..pipeline import flatten
 from ..progress import Progress, Stages
 from ..result.flattening import Flattening
@@ -24,10 +26,10 @@ from ..threads import THREADS, using_threads
 from .aligned import Layout, aligned
 from .attempt import area_of, attempt, scaled
 from .coarsest import TRIES, coarsest_grid
-from .given_cones import require_quarters
 from .integer_map import IntegerGrid
 from .sharp_edges import not_taken, sharp_layouts
 from .split import between_whole, split_edges
+from .transitions import QUARTER
 
 # What the grid wants of a flattening: three, five or six quads at a cone, and rotations that are quarter turns.
 OPTIONS = {
@@ -40,8 +42,6 @@ OPTIONS = {
 # With straight sides, what is said of cones holds for both copies of the surface, glued to each other at the boundary:
 # a corner of pi/2 is a cone of pi there.
 STRAIGHT = {"min_cone_angle": np.pi / 2}
-# Squares by default.
-QUADS = 10_000
 # Part of the squares wanted by which there may be more or fewer without a note.
 NOTED = 0.1
 # How many times the squares wanted are tried, when these are too few, to say what would do.
@@ -126,8 +126,20 @@ def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
     given = options.get("cones", "auto")
     if isinstance(given, str):
         return OPTIONS if options.get("boundary") != "straight" else {**OPTIONS, **STRAIGHT}
-    require_quarters(given)
+    _require_quarters(given)
     return {"charts": "one"}
+
+
+def _require_quarters(cones: Any) -> None:
+    """Raise OptionError unless cones, as `flatten` takes them, all have curvatures that are multiples of pi/2."""
+    parsed = WordOrVertices((), "cone").parse("cones", cones)
+    for vertex, curvature in parsed.items() if isinstance(parsed, dict) else ():
+        quarters = np.nan if curvature is None else curvature / (np.pi / 2)
+        if not abs(quarters - np.rint(quarters)) <= QUARTER:
+            raise OptionError(
+                f"cones of a grid have curvatures that are multiples of pi/2; that of vertex {vertex} is "
+                f"{'not given' if curvature is None else f'{curvature:g}'}"
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ..geometry.charts import point_vertices
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from .transitions import Transitions
 
@@ -34,8 +35,7 @@ def paths_to_sides(
     sides = transitions.sides
     if not len(sides.axis):
         return []
-    vertex = np.zeros(len(points), dtype=np.int64)
-    vertex[corners.ravel()] = mesh.faces.ravel()
+    vertex = point_vertices(mesh.faces, corners, len(points))
     # What lies on sides has the number of one, cones have their own.
     label = np.full(len(mesh.vertices), -1)
     label[cones] = len(sides.axis) + np.arange(len(cones))

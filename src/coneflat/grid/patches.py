@@ -14,7 +14,7 @@ from ..cones.sparse import ConeSearch
 from ..errors import CurvatureError
 from ..flat.exact.boundary import straight_boundary
 from ..flat.exact.flatten import ExactChoices, exact_flattening
-from ..geometry.planar import signed_double_areas
+from ..geometry.planar import as_complex, signed_double_areas
 from ..geometry.ties import tie_key
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from ..options import Options
@@ -67,7 +67,7 @@ def flatten_patch(
     seams = find_seams(mesh, solution.cones, costs)
     laid_out = metric.lay_out(cut_open(mesh, seams).mesh, seams)
     turned = np.flatnonzero(signed_double_areas(laid_out.points[laid_out.corners]) <= 0)
-    points = laid_out.points[:, 0] + 1j * laid_out.points[:, 1]
+    points = as_complex(laid_out.points)
     points = points * np.exp(-1j * _side_angle(mesh, laid_out.corners, points))
     return FlatPatch(points, laid_out.corners, solution.cones, turned)
 

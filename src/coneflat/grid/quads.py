@@ -9,6 +9,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ..errors import OptionError
+from ..options.quads import ROUNDS
 from ..progress import Stages
 from ..text import plural
 from .extract import extract_quads
@@ -18,9 +19,6 @@ from .jacobians import least_jacobians
 from .quad_mesh import QuadMesh
 from .smooth import smooth_quads
 from .untangle import untangled
-
-# Rounds of smoothing by default: more change little.
-ROUNDS = 10
 
 
 def quads(

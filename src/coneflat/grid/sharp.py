@@ -15,7 +15,7 @@ import numpy as np
 from .._arrays import ComplexArray, FloatArray, IntArray
 from ..errors import CurvatureError, GridError, MetricError, OptionError, SeamError
 from ..geometry import double_areas
-from ..geometry.planar import signed_double_areas
+from ..geometry.planar import as_complex, as_pairs, signed_double_areas
 from ..layout.relax import Lines, PointConstraints, StretchEnergy, relax
 from ..layout.relax.seam_chains import SeamChains, find_chains
 from ..options import Options
@@ -106,20 +106,18 @@ def glued(opened: Opened, lengths: FloatArray, loose: Loose) -> Loose:
     mesh, whole = opened.mesh, np.concatenate([loose.cones, opened.nodes])
     chains = find_chains(mesh, loose.corners, loose.points, whole, quarter_turns=True)
     sides = all_sides(opened, loose.corners, loose.points, chains)
-    is_upright = sides.axis == 0
-    directions = np.stack([~is_upright, is_upright], axis=1).astype(np.float64)
     offsets = np.full(len(sides.axis), np.nan)
     constraints = PointConstraints(
-        lines=Lines(sides.points, sides.side, directions, offsets) if len(offsets) else None,
+        lines=Lines(sides.points, sides.side, sides.directions, offsets) if len(offsets) else None,
         quarter_turns=True,
         nodes=whole,
     )
-    points, energy = np.stack([loose.points.real, loose.points.imag], axis=1), StretchEnergy(STRETCH)
+    points, energy = as_pairs(loose.points), StretchEnergy(STRETCH)
     try:
         found = relax(mesh, points, loose.corners, energy, constraints, lengths=lengths, steps=STEPS)
     except OptionError as error:
         raise GridError(f"sides and seams cannot all lie along the axes: {error}") from error
-    return replace(loose, points=found.points[:, 0] + 1j * found.points[:, 1])
+    return replace(loose, points=as_complex(found.points))
 
 
 def all_sides(opened: Opened, corners: IntArray, points: ComplexArray, chains: SeamChains) -> Sides:
@@ -166,7 +164,7 @@ def sharp_layout(
     whole = np.concatenate([loose.cones, opened.nodes])
     chains = find_chains(mesh, corners, loose.points, whole)
     points, of_point = joined_charts(corners, loose.points, chains)
-    flat = float(signed_double_areas(np.stack([points.real, points.imag], axis=1)[corners]).sum())
+    flat = float(signed_double_areas(as_pairs(points)[corners]).sum())
     points = points * np.sqrt(float(double_areas(lengths).sum()) / flat) / size
     chains = find_chains(mesh, corners, points, whole)
     sides = all_sides(opened, corners, points, chains)

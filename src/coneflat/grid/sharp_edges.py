@@ -21,7 +21,7 @@ from ..text import list_some, plural
 from ..threads import using_threads
 from .aligned import Layout
 from .bisect import split_faces, split_for_features
-from .features import border_of, dangling, opened, patches_of, sharp_edges, without_stubs
+from .features import border_of, dangling, lengths_along, opened, patches_of, sharp_edges, without_stubs
 from .sharp import CoarseError, PatchError, sharp_layout
 
 # What may be asked of the cones inside patches, and of the input; the rest is as grids of whole surfaces want it.
@@ -146,7 +146,7 @@ class _Search:
         tell: Callable[[int, int, int], None],
     ) -> None:
         self.square, self.options, self._tell = square, options, tell
-        self.lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges[sharp]], axis=1)[:, 0], axis=1)
+        self.lengths = lengths_along(mesh, sharp)
         kept = without_stubs(mesh, sharp, LASTING * square)
         finer = split_for_features(mesh.vertices, mesh.faces, mesh.edges[sharp[kept]], np.sqrt(area) / ACROSS)
         self.mesh, self.edges = finer[0], finer[1]

@@ -34,6 +34,18 @@ class Sides:
     side: IntArray = field(default_factory=_none)
     axis: IntArray = field(default_factory=_none)
 
+    @property
+    def directions(self) -> FloatArray:
+        """(l, 2) of the sides, along the axes."""
+        return np.eye(2)[1 - self.axis]
+
+
+def quarters_around(mesh: TriangleMesh, sides: ComplexArray) -> IntArray:
+    """Return (n,) the angle around each vertex in quarter turns, rounded; sides: (m, 3) of triangles in the plane."""
+    angles = signed_angles(sides)
+    sums = np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
+    return np.rint(sums / (np.pi / 2)).astype(np.int64)
+
 
 def side_angles(
     mesh: TriangleMesh, corners: IntArray, points: ComplexArray, component: IntArray
@@ -74,7 +86,6 @@ def find_sides(mesh: TriangleMesh, corners: IntArray, points: ComplexArray, is_s
     axis[side] = 1 - quarter % 2
     both = np.unique(np.stack([np.concatenate([starts, ends]), np.tile(side, 2)], axis=1), axis=0)
     z = points[corners]
-    angles = signed_angles(z[:, PREVIOUS] - z[:, NEXT])
-    sums = np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
+    quarters = quarters_around(mesh, z[:, PREVIOUS] - z[:, NEXT])
     at = np.unique(np.concatenate([mesh.tails[border], mesh.heads[border]]))
-    return Sides(at[np.rint(sums[at] / (np.pi / 2)) != 2], both[:, 0], both[:, 1], axis)
+    return Sides(at[quarters[at] != 2], both[:, 0], both[:, 1], axis)

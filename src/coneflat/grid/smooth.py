@@ -11,6 +11,7 @@ from .._arrays import BoolArray, FloatArray, IntArray, dots
 from ..errors import OptionError
 from ..geometry.nearest import Stars, slide_near
 from ..mesh import NEXT
+from ..options.quads import ROUNDS
 from .bisect import edge_indices
 from .jacobians import least_jacobians
 from .quad_mesh import QuadMesh
@@ -22,7 +23,7 @@ LEAST = 0.5
 SHARP = np.deg2rad(40.0)
 
 
-def smooth_quads(quads: QuadMesh, rounds: int = 10, features: ArrayLike = ()) -> QuadMesh:
+def smooth_quads(quads: QuadMesh, rounds: int = ROUNDS, features: ArrayLike = ()) -> QuadMesh:
     """Return a quad mesh with squarer quads, whose vertices have moved on the surface.
 
     Each quad asks its corners to go to the nearest square (S. Bouaziz, M. Deuss, Y. Schwartzburg, T. Weise, M. Pauly,

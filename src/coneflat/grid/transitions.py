@@ -16,6 +16,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..errors import GridError
+from ..geometry.charts import point_vertices
 from ..layout.relax.seam_chains import SeamChains, find_chains
 from ..mesh import TriangleMesh, label_components, label_faces
 from .sides import Sides
@@ -107,8 +108,7 @@ class _Builder:
     ) -> None:
         self.sides = sides
         self.chains, self.quarters, self.points, self.cones = chains, quarters, points, cones
-        self.vertex = np.zeros(len(points), dtype=np.int64)
-        self.vertex[corners.ravel()] = mesh.faces.ravel()
+        self.vertex = point_vertices(mesh.faces, corners, len(points))
         self.base = np.arange(len(points))
         self.turn = np.zeros(len(points), dtype=np.int64)
         self.chain_count = len(quarters)

@@ -99,9 +99,10 @@ def edges_within(checked: CheckedMesh, vertices: Iterable[int], count: int) -> B
     """
     inside = np.zeros(count, dtype=bool)
     numbers = np.fromiter(vertices, dtype=np.int64)
-    for vertex in numbers[(numbers < 0) | (numbers >= count)]:
+    strange = numbers[(numbers < 0) | (numbers >= count)]
+    if len(strange):
         raise OptionError(
-            f"a seamless vertex, {vertex}, is no vertex: these are numbered from 0 to {count - 1}"
+            f"a seamless vertex, {strange[0]}, is no vertex: these are numbered from 0 to {count - 1}"
         )
     inside[numbers] = True
     ends: BoolArray = inside[checked.vertex_origin][checked.mesh.edges]

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..errors import MetricError
 from ..geometry import corner_angles, is_broken
+from ..geometry.planar import as_pairs
 from ..geometry.ties import argmax_tied, tie_key
 from ..mesh import NEXT, PREVIOUS, TriangleMesh
 from ..solver import HermitianFactor
@@ -100,7 +101,7 @@ def fit_shapes(disk: TriangleMesh, shapes: TriangleShapes, lengths: FloatArray) 
             f"the layout of {len(disk.faces)} triangles has no finite solution: "
             f"{int(shapes.is_broken.sum())} of them break the triangle inequality"
         )
-    return np.stack([points.real, points.imag], axis=1)
+    return as_pairs(points)
 
 
 def pinned_least_squares(equations: csr_matrix, pins: IntArray) -> ComplexArray:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray, as_faces
 from ..compiled import compiled
 from ..errors import ArrayShapeError
+from ..geometry.planar import as_pairs
 from ..geometry.straight import FlatTriangles
 
 # Iterations that spread the gaps; each costs as much as half a breadth-first search.
@@ -81,7 +82,7 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
         queue[0] = seed
         spread(*arrays, 1, reached, frame, placed, points)
     _close_gaps(flat.sides, corner, frame, points, pinned)
-    return np.stack([points.real, points.imag], axis=1)
+    return as_pairs(points)
 
 
 def _next(halfedges: IntArray) -> IntArray:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..progress import Progress
+from ..threads import THREADS
 from .kinds import (
     Choice,
     Count,
@@ -379,7 +380,7 @@ class RunOptions(InputOptions):
         "What solves the linear systems; auto is the fastest that is installed. amg iterates, for what fits no other.",
     )
     threads: int = option(
-        2,
+        THREADS,
         Whole(256),
         "Threads of PARDISO, which solves large systems; two stages at once at most are done by more than one. The "
         "last digits depend on it, so that it is the same on every machine unless told otherwise.",

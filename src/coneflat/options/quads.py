@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from .declared import ConeBounds, ConeNumber, RunOptions, option
 from .kinds import Choice, Count, Flag, Number, Strength, WordOrVertices
 
+#: Where nothing else is said: how many quads, and rounds of smoothing, of which more change little.
+QUADS, ROUNDS = 10_000, 10
+
 
 @dataclass(frozen=True, kw_only=True)
 class QuadOptions(RunOptions, ConeBounds, ConeNumber):
@@ -18,7 +21,7 @@ class QuadOptions(RunOptions, ConeBounds, ConeNumber):
     Symmetry is not here, as quantised cones are not mirror symmetric.
     """
 
-    quads: int | None = option(None, Count(), "About how many quads; 10,000 unless a size is given.")
+    quads: int | None = option(None, Count(), f"About how many quads; {QUADS:,} unless a size is given.")
     size: float | None = option(
         None, Number(optional=True, positive=True), "The length of their edges in model units, instead."
     )
@@ -28,7 +31,7 @@ class QuadOptions(RunOptions, ConeBounds, ConeNumber):
     stretch: float = option(
         0.0, Strength(1.0), "What quads are to be alike in: from angles, 0, to sizes as well, 1."
     )
-    smooth: int = option(10, Count(), "Rounds of smoothing on the surface; 0 for none.")
+    smooth: int = option(ROUNDS, Count(), "Rounds of smoothing on the surface; 0 for none.")
     sharp_angle: float | None = option(
         None,
         Number(is_angle=True, optional=True),

@@ -8,6 +8,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..geometry.intrinsic import halfedge_twins
+from ..kept import kept_with
 from ..mesh import TriangleMesh
 
 NOTHING = np.empty(0, dtype=np.int64)
@@ -89,10 +90,7 @@ class Slots:
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Slots:
         """Return the slots of a mesh, which are not sorted again."""
-        known: Slots | None = mesh.__dict__.get("_slots")
-        if known is None:
-            known = mesh.__dict__["_slots"] = cls._sorted(mesh)
-        return known
+        return kept_with(mesh, "_slots", lambda: cls._sorted(mesh))
 
     @classmethod
     def _sorted(cls, mesh: TriangleMesh) -> Slots:

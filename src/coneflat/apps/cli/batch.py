@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from ...options import Options, read_options
+from ...options.outputs import FORMATS
 from ...text import plural, printable
 from .options import check_combinations, flag_of, keywords, option_flags, paper_option
 from .shared import checking, input_options, measures_alone, require_option, verbosity_options
@@ -29,7 +30,7 @@ LONGEST = 3  # meshes that are named
 @click.option(
     "--format",
     "ending",
-    type=click.Choice(["obj", "ply", "glb", "npz"]),
+    type=click.Choice(FORMATS),
     default="obj",
     show_default=True,
     help="What to write.",

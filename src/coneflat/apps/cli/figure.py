@@ -9,6 +9,7 @@ import click
 from click.core import ParameterSource
 
 from ...errors import OptionError
+from ...options.quads import QUADS
 from .shared import Eye, again_option, checking, color_option, input_options, up_option, verbosity_options
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ _TAKEN_BY = {
 @click.option(
     "--most", type=int, default=30, show_default=True, help="Of the curve: the largest number of cones."
 )
-@click.option("--quads", type=int, help="Of quads: about how many.  [default: 10000]")
+@click.option("--quads", type=int, help=f"Of quads: about how many.  [default: {QUADS}]")
 @again_option
 @input_options
 @click.option("--title", default="", help="A line above all.")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...options import Options, declarations
+from ...options.outputs import FORMATS
 from .options import check_combinations, flag_of, is_given, keywords, option_flags, paper_option
 from .shared import checking, input_options, measures_alone, require_option, verbosity_options
 
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["obj", "ply", "glb", "npz"]),
+    type=click.Choice(FORMATS),
     help="Of standard output, and without -o: what to write.  [default: obj]",
 )
 @paper_option

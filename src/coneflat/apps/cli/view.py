@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from ...options.outputs import SHOWS
 from .shared import again_option, color_option, input_options, up_option, verbosity_options
 
 
@@ -23,7 +24,7 @@ from .shared import again_option, color_option, input_options, up_option, verbos
 )
 @click.option(
     "--show",
-    type=click.Choice(["checker", "picture", "charts", "qc", "area", "curvature", "flat", "plain"]),
+    type=click.Choice(SHOWS),
     help="What the page shows first.  [default: checker, or picture with --texture]",
 )
 @color_option

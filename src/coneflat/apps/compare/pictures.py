@@ -165,10 +165,10 @@ def figure_of(rows: Sequence[Row], *, marks_of: Flattening | None = None) -> Fig
     return compose(rows, marks=[] if marks_of is None else mark_handles(marks_of), dpi=DPI, width=WIDTH)
 
 
-def in_rows(panels: Sequence[Panel], quantities: Sequence[Quantity] = (), count: int = IN_A_ROW) -> list[Row]:
-    """Return panels in rows of so many."""
+def in_rows(panels: Sequence[Panel], quantities: Sequence[Quantity] = ()) -> list[Row]:
+    """Return panels in rows of `IN_A_ROW`."""
     wide = [with_room(panel, TALLEST) for panel in panels]
-    return [Row(wide[k : k + count], quantities, tallest=TALLEST) for k in range(0, len(wide), count)]
+    return [Row(wide[k : k + IN_A_ROW], quantities, tallest=TALLEST) for k in range(0, len(wide), IN_A_ROW)]
 
 
 def with_room(panel: Panel, height: float) -> Panel:

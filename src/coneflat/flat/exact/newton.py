@@ -271,31 +271,34 @@ def sum_angles(
 
 
 @compiled
-def has_no_weights(cots: FloatArray, h: int) -> bool:
+def _has_no_weights(cots: FloatArray, h: int) -> bool:
     """Return whether the triangle of a half-edge has no cotangents."""
     base = h - h % 3
     return bool(cots[base] == 0.0 and cots[base + 1] == 0.0 and cots[base + 2] == 0.0)
 
 
 @compiled
-def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
-    """Write a half-edge of each edge that may not be Delaunay; return their number.
+def may_be_flipped(cots: FloatArray, h: int, t: int) -> bool:
+    """Return whether the edge of two half-edges may not be Delaunay.
 
     Its cotangents sum to less than 0, or it is one of a triangle that has none, as its sides close to none.
     """
+    # The margin is the rounding of the cotangents; the test that decides on a flip has its own.
+    is_negative = cots[h] + cots[t] < -1e-13 * (abs(cots[h]) + abs(cots[t]))
+    return bool(
+        is_negative
+        or (cots[h] == 0.0 and _has_no_weights(cots, h))
+        or (cots[t] == 0.0 and _has_no_weights(cots, t))
+    )
+
+
+@compiled
+def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
+    """Write a half-edge of each edge that may not be Delaunay; return their number."""
     count = 0
     for h in range(len(twin)):
         t = twin[h]
-        if t <= h:
-            continue
-        total = cots[h] + cots[t]
-        # The margin is the rounding of the cotangents; the test that decides on a flip has its own.
-        is_negative = total < -1e-13 * (abs(cots[h]) + abs(cots[t]))
-        if (
-            is_negative
-            or (cots[h] == 0.0 and has_no_weights(cots, h))
-            or (cots[t] == 0.0 and has_no_weights(cots, t))
-        ):
+        if t > h and may_be_flipped(cots, h, t):
             found[count] = h
             count += 1
     return count

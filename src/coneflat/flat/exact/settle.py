@@ -18,7 +18,7 @@ from ...compiled import compiled
 from ...errors import MetricError
 from ...solver import factorize
 from ...solver.newton import Limits, Point, minimise
-from .newton import add_angles, has_no_weights
+from .newton import add_angles, may_be_flipped
 
 if TYPE_CHECKING:
     from .newton import ConformalProblem, State
@@ -198,14 +198,7 @@ def find_suspects_among(twin: IntArray, cots: FloatArray, faces: IntArray) -> In
     for f in faces:
         for h in range(3 * f, 3 * f + 3):
             t = twin[h]
-            if t < 0:
-                continue
-            is_negative = cots[h] + cots[t] < -1e-13 * (abs(cots[h]) + abs(cots[t]))
-            if (
-                is_negative
-                or (cots[h] == 0.0 and has_no_weights(cots, h))
-                or (cots[t] == 0.0 and has_no_weights(cots, t))
-            ):
+            if t >= 0 and may_be_flipped(cots, h, t):
                 found[count] = h
                 count += 1
     return found[:count].copy()

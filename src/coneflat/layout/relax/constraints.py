@@ -98,22 +98,29 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
             f"{plural(len(tied), 'half-edge')} tied, but {plural(len(translations), 'translation')} for them"
         )
     nodes = np.asarray(constraints.nodes, dtype=np.int64).ravel()
-    lines = constraints.lines
+    on_line, line, directions, offsets = _checked_lines(constraints.lines, points)
+    return CheckedConstraints(
+        pinned,
+        places,
+        on_line,
+        line,
+        directions,
+        offsets,
+        held,
+        tied,
+        translations,
+        constraints.quarter_turns,
+        nodes,
+    )
+
+
+def _checked_lines(
+    lines: Lines | None, points: FloatArray
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Return points, the line of each, unit directions and offsets, as `CheckedConstraints` has them."""
     if lines is None:
         none = np.empty(0, dtype=np.int64)
-        return CheckedConstraints(
-            pinned,
-            places,
-            none,
-            none,
-            np.empty((0, 2)),
-            np.empty(0),
-            held,
-            tied,
-            translations,
-            constraints.quarter_turns,
-            nodes,
-        )
+        return none, none, np.empty((0, 2)), np.empty(0)
     on_line = _indices(lines.points, len(points), "points of lines")
     directions = _floats(lines.directions, "directions of lines").reshape(-1, 2)
     line = _indices(lines.line, len(directions), "line")
@@ -135,19 +142,7 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
             raise OptionError(
                 f"offsets of lines must be {plural(len(directions), 'number')}, or NaN, not of shape {offsets.shape}"
             )
-    return CheckedConstraints(
-        pinned,
-        places,
-        on_line,
-        line,
-        directions,
-        offsets,
-        held,
-        tied,
-        translations,
-        constraints.quarter_turns,
-        nodes,
-    )
+    return on_line, line, directions, offsets
 
 
 def _across(directions: FloatArray, places: FloatArray) -> FloatArray:

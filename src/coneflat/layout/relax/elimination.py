@@ -7,12 +7,12 @@ import scipy.linalg
 
 from ..._arrays import FloatArray
 
-# Relative size below which what is left of an equation that depends on others is rounding.
+# Relative size below which what elimination leaves of an equation is rounding.
 ROUNDING = 1e-10
 # Coefficients of an orthogonal basis below this are none; what is taken for none is missed by the sides of seams.
 TINY = 1e-15
-# Coefficients below this are rounding: those of quarter turns are whole.
-NONE = 1e-9
+# Coefficients below this are rounding where turns are quarter turns, and they are whole.
+NOT_WHOLE = 1e-9
 # Part of the largest coefficient of an equation that a pivot has at least.
 PIVOT = 0.5
 
@@ -37,7 +37,7 @@ def sparse_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, F
     is_open = np.ones(len(rows), dtype=bool)
     solved: list[tuple[int, int]] = []
     while True:
-        filled = np.abs(work[:, :count]) > NONE
+        filled = np.abs(work[:, :count]) > NOT_WHOLE
         sizes = np.where(is_open, filled.sum(axis=1), count + 1)
         sizes[is_open & (sizes == 0)] = count + 1
         row = int(np.argmin(sizes))
@@ -60,7 +60,7 @@ def sparse_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, F
     basis[free, np.arange(len(free))] = 1.0
     basis[pivots, :-1] = -work[np.ix_(at, free)]
     basis[pivots, -1] = work[at, count]
-    basis[np.abs(basis) < NONE * max(1.0, float(np.abs(basis).max(initial=0.0)))] = 0.0
+    basis[np.abs(basis) < NOT_WHOLE * max(1.0, float(np.abs(basis).max(initial=0.0)))] = 0.0
     return basis, work[is_open, count]
 
 

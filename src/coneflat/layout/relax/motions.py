@@ -8,6 +8,8 @@ import numpy as np
 
 from ..._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import OptionError
+from ...geometry.charts import point_vertices
+from ...geometry.planar import as_complex
 from ...mesh import TriangleMesh
 from .constraints import CheckedConstraints
 from .elimination import ROUNDING, orthogonal_solutions, sparse_solutions
@@ -85,8 +87,7 @@ def find_motions(
         SeamError: the sides of a seam are no rigid copies of each other.
         OptionError: the constraints contradict each other.
     """
-    vertex = np.zeros(len(points), dtype=np.int64)
-    vertex[corners.ravel()] = mesh.faces.ravel()
+    vertex = point_vertices(mesh.faces, corners, len(points))
     chains = constrained_chains(mesh, corners, points, vertex, constraints)
     return _Builder(points, vertex, is_free, chains, constraints).motions()
 
@@ -136,7 +137,7 @@ class _Builder:
         c = constraints
         self.ties = [
             self._tie(side, shift)
-            for side, shift in zip(c.tied.tolist(), self._complex(c.translations).tolist(), strict=True)
+            for side, shift in zip(c.tied.tolist(), as_complex(c.translations).tolist(), strict=True)
         ]
 
     def at(self, points: ComplexArray) -> _Builder:
@@ -257,7 +258,7 @@ class _Builder:
         order = np.argsort(c.on_line, kind="stable")
         at = order[np.searchsorted(c.on_line[order], left)]
         line = c.line[at]
-        direction = self._complex(c.directions)[line]
+        direction = as_complex(c.directions)[line]
         normal = 1j * direction
         off = normal * self._off_line(left, line)
         shifts = self.of_line[line] >= 0
@@ -285,11 +286,11 @@ class _Builder:
         """Let points move to their places or along their lines, if they are among `rest` (u,), and take them out."""
         c = self.constraints
         pins = np.flatnonzero(rest[c.pinned])
-        self._add_offset(c.pinned[pins], self._complex(c.places[pins]) - self.points[c.pinned[pins]])
+        self._add_offset(c.pinned[pins], as_complex(c.places[pins]) - self.points[c.pinned[pins]])
         rest[c.pinned] = False
         on = np.flatnonzero(rest[c.on_line])
         points, line = c.on_line[on], c.line[on]
-        direction = self._complex(c.directions)[line]
+        direction = as_complex(c.directions)[line]
         self._add_unknowns(points, direction, self.count + np.arange(len(points)))
         self.count += len(points)
         normal = 1j * direction
@@ -301,13 +302,13 @@ class _Builder:
     def _off_line(self, points: IntArray, line: IntArray) -> FloatArray:
         """Return (q,) by how much each point has to go to the left to its line; a loose one is where its first is."""
         c = self.constraints
-        across = (np.conj(1j * self._complex(c.directions)[c.line]) * self.points[c.on_line]).real
+        across = (np.conj(1j * as_complex(c.directions)[c.line]) * self.points[c.on_line]).real
         at = c.offsets.copy()
         lines, first = np.unique(c.line, return_index=True)
         loose = np.isnan(at[lines])
         at[lines[loose]] = across[first[loose]]
         here: FloatArray = (
-            at[line] - (np.conj(1j * self._complex(c.directions)[line]) * self.points[points]).real
+            at[line] - (np.conj(1j * as_complex(c.directions)[line]) * self.points[points]).real
         )
         return here
 
@@ -342,7 +343,7 @@ class _Builder:
             rows.extend(both)
             right.extend([value.real, value.imag])
 
-        for point, place in zip(c.pinned.tolist(), self._complex(c.places).tolist(), strict=True):
+        for point, place in zip(c.pinned.tolist(), as_complex(c.places).tolist(), strict=True):
             if self.of_point[point] >= 0:
                 add([(int(self.of_point[point]), 1.0 + 0.0j)], place - complex(self.points[point]))
         for chain, value in self.ties:
@@ -393,8 +394,3 @@ class _Builder:
         turn = complex(chains.rotation[chain])
         wanted = shift if is_right else -turn * shift
         return chain, wanted - complex(self.translation[chain])
-
-    @staticmethod
-    def _complex(places: FloatArray) -> ComplexArray:
-        joined: ComplexArray = places[:, 0] + 1j * places[:, 1]
-        return joined

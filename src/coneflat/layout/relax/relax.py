@@ -12,7 +12,7 @@ from ..._arrays import BoolArray, ComplexArray, FloatArray, as_faces, as_floats,
 from ...errors import ArrayShapeError, ConvergenceError, OptionError
 from ...geometry import double_areas, edge_lengths
 from ...geometry.lengths import check_lengths
-from ...geometry.planar import signed_double_areas
+from ...geometry.planar import as_complex, as_pairs, signed_double_areas
 from ...geometry.straight import place_triangles
 from ...mesh import TriangleMesh
 from ...text import plural
@@ -117,7 +117,7 @@ def relax(
     if not is_free.any():
         return Relaxed(places, 0.0, 0.0, 0, is_free)
     unit = float(np.sqrt(np.abs(doubled).sum() / (2 * areas.sum())))
-    z = places[:, 0] + 1j * places[:, 1]
+    z = as_complex(places)
     motions = find_motions(mesh, corner, z, is_free, checked)
     elements = Elements(motions, corner, unit * rest, share)
     if not elements.count and not motions.has_offset:
@@ -130,8 +130,7 @@ def relax(
             f"in {plural(found.steps, 'step')}"
         )
     total = float(elements.weight.sum())
-    closed = motions.closed(found.points)
-    moved = np.stack([closed.real, closed.imag], axis=1)
+    moved = as_pairs(motions.closed(found.points))
     return Relaxed(moved, found.before / total, found.after / total, found.steps, is_free)
 
 

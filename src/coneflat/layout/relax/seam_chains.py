@@ -48,7 +48,7 @@ def find_chains(
     mesh: TriangleMesh,
     corners: IntArray,
     points: ComplexArray,
-    nodes: IntArray | None = None,
+    nodes: IntArray,
     *,
     quarter_turns: bool = False,
 ) -> SeamChains:
@@ -75,23 +75,11 @@ def find_chains(
     turns /= np.abs(turns)
     if quarter_turns:
         turns = _nearest_quarter(turns)
-
-    count = len(edges)
     is_node = np.bincount(vertices.ravel(), minlength=len(mesh.vertices)) != 2
     is_node |= mesh.is_boundary_vertex
-    if nodes is not None:
-        is_node[nodes] = True
+    is_node[nodes] = True
     is_node[_turning(vertices, sides, turns, is_node)] = True
-    # Sides of edges, numbered from 0 on the one hand and from `count` on the other, that meet at a point.
-    point = sides.reshape(-1, 2).ravel()
-    side = np.arange(2 * count).repeat(2)
-    regular = ~is_node[np.concatenate([vertices, vertices]).ravel()]
-    point, side = point[regular], side[regular]
-    order = np.argsort(point, kind="stable")
-    point, side = point[order], side[order]
-    meet = np.flatnonzero(point[1:] == point[:-1])
-    _, label = label_components(2 * count, side[meet], side[meet + 1])
-    first, second = label[:count], label[count:]
+    first, second = _strands(vertices, sides, is_node)
     swapped = second < first
     left = np.where(swapped[:, None], sides[1], sides[0])
     right = np.where(swapped[:, None], sides[0], sides[1])
@@ -126,6 +114,21 @@ def constrained_chains(
     return find_chains(
         mesh, corners, points, np.concatenate([nodes, vertex[on]]), quarter_turns=c.quarter_turns
     )
+
+
+def _strands(vertices: IntArray, sides: IntArray, is_node: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return (k,) the number of what each edge's first side belongs to, and its second: sides that meet at no node."""
+    count = len(vertices)
+    # Numbered from 0 on the one hand and from `count` on the other.
+    point = sides.reshape(-1, 2).ravel()
+    side = np.arange(2 * count).repeat(2)
+    regular = ~is_node[np.concatenate([vertices, vertices]).ravel()]
+    point, side = point[regular], side[regular]
+    order = np.argsort(point, kind="stable")
+    point, side = point[order], side[order]
+    meet = np.flatnonzero(point[1:] == point[:-1])
+    _, label = label_components(2 * count, side[meet], side[meet + 1])
+    return label[:count], label[count:]
 
 
 def _nearest_quarter(turns: ComplexArray) -> ComplexArray:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from ...errors import OptionError
-from ...files.atomic import as_path, atomic_write, check_target, known_ending
+from ...files.atomic import atomic_write, checked_target
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,10 +52,7 @@ def check_figure_target(path: str | PathLike[str]) -> Path:
         UnknownFormatError: the ending is not one of `FIGURE_FORMATS`.
         MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
     """
-    path = as_path(path)
-    known_ending(path, FIGURE_FORMATS, "figures are written as")
-    check_target(path)
-    return path
+    return checked_target(path, FIGURE_FORMATS, "figures are written as")
 
 
 def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
@@ -65,10 +62,10 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
         UnknownFormatError: the ending is none of these.
         MeshFileError: the file cannot be written.
     """
-    ending = known_ending(check_figure_target(path), FIGURE_FORMATS, "figures are written as")
-    with atomic_write(path, "wb") as stream:
-        write_figure(figure, stream, ending)
-    return as_path(path)
+    path = check_figure_target(path)
+    with atomic_write(path) as stream:
+        write_figure(figure, stream, path.suffix.lower())
+    return path
 
 
 def write_figure(figure: Figure, stream: IO[bytes], ending: str) -> None:

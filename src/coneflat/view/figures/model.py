@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..._arrays import FloatArray, IntArray
 from ...errors import OptionError
 from ...quality.checker import CELLS, cell_side
 from ..quantity import Quantity, conformal_distortion, curvature, stretch
@@ -143,8 +144,14 @@ def draw_quantity(
 
 
 def _show(axes: Axes, result: Flattening, eye: Eye, up: str, dpi: float, **paint: Any) -> MeshPicture:
-    """Show a picture of the model so that the axes' coordinates are its pixels, row 0 at the top."""
-    picture = render_mesh(result.vertices, result.faces, size=pixels_of(axes, dpi), eye=eye, up=up, **paint)
+    return show_mesh(axes, result.vertices, result.faces, eye, up, dpi, **paint)
+
+
+def show_mesh(
+    axes: Axes, vertices: FloatArray, faces: IntArray, eye: Eye, up: str, dpi: float, **paint: Any
+) -> MeshPicture:
+    """Show a picture of a mesh so that the axes' coordinates are its pixels, row 0 at the top; see `render_mesh`."""
+    picture = render_mesh(vertices, faces, size=pixels_of(axes, dpi), eye=eye, up=up, **paint)
     extent = (0, picture.camera.width, picture.camera.height, 0)
     axes.imshow(picture.image, extent=extent, interpolation="antialiased")
     axes.set_axis_off()

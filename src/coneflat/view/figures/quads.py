@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .camera import Eye
-from .cone_marks import DOT_REACH, mark_scale, pixels_of
-from .projection import render_mesh
+from .cone_marks import DOT_REACH, mark_scale
+from .model import DOTS_PER_INCH, show_mesh
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ...grid import QuadMesh
 
-DOTS_PER_INCH = 300.0
 EDGE_COLOR = "#30343b"
 #: Points that edges are wide, and the share of their length where they are short.
 EDGE_WIDTH, EDGE_SHARE = 0.45, 0.07
@@ -39,10 +38,8 @@ def draw_quads(
     Args:
         quads: the mesh.
         axes: matplotlib axes to draw in; their own lines and ticks are turned off.
-        eye: direction from the model to the eye, as of `draw_checker`.
-        up: the model's upward axis, "x", "y" or "z".
         irregular: draw the dots.
-        dpi: resolution of the picture.
+        eye, up, dpi: as of `draw_checker`.
 
     Raises:
         OptionError: an option makes no sense.
@@ -50,12 +47,8 @@ def draw_quads(
     from matplotlib.collections import LineCollection
 
     colors = np.broadcast_to(np.array(FACE_COLOR), quads.triangles.shape)
-    picture = render_mesh(
-        quads.vertices, quads.triangles, size=pixels_of(axes, dpi), eye=eye, up=up, colors=colors
-    )
+    picture = show_mesh(axes, quads.vertices, quads.triangles, eye, up, dpi, colors=colors)
     camera = picture.camera
-    axes.imshow(picture.image, extent=(0, camera.width, camera.height, 0), interpolation="antialiased")
-    axes.set_axis_off()
     ends = quads.vertices[quads.edges]
     pieces, visible = picture.split_segments(ends[:, 0], ends[:, 1])
     length = float(np.median(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1))) * camera.scale * 72.0 / dpi

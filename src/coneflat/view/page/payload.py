@@ -55,21 +55,8 @@ class Told:
     squares: float = CELLS
 
 
-def payload_of(
-    result: Flattening,
-    content: Content,
-    picture: Texture | None,
-    name: str,
-    up: str,
-    show: str,
-    told: Told | None = None,
-) -> Payload:
-    """Return the data of a page; told: what is said, by default that of a flattening.
-
-    Raises:
-        OptionError: `up` names no axis.
-    """
-    head, block = head_and_block(result, content, picture, name, up, show, told)
+def as_payload(head: dict[str, Any], block: bytes) -> Payload:
+    """Return what `head_and_block` returns as it goes into a page."""
     return Payload(_safe_json(head), base64.b64encode(zlib.compress(block, COMPRESSION)).decode("ascii"))
 
 
@@ -82,7 +69,13 @@ def head_and_block(
     show: str,
     told: Told | None = None,
 ) -> tuple[dict[str, Any], bytes]:
-    """Return the numbers and texts of a page, and its arrays as they lie in memory; see `payload_of`."""
+    """Return the numbers and texts of a page, and its arrays as they lie in memory.
+
+    told: what is said, by default that of a flattening.
+
+    Raises:
+        OptionError: `up` names no axis.
+    """
     if told is None:
         told = Told(title(replace(result, source=None)), shown_rows(result))
     low, high = content.uv.min(axis=0), content.uv.max(axis=0)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...grid.domains import arranged, find_domains
+from ...grid.domains import Domains, arranged, find_domains
 from ...grid.quality import measure_quads
 from ...result.from_uv import flattening_of
 from ...result.mapped import Mapped
@@ -26,8 +26,8 @@ def page_of_quads(quads: QuadMesh, *, name: str = "Quads", show: str | None = No
     Triangles are halves of quads. Charts, which it shows first, are the rectangles of `find_domains`, laid out apart,
     and seams their borders. Irregular vertices are cones: red where fewer than four quads meet, black where more do.
     """
-    result = as_flattening(quads)
-    charts = len(find_domains(quads).sides)
+    domains = find_domains(quads)
+    result, charts = as_flattening(quads, domains), len(domains.sides)
     told = Told(
         title="  ·  ".join(
             (
@@ -49,9 +49,9 @@ def page_of_quads(quads: QuadMesh, *, name: str = "Quads", show: str | None = No
     return page_of(result, name=name, show=show, told=told, **look)
 
 
-def as_flattening(quads: QuadMesh) -> Flattening:
+def as_flattening(quads: QuadMesh, domains: Domains) -> Flattening:
     """Return the triangles of quads with UVs in which all are squares of one size, in rectangles that lie apart."""
-    places, side = arranged(find_domains(quads))
+    places, side = arranged(domains)
     corner_uv = places.reshape(-1, 2)[quads.triangle_corners] / side
     result = flattening_of(Mapped(quads.vertices, quads.triangles, corner_uv, len(quads.quads), 0, 0))
     irregular = quads.irregular

@@ -16,19 +16,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import OptionError
-from ...files.atomic import as_path, atomic_write, check_target, known_ending
+from ...files.atomic import atomic_write, checked_target
 from ...files.texture import read_picture
+from ...options.outputs import SHOWS
 from ...text import shown
 from ..own import own_quantity
 from ..quantity import Quantity
 from .content import content_of
-from .payload import Told, payload_of
+from .payload import Told, as_payload, head_and_block
 
 if TYPE_CHECKING:
     from ...result.flattening import Flattening
-
-SHOWS = ("checker", "picture", "charts", "qc", "area", "curvature", "flat", "plain")
-"""What a page can show first."""
 
 MOST_TRIANGLES = 500_000
 """On a page; larger meshes are thinned for display, or the browser would turn them haltingly."""
@@ -89,7 +87,7 @@ def page_of(
     content = content_of(result, most_triangles, own=own)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
-    payload = payload_of(result, content, picture, name, up, show, told)
+    payload = as_payload(*head_and_block(result, content, picture, name, up, show, told))
     before_head, after_head, after_arrays = _template()
     return "".join((before_head, payload.head, after_head, payload.arrays, after_arrays))
 
@@ -101,10 +99,7 @@ def check_page(path: str | PathLike[str]) -> Path:
         UnknownFormatError: it does not end with .html or .htm.
         MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
     """
-    path = as_path(path)
-    known_ending(path, ENDINGS, "pages are written as")
-    check_target(path)
-    return path
+    return checked_target(path, ENDINGS, "pages are written as")
 
 
 def write_page(page: str, path: str | PathLike[str] | None) -> Path:
