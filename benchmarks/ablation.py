@@ -60,7 +60,6 @@ def variants() -> dict[str, list[Patch]]:
         (linear_model, "VERTICES_PER_UNKNOWN", (8, 15, 30)),
         (linear_model, "LEAST_SIZE", (200, 400, 800)),
         (linear_model, "MOST_SIZE", (600, 2000)),
-        (linear_model, "ENOUGH", (600, 1200)),
         (aggregation, "WEAK", (0.0,)),
         (aggregation, "LARGEST_AGGREGATE", (4.0, 12.0)),
         (aggregation, "TRIES", (0,)),
@@ -104,7 +103,7 @@ def patched(patches: list[Patch]) -> Iterator[None]:
             setattr(owner, name, value)
 
 
-OPENING = ("VERTICES", "LEAST_SIZE", "MOST_SIZE", "ENOUGH", "WEAK", "LARGEST_AGGREGATE", "TRIES")
+OPENING = ("VERTICES", "LEAST_SIZE", "MOST_SIZE", "WEAK", "LARGEST_AGGREGATE", "TRIES")
 
 
 def main() -> None:

@@ -14,16 +14,8 @@ from .coarse_model import CoarseModel, coarse_model
 from .green import GreenOperator
 
 # Unknowns of the coarse model: one for so many vertices, within bounds that keep its dense inverse cheaper than the
-# factorization of the mesh's own Laplacian; from ENOUGH of them on one for more vertices. Of 24 searches on 10,000 to
-# 17,000 vertices that left the number of cones as it was in 21, took one less in 2, one more in 1, and 16% less time.
+# factorization of the mesh's own Laplacian.
 VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 12, 600, 1200
-ENOUGH, PER_UNKNOWN_THEN = 720, 20
-
-
-def coarse_size(count: int) -> int:
-    """Return about how many unknowns the coarse model of a mesh of so many vertices has."""
-    few = min(max(count // VERTICES_PER_UNKNOWN, LEAST_SIZE), ENOUGH)
-    return min(max(few, count // PER_UNKNOWN_THEN), MOST_SIZE)
 
 
 class LinearModel:
@@ -87,7 +79,8 @@ class LinearModel:
     def coarse(self) -> CoarseModel:
         """The kernel of E on a coarse basis."""
         operator = self.operator
-        modelled = partial(coarse_model, operator, self.inner, coarse_size(len(operator.vertices)))
+        size = min(max(len(operator.vertices) // VERTICES_PER_UNKNOWN, LEAST_SIZE), MOST_SIZE)
+        modelled = partial(coarse_model, operator, self.inner, size)
         with meanwhile(modelled, 2 * len(operator.vertices)) as modelling:
             constant = float(self.log_scale @ operator.weighted(self.log_scale))
             return modelling.result().scaled_to(constant)
