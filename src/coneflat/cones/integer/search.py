@@ -95,8 +95,10 @@ def quantise_cones(
         if not near or not polish(search, lattice, exact, size) <= goal:
             break
     found = exact.best.fewest(goal)
-    solution = search.solution_of(search.exact.unknowns[found.members], lattice.curvatures(found))
-    return QuantisedCones(solution, found.indices, lattice.quanta.quantum, math.sqrt(found.energy))
+    order = search.exact.in_order(found.members)
+    places = search.exact.unknowns[found.members[order]]
+    solution = search.solution_of(places, lattice.curvatures(found)[order])
+    return QuantisedCones(solution, found.indices[order], lattice.quanta.quantum, math.sqrt(found.energy))
 
 
 def open_lattice(search: ConeSearch, quantum: float) -> Lattice:

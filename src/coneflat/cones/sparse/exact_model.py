@@ -65,6 +65,14 @@ class ExactModel(DenseModel):
         order = np.argsort(self.unknowns, kind="stable")
         return order[np.searchsorted(self.unknowns, unknowns, sorter=order)]
 
+    def in_order(self, members: IntArray) -> IntArray:
+        """Return the order (s,) of members in which cones are given out: the required ones, and then by unknown.
+
+        In which order they were found depends on rounding.
+        """
+        required = len(self.fixed)
+        return np.append(np.arange(required), required + np.argsort(self.unknowns[members[required:]]))
+
     def _room(self, count: int) -> FloatArray:
         """Return (count, f) room for sources, the same each time."""
         if len(self._sources) < count:

@@ -338,13 +338,9 @@ class ConeSearch:
         return exact.best.energy(count)
 
     def _cones(self, found: ConeSet) -> SparseCones:
-        """Return the cones of a set on the mesh, those of no curvature left out unless they are required.
-
-        After the required ones, they come in the order of the search's vertices, not in that in which they were found.
-        """
+        """Return the cones of a set on the mesh, those of no curvature left out unless they are required."""
         unknowns, required = self.exact.unknowns, len(self._required)
-        free = found.members[required:]
-        members = np.concatenate([found.members[:required], free[np.argsort(unknowns[free])]])
+        members = found.members[self.exact.in_order(found.members)]
         curvatures = self.exact.fit(members).curvatures
         keep = np.abs(curvatures) > 1e-9
         keep[:required] = True
