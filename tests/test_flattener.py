@@ -148,7 +148,8 @@ def test_what_is_given_up_leaves_nothing_behind(how):
     assert interrupted > 4
 
 
-def test_green_functions_kept_are_those_found_anew(monkeypatch):
+@pytest.mark.parametrize("bound", ["KEPT", "MOST_KEPT"])
+def test_green_functions_kept_are_those_found_anew(monkeypatch, bound):
     vertices, faces = wavy()
     laplacian = cotangent_laplacian(faces, cotangents(edge_lengths(vertices, faces)), len(vertices))
     areas = np.full(len(vertices), 1 / len(vertices))
@@ -156,7 +157,7 @@ def test_green_functions_kept_are_those_found_anew(monkeypatch):
     def operator():
         return GreenOperator(laplacian, areas, np.zeros(len(vertices), dtype=bool), np.arange(len(vertices)))
 
-    monkeypatch.setattr(green, "KEPT", 10 * len(vertices))
+    monkeypatch.setattr(green, bound, 10 * len(vertices) if bound == "KEPT" else 10)
     kept, rng = operator(), np.random.default_rng(1)
     for size in (1, 7, SIDE_BY_SIDE, 12, 3, 2, 9):
         unknowns = rng.choice(30, size, replace=False)

@@ -1,5 +1,7 @@
 """Every back end against dense linear algebra, and the ladder."""
 
+import ctypes
+
 import numpy as np
 import pytest
 import shapes
@@ -198,6 +200,34 @@ def test_a_factor_stays_on_the_threads_that_it_was_made_on(matrix, monkeypatch):
         factor.solve(np.ones(matrix.shape[0]))
     assert set(used) == {3}
     assert len(used) > 3
+
+
+class Heap(ctypes.Structure):
+    """What the C library tells of its memory."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_size_t)
+        for name in ("arena", "free_chunks", "fast", "maps", "mapped", "_", "__", "in_use", "free", "top")
+    )
+
+
+@pytest.mark.skipif(not available("pardiso"), reason="needs pypardiso")
+def test_another_pattern_leaves_no_memory_behind(matrix):
+    try:
+        tell = ctypes.CDLL("libc.so.6").mallinfo2
+    except (OSError, AttributeError):
+        pytest.skip("needs the C library of GNU to tell how much memory is used")
+    tell.restype = Heap
+    right, found = np.ones(matrix.shape[0]), []
+    with solving("pardiso"):
+        kept = factorize(matrix)
+        for _ in range(60):
+            # Another array of indices may be of another pattern.
+            kept = kept.renewed(matrix.copy())
+            found.append(tell().in_use + tell().mapped)
+        np.testing.assert_array_equal(kept.solve(right), factorize(matrix).solve(right))
+    # An analysis takes more than the matrix does.
+    assert max(found[10:]) - found[10] < 5 * matrix.data.nbytes
 
 
 def test_with_one_thread_nothing_is_done_meanwhile():

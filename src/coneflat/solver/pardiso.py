@@ -98,6 +98,9 @@ class PardisoFactor:
     def renewed(self, matrix: csc_matrix) -> PardisoFactor:
         """Return the factor of another matrix of the same size."""
         if matrix.indices is not self._indices:
+            # A second analysis by one handle would leave the memory of the first behind.
+            _release(self._kind, self._threads, self._handle, self._table, matrix.shape[0])
+            self._handle[:] = 0
             self._set_pattern(matrix)
         self._fill(matrix)
         return self

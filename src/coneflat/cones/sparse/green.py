@@ -19,9 +19,12 @@ from ...solver import Factor, aligned, factorize, used_again
 
 # Right-hand sides solved at once: more gain nothing and cost memory, of which they take so many numbers at most.
 BATCH, NUMBERS = 32, 50_000_000
-# The last Green's functions of cones that the user places are kept, in so many numbers at most. So many are solved for
-# at a time, whatever is wanted: on their number the last digits depend, and what was kept must be what would be found.
-KEPT, SIDE_BY_SIDE = 8_000_000, 4
+# The last Green's functions of cones that the user places are kept, in so many numbers at most, and so many of them:
+# cones seldom come back to where they were before the last hundreds of moves.
+KEPT, MOST_KEPT = 8_000_000, 256
+# So many are solved for at a time, whatever is wanted: on their number the last digits depend, and what was kept must
+# be what would be found.
+SIDE_BY_SIDE = 4
 
 
 class GreenOperator:
@@ -128,7 +131,8 @@ class GreenOperator:
             # Taken out and put back, so that the first is the one that was used longest ago.
             known[unknown] = known.pop(unknown)
         rows = np.array([known[unknown] for unknown in wanted]).reshape(len(wanted), len(self.vertices))
-        for unknown in list(known)[: max(0, len(known) - max(1, KEPT // len(self.vertices)))]:
+        room = min(max(1, KEPT // len(self.vertices)), MOST_KEPT)
+        for unknown in list(known)[: max(0, len(known) - room)]:
             del known[unknown]
         return rows
 
