@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -117,3 +118,21 @@ def visit(browser, studio):
     opened = StudioVisit(browser, studio)
     yield opened
     opened.close()
+
+
+@pytest.fixture
+def open_page(browser):
+    """A function that serves a mesh in its folder, and returns its settled page; both are closed at the end."""
+    with ExitStack() as stack:
+
+        def opening(mesh, **options):
+            served = Studio(mesh.parent, **options)
+            stack.callback(served.close)
+            served.session.open(mesh)
+            assert served.session.wait_until_idle(PATIENCE / 1000)
+            opened = StudioVisit(browser, served)
+            stack.callback(opened.close)
+            opened.settle()
+            return opened
+
+        yield opening

@@ -1,4 +1,5 @@
 """The studio of a mesh of which the page draws fewer triangles than it has: it is painted all the same."""
+# ruff: noqa: F811  (fixtures that are imported)
 
 from __future__ import annotations
 
@@ -7,8 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapes
-from browsing import PATIENCE
-from studio_browsing import Studio, StudioVisit
+from studio_browsing import open_page  # noqa: F401
 
 import coneflat
 from coneflat.apps.studio.child import Bench, with_whole
@@ -28,15 +28,8 @@ def ball(tmp_path):
 
 
 @pytest.fixture
-def thinned(browser, tmp_path, ball):
-    served = Studio(tmp_path, most_triangles=SHOWN)
-    served.session.open(ball)
-    assert served.session.wait_until_idle(PATIENCE / 1000)
-    opened = StudioVisit(browser, served)
-    opened.settle()
-    yield opened
-    opened.close()
-    served.close()
+def thinned(open_page, ball):
+    return open_page(ball, most_triangles=SHOWN)
 
 
 def into_ball(places):

@@ -8,9 +8,8 @@ import json
 import numpy as np
 import pytest
 import shapes
-from browsing import PATIENCE
 from click.testing import CliRunner
-from studio_browsing import Studio, StudioVisit, sample, studio, visit  # noqa: F401
+from studio_browsing import open_page, sample, studio, visit  # noqa: F401
 
 import coneflat
 from coneflat.apps.cli.main import cli
@@ -18,16 +17,8 @@ from coneflat.apps.studio.paint import Region
 
 
 @pytest.fixture
-def hill(browser, tmp_path):
-    shapes.write_obj(tmp_path / "hill.obj", *shapes.hill(16, 12))
-    served = Studio(tmp_path)
-    served.session.open(tmp_path / "hill.obj")
-    assert served.session.wait_until_idle(PATIENCE / 1000)
-    opened = StudioVisit(browser, served)
-    opened.settle()
-    yield opened
-    opened.close()
-    served.close()
+def hill(open_page, tmp_path):
+    return open_page(shapes.write_obj(tmp_path / "hill.obj", *shapes.hill(16, 12)))
 
 
 def painted(visit, layer):
@@ -289,14 +280,9 @@ def test_controls_refuse_in_the_panel_and_keep_the_layout(hill):
     assert page.locator("#own-seams").is_checked() is False
 
 
-def test_paths_follow_sharp_edges(browser, tmp_path):
+def test_paths_follow_sharp_edges(open_page, tmp_path):
     """On a box the way along its edges is as long as many others; a drawn one takes it."""
-    shapes.write_obj(tmp_path / "box.obj", *shapes.box(6, (1.0, 1.0, 1.0)))
-    served = Studio(tmp_path)
-    served.session.open(tmp_path / "box.obj")
-    assert served.session.wait_until_idle(PATIENCE / 1000)
-    opened = StudioVisit(browser, served)
-    opened.settle()
+    opened = open_page(shapes.write_obj(tmp_path / "box.obj", *shapes.box(6, (1.0, 1.0, 1.0))))
     mesh = coneflat.read_mesh(tmp_path / "box.obj")
     corners = [v for v, p in enumerate(mesh.vertices.tolist()) if all(x in (0.0, 1.0) for x in p)]
     one, two = next(
@@ -315,8 +301,6 @@ def test_paths_follow_sharp_edges(browser, tmp_path):
     assert sharp_share() == 1
     opened.page.keyboard.press("f")
     assert sharp_share() < 1
-    opened.close()
-    served.close()
 
 
 def test_what_is_to_be_known_of_cones_is_said(visit):
@@ -358,14 +342,9 @@ def test_what_is_to_be_known_of_cones_is_said(visit):
     assert page.locator("#warnings").is_hidden()
 
 
-def test_the_curve_is_that_of_all_parts(browser, tmp_path):
+def test_the_curve_is_that_of_all_parts(open_page, tmp_path):
     ball, hill = shapes.sphere(2), shapes.hill(8, 8)
-    shapes.write_obj(tmp_path / "two.obj", *shapes.join(ball, (hill[0] + 9, hill[1])))
-    served = Studio(tmp_path)
-    served.session.open(tmp_path / "two.obj")
-    assert served.session.wait_until_idle(PATIENCE / 1000)
-    opened = StudioVisit(browser, served)
-    opened.settle()
+    opened = open_page(shapes.write_obj(tmp_path / "two.obj", *shapes.join(ball, (hill[0] + 9, hill[1]))))
     page = opened.page
     page.keyboard.press("q")
     opened.wait("studio.panel.curve.found")
@@ -377,5 +356,3 @@ def test_the_curve_is_that_of_all_parts(browser, tmp_path):
     opened.settle()
     assert opened.run("studio.panel.curve.current()[0]") == count
     assert page.locator("#curve").is_visible()
-    opened.close()
-    served.close()

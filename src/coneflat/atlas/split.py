@@ -46,6 +46,7 @@ def split_overlaps(
         whole: what `as_disk` returns of all triangles, if that is known.
     """
     chart, count = np.zeros(len(corners), dtype=np.int64), 1
+    # Triangles of all, their pairs, a disk, and the triangles of the disk that they are.
     waiting = []
     if len(pairs):
         disk = as_disk(points, corners) if whole is None else whole

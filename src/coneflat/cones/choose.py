@@ -103,9 +103,9 @@ class Surface:
             np.maximum.at(widest, mesh.faces.ravel(), angles.ravel())
             widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
             areas = vertex_areas(faces, sides, n)
-            laplacian = weighing.result()
-        surface = cls(mesh, lengths, laplacian, curvature, areas, widest, flips)
-        surface.__dict__.update({} if delaunay is None or len(faces) > HUGE else {"delaunay": delaunay})
+        surface = cls(mesh, lengths, weighing.result(), curvature, areas, widest, flips)
+        if delaunay is not None and len(faces) <= HUGE:
+            surface.__dict__["delaunay"] = delaunay
         return surface
 
     @cached_property

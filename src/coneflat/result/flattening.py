@@ -201,7 +201,8 @@ class Flattening:
             ArrayShapeError, MeshError: there are no UVs, or the mesh cannot be thinned to so few triangles.
             UnknownFormatError, MeshFileError: a file cannot be read or written.
         """
-        from ..view.page.webpage import MOST_TRIANGLES, check_page, open_page, page_of, write_page
+        from ..options.outputs import MOST_TRIANGLES
+        from ..view.page.webpage import check_page, open_page, page_of, write_page
 
         if path is not None:
             check_page(path)

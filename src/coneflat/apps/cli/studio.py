@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ...options.outputs import MOST_TRIANGLES
 from .shared import QUIET, VERBOSE, color_option, verbosity_options
 
 
@@ -23,7 +24,7 @@ from .shared import QUIET, VERBOSE, color_option, verbosity_options
 @click.option(
     "--most-triangles",
     type=click.IntRange(1),
-    default=500_000,
+    default=MOST_TRIANGLES,
     show_default=True,
     help="Thin a larger mesh to so many, for display only.",
 )

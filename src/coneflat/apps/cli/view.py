@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ...options.outputs import SHOWS
+from ...options.outputs import MOST_TRIANGLES, SHOWS
 from .shared import again_option, color_option, input_options, up_option, verbosity_options
 
 
@@ -34,7 +34,7 @@ from .shared import again_option, color_option, input_options, up_option, verbos
 @click.option(
     "--most-triangles",
     type=int,
-    default=500_000,
+    default=MOST_TRIANGLES,
     show_default=True,
     help="Thin a larger mesh to so many, for display only.",
 )

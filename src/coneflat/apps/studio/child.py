@@ -165,10 +165,10 @@ class Bench:
 
         own: numbers that are shown as colours.
         """
+        from ...options.outputs import MOST_TRIANGLES
         from ...result.from_uv import shown_rows
         from ...view.page.content import Model, content_of
         from ...view.page.payload import Told, head_and_block
-        from ...view.page.webpage import MOST_TRIANGLES
         from .wording import in_page
 
         told = None

@@ -97,7 +97,7 @@ def quantise_cones(
         if not near or not polish(search, lattice, exact, size) <= goal:
             break
     found = exact.best.fewest(goal)
-    order = _order_of(search, found.members)
+    order = _order_to_round_in(search, found.members)
     places = search.exact.unknowns[found.members[order]]
     solution = search.solution_of(places, lattice.curvatures(found)[order])
     return QuantisedCones(solution, found.indices[order], lattice.quanta.quantum, math.sqrt(found.energy))
@@ -133,7 +133,7 @@ def open_lattice(search: ConeSearch, quantum: float) -> Lattice:
     return Lattice(search.coarse, Quanta(float(quantum), least, most, total is not None), total)
 
 
-def _order_of(search: ConeSearch, members: IntArray) -> IntArray:
+def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
     """Return the order (s,) of cones: the required ones, and then from where curvature is not wanted to where it is.
 
     To which grid they are rounded depends on it, by chance: of eight orders that were tried this was among the three

@@ -103,13 +103,13 @@ class GreenOperator:
 
     def batches(self, unknowns: IntArray) -> list[IntArray]:
         """Return unknowns in sets of as many as are best solved for at once."""
-        size = min(BATCH, max(1, NUMBERS // len(self.vertices)))
+        size = min(BATCH, max(1, NUMBERS // max(1, len(self.vertices))))
         return [unknowns[start : start + size] for start in range(0, len(unknowns), size)]
 
     def responses(self, unknowns: IntArray, room: FloatArray | None = None) -> FloatArray:
         """Return (k, f) the Green's functions of sources at k unknowns; on a closed surface, each up to a constant.
 
-        room: (k, f), aligned, for sources to be written to: memory used again takes half the time of new memory.
+        room: (k, f), aligned, for sources to be written to: memory that is used again need not be handed out.
         """
         sources = aligned((len(unknowns), len(self.vertices))) if room is None else room
         sources[:] = -self.areas if self.is_closed else 0.0

@@ -18,7 +18,7 @@ import numpy as np
 from ...errors import OptionError
 from ...files.atomic import atomic_write, checked_target
 from ...files.texture import read_picture
-from ...options.outputs import SHOWS
+from ...options.outputs import MOST_TRIANGLES, SHOWS
 from ...text import shown
 from ..own import own_quantity
 from ..quantity import Quantity
@@ -27,9 +27,6 @@ from .payload import Told, as_payload, head_and_block
 
 if TYPE_CHECKING:
     from ...result.flattening import Flattening
-
-MOST_TRIANGLES = 500_000
-"""On a page; larger meshes are thinned for display, or the browser would turn them haltingly."""
 
 MOST_IN_NOTEBOOK = 100_000
 """The same in a notebook, which stores every page that it shows."""
