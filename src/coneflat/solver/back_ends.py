@@ -24,8 +24,10 @@ MODULES = {
     "amg": "pyamg",
 }
 INSTALLED_BY = {"pardiso": "coneflat[fast]", "amg": "coneflat[amg]"}
-# Unknowns below which loading MKL takes longer than what it saves.
-LARGE = 20_000
+# Unknowns below which loading MKL, 0.03 s in each process, takes longer than what it saves.
+LARGE = 12_000
+# Unknowns of scattered parts below which SuperLU is faster.
+SCATTERED = 20_000
 # Unknowns from which a factorization without supernodes and nested dissection takes minutes and too much memory.
 HUGE = 2_000_000
 
@@ -94,7 +96,7 @@ def factorize(
     choice = _choice.get() or Choice("auto")
     name = choice.name
     if name == "auto":
-        name = "scipy" if is_scattered and size < LARGE else best_for(max(size, min(whole, LARGE)))
+        name = "scipy" if is_scattered and size < SCATTERED else best_for(max(size, min(whole, LARGE)))
     try:
         factor = _open(name, matrix) if used_up is None else used_up.renewed(matrix)
     except NotPositiveDefinite:
