@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -44,6 +45,8 @@ OPTIONS = {
 STRAIGHT = {"min_cone_angle": np.pi / 2}
 # Part of the squares wanted by which there may be more or fewer without a note.
 NOTED = 0.1
+# How often a grid of another size is tried, to come nearer to the squares wanted.
+NEARER = 4
 # How many times the squares wanted are tried, when these are too few, to say what would do.
 FINER = (2, 4, 8, 16)
 
@@ -281,11 +284,18 @@ def _nearer(found: IntegerGrid, layout: Layout, energy: StretchEnergy) -> Intege
     wanted, squares = area_of(layout), _squares(found)
     if abs(squares - wanted) <= NOTED * wanted:
         return found
-    other, _ = attempt(scaled(layout, wanted / squares), energy)
-    if other is not None and abs(np.log(_squares(other) / wanted)) < abs(np.log(squares / wanted)):
-        found, squares = replace(other, size=layout.size), _squares(other)
-    if abs(squares - wanted) <= NOTED * wanted:
-        return found
+    factor, last = 1.0, squares
+    for _ in range(NEARER):
+        # Half of the way after the first: squares come and go by whole rows.
+        factor *= (wanted / last) if factor == 1.0 else math.sqrt(wanted / last)
+        other, _ = attempt(scaled(layout, factor), energy)
+        if other is None:
+            break
+        last = _squares(other)
+        if abs(np.log(last / wanted)) < abs(np.log(squares / wanted)):
+            found, squares = replace(other, size=layout.size), last
+        if abs(squares - wanted) <= NOTED * wanted:
+            return found
     return replace(
         found, notes=(*found.notes, f"The grid has an area of {squares:,.0f} squares, not {wanted:,.0f}.")
     )
