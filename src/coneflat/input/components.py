@@ -20,6 +20,7 @@ from ..text import list_some, plural
 from .arrays import InputMesh, as_input
 from .constraints import Constraints, locate_constraints
 from .marked_edges import edges_within, effective_marks, marked_edges, named_edges, out_of_reach
+from .nearby import brought_together
 from .numbering import at_unit_size, lengths_of_input, turn_corners
 from .validation import CheckedMesh, check_mesh
 
@@ -165,10 +166,13 @@ def _open_triangles(
 def _parts(mesh: TriangleMesh, marked: IntArray, lengths: FloatArray) -> tuple[Part, ...]:
     """Return the connected parts of a mesh that is open along edges (k,)."""
     opened = open_along(mesh, marked) if len(marked) else CutMesh(mesh, np.arange(len(mesh.vertices)))
-    return tuple(
-        (part, opened.origin[vertices], faces, lengths[faces])
-        for part, vertices, faces in opened.mesh.split_components()
-    )
+    parts = []
+    for part, vertices, faces in opened.mesh.split_components():
+        together = brought_together(part)
+        if together is not None:
+            part, vertices, faces = together[0], vertices[together[1]], faces[together[2]]
+        parts.append((part, opened.origin[vertices], faces, lengths[faces]))
+    return tuple(parts)
 
 
 def _within_reach(constraints: Constraints, mesh: TriangleMesh, is_forbidden: BoolArray) -> Constraints:

@@ -37,9 +37,13 @@ class VertexCurvatures:
         return len(self.vertices)
 
     def within(self, component: IntArray) -> VertexCurvatures:
-        """Return those of a component, numbered there; `component` are its vertices, ascending."""
+        """Return those of a component, numbered there; `component` are its vertices."""
         inside = np.isin(self.vertices, component)
-        return VertexCurvatures(np.searchsorted(component, self.vertices[inside]), self.curvatures[inside])
+        if not inside.any():
+            return VertexCurvatures(np.empty(0, dtype=np.int64), np.empty(0))
+        order = np.argsort(component, kind="stable")
+        places = order[np.searchsorted(component, self.vertices[inside], sorter=order)]
+        return VertexCurvatures(places, self.curvatures[inside])
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +91,7 @@ class Constraints:
         return replace(self, on_marks=on_marks)
 
     def within(self, component: IntArray) -> Constraints:
-        """Return what is said of a component, numbered there; `component` are its vertices, ascending."""
+        """Return what is said of a component, numbered there; `component` are its vertices."""
         return Constraints(
             self.names[component],
             self.cones.within(component),
