@@ -31,14 +31,6 @@ def test_the_same_triangles_come_nearer(always):
     assert nearby.brought_together(TriangleMesh(*shapes.grid(100, 10))) is None
 
 
-@pytest.mark.parametrize("plane", [[0, 1, 2], [2, 0, 1]])
-def test_flat_meshes_come_nearer(always, plane):
-    vertices, faces, _ = shapes.renumber(*shapes.grid(60, 50))
-    flat = np.column_stack([vertices[:, :2], np.zeros(len(vertices))])[:, plane]
-    together, _, _ = nearby.brought_together(TriangleMesh(flat, faces))
-    assert nearby.mean_span(together.faces) < 0.04 * len(vertices)
-
-
 def test_small_meshes_stay():
     assert nearby.brought_together(TriangleMesh(*shapes.renumber(*shapes.sphere(4))[:2])) is None
 

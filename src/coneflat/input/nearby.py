@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import IntArray
 from ..compiled import compiled
 from ..mesh import TriangleMesh
 
@@ -16,19 +16,17 @@ from ..mesh import TriangleMesh
 LARGE = 200_000
 # Of the vertices of a mesh, how far apart the numbers of those of a triangle are where they are scattered, in the mean.
 SCATTERED = 1 / 32
-# Steps along each axis in which places are told from one another, as a power of two: three of them make an index.
-BITS = 9
 
 
 def brought_together(mesh: TriangleMesh) -> tuple[TriangleMesh, IntArray, IntArray] | None:
-    """Return a mesh whose neighbours have numbers near each other, and which vertices (n,) and faces (m,) its own are.
+    """Return a connected mesh whose neighbours have numbers near each other; with its (n,) vertices and (m,) faces.
 
-    None: the mesh is small, or its numbering is good.
+    These are numbered as in the other one. Copies of a mesh stay alike. None: it is small, or its numbering is good.
     """
     faces = mesh.faces
     if len(faces) < LARGE or mean_span(faces) < SCATTERED * len(mesh.vertices):
         return None
-    face_order = along_curve(mesh.vertices, faces)
+    face_order = by_distance(mesh.halfedge_edges.reshape(-1, 3), mesh.edge_halfedges)
     vertex_order, found = by_first_use(faces, face_order, len(mesh.vertices))
     return TriangleMesh(mesh.vertices[vertex_order], found), vertex_order, face_order
 
@@ -44,36 +42,21 @@ def mean_span(faces: IntArray) -> float:
 
 
 @compiled
-def along_curve(vertices: FloatArray, faces: IntArray) -> IntArray:
-    """Return the triangles (m,) along a curve that fills space (G. M. Morton, 1966): their places' bits by turns."""
-    steps, bins = 1 << BITS, 1 << (3 * BITS // 2 + 1)
-    low, size = vertices[faces[0, 0]].copy(), 0.0
-    for axis in range(3):
-        low[axis] = vertices[:, axis].min()
-        size = max(size, vertices[:, axis].max() - low[axis])
-    codes = np.empty(len(faces), np.int64)
-    for f in range(len(faces)):
-        a, b, c = faces[f]
-        code = 0
-        for axis in range(3):
-            middle = (vertices[a, axis] + vertices[b, axis] + vertices[c, axis]) / 3 - low[axis]
-            step = min(int(middle / size * steps), steps - 1)
-            for bit in range(BITS):
-                code |= ((step >> bit) & 1) << (3 * bit + axis)
-        codes[f] = code
-    # By counting, first the lower half of the bits, then the upper.
-    order, other = np.arange(len(faces)), np.empty(len(faces), np.int64)
-    for shift in (0, 3 * BITS // 2 + 1):
-        starts = np.zeros(bins + 1, np.int64)
-        for f in range(len(codes)):
-            starts[((codes[f] >> shift) & (bins - 1)) + 1] += 1
-        for b in range(bins):
-            starts[b + 1] += starts[b]
-        for at in range(len(order)):
-            b = (codes[order[at]] >> shift) & (bins - 1)
-            other[starts[b]] = order[at]
-            starts[b] += 1
-        order, other = other, order
+def by_distance(edge_of: IntArray, sides: IntArray) -> IntArray:
+    """Return the triangles (m,) of a connected mesh by how many edges are crossed from the first one to them.
+
+    edge_of: (m, 3) the edge of each half-edge. sides: (e, 2) the half-edges of each edge, -1 for none.
+    """
+    order, is_listed = np.zeros(len(edge_of), np.int64), np.zeros(len(edge_of), np.bool_)
+    is_listed[0] = True
+    listed = 1
+    for at in range(len(order)):
+        for edge in edge_of[order[at]]:
+            for side in sides[edge]:
+                if side >= 0 and not is_listed[side // 3]:
+                    is_listed[side // 3] = True
+                    order[listed] = side // 3
+                    listed += 1
     return order
 
 
