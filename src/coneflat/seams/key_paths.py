@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
+from ..compiled import compiled
 from .open_mesh import NOTHING, OpenMesh, Terminals
 
 
@@ -57,7 +58,7 @@ class Parts:
     """
 
     terminals: Terminals
-    ends: list[int]
+    ends: IntArray
     arms: FloatArray
 
 
@@ -140,41 +141,97 @@ class KeyPaths:
         if len(arms) < 2 or len(arms) != 1 + len(gone) - len(inner):
             return None
         order = sorted(arms, key=lambda terminal: (len(terminals.leaving(terminal)), terminal))
-        return Parts(terminals, order, np.array([arms[terminal] for terminal in order]))
+        return Parts(terminals, np.array(order), np.array([arms[terminal] for terminal in order]))
 
 
 def find_key_paths(work: OpenMesh, fixed: Fixed) -> KeyPaths:
     """Return the seams of an open mesh as a graph."""
     terminals = work.label_terminals(NOTHING)
-    on_border = work.cut[terminals.around]
-    sides = terminals.around[on_border]
-    bounds = np.concatenate([[0], np.cumsum(on_border)])[terminals.starts].tolist()
-    tails = work.tail[sides]
-    degree = np.bincount(tails[~fixed.sides[sides]], minlength=len(work.height))
-    is_key = (degree[tails] != 2) | fixed.cones[tails] | fixed.vertices[tails]
-    paths: list[KeyPath] = []
+    halfedges, starts, costs, numbers, curves = list_key_paths(
+        *(terminals.around, terminals.starts, work.cut, work.twin, work.tail, work.cost),
+        *(fixed.sides, fixed.cones, fixed.vertices),
+    )
+    firsts, lasts = halfedges[starts[:-1]], halfedges[starts[1:] - 1]
+    ends = list(zip(work.tail[firsts].tolist(), work.tail[work.twin[lasts]].tolist(), strict=True))
+    bounds = starts.tolist()
+    paths = [
+        KeyPath(halfedges[start:stop], both, cost)
+        for start, stop, both, cost in zip(bounds[:-1], bounds[1:], ends, costs.tolist(), strict=True)
+    ]
     at: dict[int, list[int]] = {}
-    curves: list[list[int]] = []
-    by_first: dict[int, int] = {}
-    for start, stop in itertools.pairwise(bounds):
-        keys = np.flatnonzero(is_key[start:stop])
-        curve = np.roll(sides[start:stop], -keys[0])
-        around = []
-        for i, j in itertools.pairwise([*(keys - keys[0]).tolist(), stop - start]):
-            first, back = int(curve[i]), int(work.twin[curve[j - 1]])
-            if fixed.sides[first]:
+    for number, both in enumerate(ends):
+        for vertex in both:
+            at.setdefault(vertex, []).append(number)
+    along, cuts = numbers.tolist(), curves.tolist()
+    around = [along[start:stop] for start, stop in itertools.pairwise(cuts)]
+    return KeyPaths(work, fixed, paths, at, around)
+
+
+@compiled
+def list_key_paths(
+    around: IntArray,
+    bounds: IntArray,
+    cut: BoolArray,
+    twin: IntArray,
+    tail: IntArray,
+    cost: FloatArray,
+    is_fixed: BoolArray,
+    is_cone: BoolArray,
+    on_fixed: BoolArray,
+) -> tuple[IntArray, IntArray, FloatArray, IntArray, IntArray]:
+    """Return the paths between key vertices along border curves, each once, and how they follow one another.
+
+    Args:
+        around, bounds: the half-edges that leave border curves, in order, and where those of each curve begin.
+        cut, twin, tail, cost: (3m,) of the half-edges.
+        is_fixed: (3m,) half-edges of the border that are no seams.
+        is_cone, on_fixed: (n,) cones, and vertices of that border.
+
+    Returns:
+        The half-edges of the paths, where those of each begin, what each costs, the paths along the curves, and where
+        those of each curve begin.
+    """
+    degree = np.zeros(len(is_cone), np.int64)
+    sides, starts = np.empty(len(around), np.int64), np.zeros(len(bounds), np.int64)
+    size = 0
+    for c in range(len(bounds) - 1):
+        for h in around[bounds[c] : bounds[c + 1]]:
+            if cut[h]:
+                sides[size] = h
+                degree[tail[h]] += not is_fixed[h]
+                size += 1
+        starts[c + 1] = size
+    halfedges, path_starts, costs = np.empty(size, np.int64), np.zeros(size + 1, np.int64), np.zeros(size)
+    numbers, curves = np.empty(size, np.int64), np.zeros(len(bounds), np.int64)
+    # The path that begins on the way back with each half-edge.
+    by_first = {np.int64(-1): np.int64(-1)}
+    paths = listed = filled = 0
+    for c in range(len(bounds) - 1):
+        curve = sides[starts[c] : starts[c + 1]]
+        keys = np.empty(len(curve) + 1, np.int64)
+        found = 0
+        for i in range(len(curve)):
+            v = tail[curve[i]]
+            if degree[v] != 2 or is_cone[v] or on_fixed[v]:
+                keys[found] = i
+                found += 1
+        keys[found] = keys[0] + len(curve)
+        for k in range(found):
+            first, last = curve[keys[k]], curve[(keys[k + 1] - 1) % len(curve)]
+            if is_fixed[first]:
                 continue
-            number = by_first.get(first, len(paths))
-            around.append(number)
-            if number == len(paths):
-                by_first[back] = number
-                path = KeyPath(
-                    curve[i:j],
-                    (int(work.tail[first]), int(work.tail[back])),
-                    float(work.cost[curve[i:j]].sum()),
-                )
-                paths.append(path)
-                for vertex in path.ends:
-                    at.setdefault(vertex, []).append(number)
-        curves.append(around)
-    return KeyPaths(work, fixed, paths, at, curves)
+            if first in by_first:
+                numbers[listed] = by_first[first]
+            else:
+                numbers[listed] = paths
+                by_first[twin[last]] = np.int64(paths)
+                for i in range(keys[k], keys[k + 1]):
+                    h = curve[i % len(curve)]
+                    halfedges[filled] = h
+                    costs[paths] += cost[h]
+                    filled += 1
+                paths += 1
+                path_starts[paths] = filled
+            listed += 1
+        curves[c + 1] = listed
+    return halfedges[:filled], path_starts[: paths + 1], costs[:paths], numbers[:listed], curves
