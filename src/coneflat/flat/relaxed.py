@@ -34,6 +34,8 @@ TOLERANCE, STEPS = 1e-2, 40
 BESIDES = 0.1
 # Where a patch's mean or the worst triangle of all would be worse, the same is tried with this sharpness.
 SHARP = 2.0
+# What is worse by less than this part is not: nothing may have moved, or what has as a whole.
+SAME = 1e-9
 
 
 def relaxes(options: Options) -> bool:
@@ -219,11 +221,13 @@ class _Surface:
         corner = np.argmax(was_free[faces[touched]], axis=1)
         of_face = patch[faces[touched, corner]]
         gain = before[touched] - after[touched]
-        gained = np.bincount(of_face, gain * self.areas[touched], count)
+        areas = self.areas[touched]
+        gained = np.bincount(of_face, gain * areas, count)
+        least = -SAME * np.bincount(of_face, before[touched] * areas, count)
         worst = np.zeros(count)
         np.maximum.at(worst, of_face, after[touched])
-        is_worse = worst[patch] > self.largest(before)[self._of_vertex]
-        is_lost = ((gained < 0)[patch] | is_worse) & was_free
+        is_worse = worst[patch] > (1 + SAME) * self.largest(before)[self._of_vertex]
+        is_lost = ((gained < least)[patch] | is_worse) & was_free
         back = np.zeros(len(moved), dtype=bool)
         back[self.corners[is_lost[faces]]] = True
         return np.where(back[:, None], points, moved), is_lost

@@ -153,7 +153,7 @@ def _seeds(
     slot_of: IntArray,
     number: IntArray,
 ) -> tuple[IntArray, FloatArray, IntArray]:
-    """Return the slots at which a search begins, along what leaves terminals that trees reach, their costs and names."""
+    """Return the slots at which a search begins, which leave terminals that trees reach, their costs and names."""
     size = 0
     for end in ends[:-1]:
         size += bounds[end + 1] - bounds[end] if merged[end] < limit else 0
