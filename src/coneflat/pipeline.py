@@ -40,7 +40,7 @@ Early: TypeAlias = Callable[[Flattening], object]
 SurfaceOf: TypeAlias = Callable[[TriangleMesh, FloatArray, bool], Surface]
 
 # Triangles up to which components count as small, and of those that are relaxed as one mesh.
-SMALL, TOGETHER = 500, 20_000
+SMALL, TOGETHER = 500, 40_000
 # The part of a small component's work that comes before.
 HALF = 0.5
 
@@ -227,6 +227,8 @@ def flatten_component(
         return with_held_cones(once, part) if may_lack_room else once(part)
 
     first = flatten_held(options)
+    if options.quality is None:
+        surface.search = None  # It remembers what it was asked for, and takes much memory.
     relaxed_first = yield first
 
     def flatten_by(asked: Options) -> LaidOut:
@@ -239,7 +241,7 @@ def flatten_component(
             return relaxed(layout, part, asked, stages.tell)
 
     layout = with_quality(flatten_by, part, options)
-    surface.search = None  # It remembers what it was asked for, and takes much memory.
+    surface.search = None
     if options.charts == "atlas":
         with stages("atlas", 1.0):
             part_charts = overlaid if options.mirrored == "overlap" else without_overlaps

@@ -38,6 +38,8 @@ class VertexCurvatures:
 
     def within(self, component: IntArray) -> VertexCurvatures:
         """Return those of a component, numbered there; `component` are its vertices, ascending."""
+        if not len(self):
+            return self
         inside = np.isin(self.vertices, component)
         return VertexCurvatures(np.searchsorted(component, self.vertices[inside]), self.curvatures[inside])
 

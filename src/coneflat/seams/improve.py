@@ -7,11 +7,9 @@ surfaces with handles, too: taking a path out of a loop leaves two borders, one 
 
 from __future__ import annotations
 
-import numpy as np
-
 from .._arrays import IntArray
 from ..progress import go_on
-from .key_paths import Fixed, KeyPaths, find_key_paths
+from .key_paths import Fixed, KeyPaths, find_key_paths, name_edges
 from .open_mesh import OpenMesh
 
 # Relative: what is gained must be more than rounding makes.
@@ -30,7 +28,7 @@ def shorten(work: OpenMesh, fixed: Fixed, enough: int) -> None:
         enough: the effort after which to stop.
     """
     work.measure_heights()
-    rested: set[bytes] = set()
+    rested: set[int] = set()
     # Pairs first, as they gain most; again and again, until nothing is gained. Then others.
     waiting = [*WINDOWS]
     while waiting and work.effort < enough:
@@ -42,25 +40,21 @@ def shorten(work: OpenMesh, fixed: Fixed, enough: int) -> None:
             go_on()
             if work.effort >= enough:
                 break
-            name = _name(work, seams.halfedges(gone))
+            name = seams.name(gone)
             if name in rested or not changed.isdisjoint(gone):
                 continue
             rested.add(name)
             found, tried = _exchange(seams, gone)
             if tried:
                 # What is best for several paths is for each of them.
-                rested.update(_name(work, seams.paths[p].halfedges) for p in gone)
+                rested.update(seams.paths[p].name for p in gone)
             if found is not None:
-                rested.add(_name(work, found))
+                rested.add(name_edges(found, work.mesh.halfedge_edges))
                 changed |= seams.touched_by(gone, found)
         if changed or loose:
             waiting = [*WINDOWS]
         else:
             waiting.pop(0)
-
-
-def _name(work: OpenMesh, halfedges: IntArray) -> bytes:
-    return np.sort(work.mesh.halfedge_edges[halfedges]).tobytes()
 
 
 def _exchanges(seams: KeyPaths, count: int) -> list[frozenset[int]]:

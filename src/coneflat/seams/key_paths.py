@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import operator
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -27,10 +29,6 @@ class Fixed:
     vertices: BoolArray
     cones: BoolArray
 
-    def holds(self, vertex: int) -> bool:
-        """Return whether a seam may end at a vertex."""
-        return bool(self.vertices[vertex] or self.cones[vertex])
-
 
 @dataclass(frozen=True, eq=False)
 class KeyPath:
@@ -39,12 +37,16 @@ class KeyPath:
     Attributes:
         halfedges: one side of each of its edges, in order.
         ends: the vertices that it leads from and to.
+        sides: the half-edges along it that leave these.
         cost: the sum over its edges.
+        name: of its edges, whichever way they are gone along; see `name_edges`.
     """
 
     halfedges: IntArray
     ends: tuple[int, int]
+    sides: tuple[int, int]
     cost: float
+    name: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,14 +70,16 @@ class KeyPaths:
 
     Attributes:
         work: the mesh that they open.
-        fixed: where they may end.
+        cones: the key vertices that are cones off the border that is there without them.
+        held: those at which seams may end, cones and others.
         paths: the key paths.
         at: the paths that end at each vertex; loops twice.
         curves: for each border curve the paths along it, in order; most are there twice, with both sides.
     """
 
     work: OpenMesh
-    fixed: Fixed
+    cones: set[int]
+    held: set[int]
     paths: list[KeyPath]
     at: dict[int, list[int]]
     curves: list[list[int]]
@@ -83,6 +87,10 @@ class KeyPaths:
     def cost(self, some: Iterable[int]) -> float:
         """Return what some of the paths cost."""
         return sum(self.paths[p].cost for p in some)
+
+    def name(self, some: Iterable[int]) -> int:
+        """Return the name of the edges of some of the paths."""
+        return reduce(operator.xor, (self.paths[p].name for p in some))
 
     def halfedges(self, some: Iterable[int]) -> IntArray:
         """Return the half-edges of some of the paths, one for each edge."""
@@ -93,7 +101,7 @@ class KeyPaths:
         removed, waiting = set(gone), list(gone)
         while waiting:
             for vertex in self.paths[waiting.pop()].ends:
-                if not self.fixed.holds(vertex):
+                if vertex not in self.held:
                     left = [p for p in self.at[vertex] if p not in removed]
                     if len(left) == 1:
                         removed.add(left[0])
@@ -102,9 +110,7 @@ class KeyPaths:
 
     def loose(self) -> frozenset[int]:
         """Return the paths that end nowhere."""
-        ends = [
-            paths[0] for vertex, paths in self.at.items() if len(paths) == 1 and not self.fixed.holds(vertex)
-        ]
+        ends = [paths[0] for vertex, paths in self.at.items() if len(paths) == 1 and vertex not in self.held]
         return self.with_loose_ends(ends)
 
     def touched_by(self, gone: Iterable[int], found: IntArray) -> set[int]:
@@ -124,13 +130,13 @@ class KeyPaths:
         work = self.work
         work.glue(self.halfedges(gone))
         ends = {vertex for p in gone for vertex in self.paths[p].ends}
-        cones = sorted(vertex for vertex in ends if self.fixed.cones[vertex])
+        cones = sorted(ends & self.cones)
         terminals = work.label_terminals(np.array(cones, dtype=np.int64))
         arms: dict[int, float] = {}
         inner = set()
         for p in gone:
             path = self.paths[p]
-            for h, vertex in zip((path.halfedges[0], work.twin[path.halfedges[-1]]), path.ends, strict=True):
+            for h, vertex in zip(path.sides, path.ends, strict=True):
                 terminal = int(terminals.number[h])
                 if terminal < 0:
                     inner.add(vertex)
@@ -147,16 +153,16 @@ class KeyPaths:
 def find_key_paths(work: OpenMesh, fixed: Fixed) -> KeyPaths:
     """Return the seams of an open mesh as a graph."""
     terminals = work.label_terminals(NOTHING)
-    halfedges, starts, costs, numbers, curves = list_key_paths(
+    halfedges, starts, costs, names, numbers, curves = list_key_paths(
         *(terminals.around, terminals.starts, work.cut, work.twin, work.tail, work.cost),
-        *(fixed.sides, fixed.cones, fixed.vertices),
+        *(work.mesh.halfedge_edges, fixed.sides, fixed.cones, fixed.vertices),
     )
-    firsts, lasts = halfedges[starts[:-1]], halfedges[starts[1:] - 1]
-    ends = list(zip(work.tail[firsts].tolist(), work.tail[work.twin[lasts]].tolist(), strict=True))
-    bounds = starts.tolist()
+    sides = halfedges[starts[:-1]], work.twin[halfedges[starts[1:] - 1]]
+    ends = list(zip(*(work.tail[side].tolist() for side in sides), strict=True))
+    of_paths = ends, zip(*(side.tolist() for side in sides), strict=True), costs.tolist(), names.tolist()
+    bounds = itertools.pairwise(starts.tolist())
     paths = [
-        KeyPath(halfedges[start:stop], both, cost)
-        for start, stop, both, cost in zip(bounds[:-1], bounds[1:], ends, costs.tolist(), strict=True)
+        KeyPath(halfedges[start:stop], *rest) for (start, stop), *rest in zip(bounds, *of_paths, strict=True)
     ]
     at: dict[int, list[int]] = {}
     for number, both in enumerate(ends):
@@ -164,7 +170,9 @@ def find_key_paths(work: OpenMesh, fixed: Fixed) -> KeyPaths:
             at.setdefault(vertex, []).append(number)
     along, cuts = numbers.tolist(), curves.tolist()
     around = [along[start:stop] for start, stop in itertools.pairwise(cuts)]
-    return KeyPaths(work, fixed, paths, at, around)
+    keys = np.fromiter(at, dtype=np.int64, count=len(at))
+    cones = set(keys[fixed.cones[keys]].tolist())
+    return KeyPaths(work, cones, cones.union(keys[fixed.vertices[keys]].tolist()), paths, at, around)
 
 
 @compiled
@@ -175,21 +183,22 @@ def list_key_paths(
     twin: IntArray,
     tail: IntArray,
     cost: FloatArray,
+    edge_of: IntArray,
     is_fixed: BoolArray,
     is_cone: BoolArray,
     on_fixed: BoolArray,
-) -> tuple[IntArray, IntArray, FloatArray, IntArray, IntArray]:
+) -> tuple[IntArray, IntArray, FloatArray, IntArray, IntArray, IntArray]:
     """Return the paths between key vertices along border curves, each once, and how they follow one another.
 
     Args:
         around, bounds: the half-edges that leave border curves, in order, and where those of each curve begin.
-        cut, twin, tail, cost: (3m,) of the half-edges.
+        cut, twin, tail, cost, edge_of: (3m,) of the half-edges.
         is_fixed: (3m,) half-edges of the border that are no seams.
         is_cone, on_fixed: (n,) cones, and vertices of that border.
 
     Returns:
-        The half-edges of the paths, where those of each begin, what each costs, the paths along the curves, and where
-        those of each curve begin.
+        The half-edges of the paths, where those of each begin, what each costs and is called, the paths along the
+        curves, and where those of each curve begin.
     """
     degree = np.zeros(len(is_cone), np.int64)
     sides, starts = np.empty(len(around), np.int64), np.zeros(len(bounds), np.int64)
@@ -234,4 +243,23 @@ def list_key_paths(
                 path_starts[paths] = filled
             listed += 1
         curves[c + 1] = listed
-    return halfedges[:filled], path_starts[: paths + 1], costs[:paths], numbers[:listed], curves
+    names = np.empty(paths, np.int64)
+    for p in range(paths):
+        names[p] = name_edges(halfedges[path_starts[p] : path_starts[p + 1]], edge_of)
+    return halfedges[:filled], path_starts[: paths + 1], costs[:paths], names, numbers[:listed], curves
+
+
+@compiled
+def name_edges(halfedges: IntArray, edge_of: IntArray) -> int:
+    """Return a number by which the edges of half-edges are known again; that of two sets is the exclusive or of theirs.
+
+    Numbers are mixed as by SplitMix64 (G. Steele, D. Lea, C. Flood, "Fast splittable pseudorandom number generators",
+    2014), so that among millions of sets two have the same one with a probability below 1e-6.
+    """
+    name = np.uint64(0)
+    for h in halfedges:
+        mixed = np.uint64(edge_of[h] + 1) * np.uint64(0x9E3779B97F4A7C15)
+        mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        name ^= mixed ^ (mixed >> np.uint64(31))
+    return np.int64(name)
