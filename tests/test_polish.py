@@ -148,6 +148,82 @@ def test_a_metric_that_did_not_converge_is_left_alone(monkeypatch):
     assert any("Not relaxed" in note for note in result.notes)
 
 
+def of_many_sizes():
+    """Small components with bent triangles, and one that is large; and them all in one file."""
+    meshes = [
+        (shapes.sphere(1, seed=1), 1.0),
+        (shapes.torus(8, 5, 0.4), 1e-3),
+        (shapes.grid(8, 5, lambda x, y: 0.6 * np.exp(-12 * ((x - 0.4) ** 2 + (y - 0.6) ** 2))), 200.0),
+        (shapes.genus(2), 5.0),
+        (shapes.sphere(1, seed=2), 0.02),
+    ]
+    pieces = [(size * np.asarray(vertices) * (1.0, 1.2, 0.9), faces) for (vertices, faces), size in meshes]
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
+    faces = [own + start for (_, own), start in zip(pieces, starts, strict=False)]
+    return pieces, np.concatenate([vertices for vertices, _ in pieces]), np.concatenate(faces)
+
+
+def side_lengths(result):
+    corners = result.corner_uv
+    return np.linalg.norm(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]], axis=2) / result.uv_scale
+
+
+@pytest.mark.parametrize("options", [{}, {"polish": "whole"}, {"stretch": 0.5}])
+def test_small_components_are_relaxed_together_as_each_by_itself(options, monkeypatch):
+    import coneflat.pipeline as pipeline
+
+    pieces, vertices, faces = of_many_sizes()
+    sizes = []
+    together = pipeline.relaxed_together
+    monkeypatch.setattr(
+        pipeline, "relaxed_together", lambda *some: (sizes.append(len(some[0])), together(*some))[1]
+    )
+    result = flatten(vertices, faces, **options)
+    assert sizes == [4]
+    assert result.distortion.flipped == 0
+    alone = [flatten(*piece, **options) for piece in pieces]
+    assert sizes == [4]
+    # Newton's method ends where little is left to gain, which does not say where to the last digits.
+    start, scales, sides = 0, [], side_lengths(result)
+    for piece, one in zip(pieces, alone, strict=True):
+        own = sides[start : start + len(piece[1])]
+        assert np.allclose(own, side_lengths(one), rtol=1e-6)
+        start += len(own)
+        scales.append(one.log_scale)
+    assert np.allclose(result.log_scale, np.concatenate(scales), atol=1e-6)
+    assert result.solve.relaxed_vertices == sum(one.solve.relaxed_vertices for one in alone)
+    worst = [one.solve.qc_max_unrelaxed for one in alone]
+    assert result.solve.qc_max_unrelaxed == pytest.approx(max(worst), rel=1e-9)
+
+
+def test_a_small_component_that_cannot_be_relaxed_leaves_the_others_to_themselves(monkeypatch):
+    import coneflat.flat.relaxed as stage
+
+    _, vertices, faces = of_many_sizes()
+    relax, components = stage.relax, []
+
+    def refuse(mesh, *arguments, **options):
+        components.append(mesh.components[0])
+        if mesh.components[0] > 1:
+            raise errors.SeamError("the sides of 3 of 4 seam edges are no copies of each other")
+        return relax(mesh, *arguments, **options)
+
+    wanted = flatten(vertices, faces)
+    monkeypatch.setattr(stage, "relax", refuse)
+    result = flatten(vertices, faces)
+    assert sorted(components, reverse=True)[:2] == [4, 1]
+    assert np.allclose(side_lengths(result), side_lengths(wanted), rtol=1e-6)
+    assert result.distortion.qc_max == pytest.approx(wanted.distortion.qc_max, rel=1e-6)
+
+
+def test_progress_of_components_in_groups_goes_on():
+    _, vertices, faces = of_many_sizes()
+    told = []
+    flatten(vertices, faces, progress=lambda stage, done: told.append(done))
+    assert told == sorted(told)
+    assert 0.9 < told[-1] <= 1
+
+
 @pytest.mark.parametrize(
     ("name", "mean", "worst"),
     [("3holes.off", 1.049, 4), ("hand.obj", 1.029, 6), ("knight.off", 1.27, 6), ("human.obj", 1.052, 6)],

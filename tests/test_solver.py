@@ -178,6 +178,21 @@ def test_scattered_parts_and_parts_of_a_whole_are_solved_by_what_is_fastest_for_
             assert list(choice.used)[-1] == best_for(min(max(whole, 1), LARGE))
 
 
+def test_tiny_matrices_are_dense_and_solved_with_pivots_where_they_are_indefinite(matrix):
+    right = np.random.default_rng(0).normal(size=(60, 3))
+    some = csc_matrix(matrix[:60, :60])
+    indefinite = some.copy()
+    indefinite[20, 20] -= 100.0
+    with solving("auto") as choice:
+        factor = factorize(some)
+        for each in (some, indefinite, some):
+            factor = factorize(csc_matrix(each), used_up=factor)
+            for sources in (right, right[:, 0], np.asfortranarray(right)[:, ::2]):
+                expected = np.linalg.solve(each.toarray(), sources)
+                assert factor.solve(sources) == pytest.approx(expected, abs=1e-9)
+    assert list(choice.used) == ["scipy"]
+
+
 @pytest.mark.skipif(not available("pardiso"), reason="needs pypardiso")
 def test_the_number_of_threads_changes_nothing_but_rounding():
     vertices, faces = shapes.sphere(5)

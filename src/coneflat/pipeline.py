@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -20,7 +20,7 @@ from .flat.copies import copied, find_copies
 from .flat.held_cones import split_notes, unheld_notes, with_held_cones
 from .flat.methods import find_metric, turning_meter
 from .flat.more_cones import with_quality
-from .flat.relaxed import relaxed, relaxes
+from .flat.relaxed import relaxed, relaxed_together, relaxes
 from .geometry.operators import weighted_areas
 from .geometry.overlap import NOT_LOOKED_FOR
 from .input.components import Component, Prepared, prepare
@@ -38,6 +38,11 @@ from .threads import using_threads
 Early: TypeAlias = Callable[[Flattening], object]
 #: Returns a connected mesh with what follows from its (m, 3) lengths, on flips of edges if a metric may make them.
 SurfaceOf: TypeAlias = Callable[[TriangleMesh, FloatArray, bool], Surface]
+
+# Triangles up to which components count as small, and of those that are relaxed as one mesh.
+SMALL, TOGETHER = 500, 40_000
+# The part of a small component's work that comes before.
+HALF = 0.5
 
 
 @takes(Options)
@@ -91,34 +96,109 @@ def flatten_prepared(
             parted, which are not looked for.
     """
     with using_threads(options.threads), solving(solver) as solvers:
-        runs = [flatten_component(part, surface_of, options, stages) for part in prepared.components]
-        copies = find_copies(prepared.components, options)
-
-        def laid_out(i: int, found: list[LaidOut], run: Callable[[Iterator[LaidOut]], LaidOut]) -> LaidOut:
-            copy, same = copies[i], None
-            with _at_component(prepared, i, stages):
-                if copy is not None:
-                    same = copied(found[copy.first], prepared.components[i], copy.scale, options)
-                return run(runs[i]) if same is None else same
-
+        runs = _Runs(prepared, surface_of, options, stages)
         if early is not None:
-            first: list[LaidOut] = []
-            for i in range(len(runs)):
-                first.append(laid_out(i, first, next))
+            first = runs.all_first()
             early(assemble(prepared, first, replace(options, charts="one"), Stages(), NOT_LOOKED_FOR))
-        flat: list[LaidOut] = []
-        for i in range(len(runs)):
-            flat.append(laid_out(i, flat, _last))
-            stages.end_part()
+        flat = runs.all_last()
     return replace(assemble(prepared, flat, options, stages), solvers=tuple(solvers.used))
+
+
+class _Runs:
+    """The components of a mesh on their way: one after the other, small ones in groups that are relaxed together."""
+
+    def __init__(self, prepared: Prepared, surface_of: SurfaceOf, options: Options, stages: Stages) -> None:
+        self._parts, self._options, self._stages = prepared.components, options, stages
+        self._size = len(prepared.checked.mesh.faces)
+        self._runs = [flatten_component(part, surface_of, options, stages) for part in self._parts]
+        self._copies = find_copies(self._parts, options)
+        self._begun: dict[int, LaidOut] = {}
+
+    def all_first(self) -> list[LaidOut]:
+        """Return the first layout of each component."""
+        found: dict[int, LaidOut] = {}
+        for i in range(len(self._parts)):
+            with self._at(i):
+                found[i] = self._copy(i, found) or self._first(i)
+        return list(found.values())
+
+    def all_last(self) -> list[LaidOut]:
+        """Return the layout of each component that was asked for."""
+        found: dict[int, LaidOut] = {}
+        for group in self._groups():
+            relaxed = self._relaxed([i for i in group if self._copies[i] is None]) if len(group) > 1 else {}
+            for i in group:
+                with self._at(i, HALF if i in relaxed else 1.0):
+                    found[i] = self._copy(i, found) or self._last(i, relaxed.get(i))
+                self._stages.end_part()
+        return [found[i] for i in range(len(self._parts))]
+
+    def _groups(self) -> list[list[int]]:
+        """Return the numbers of the components, those together whose triangles are relaxed at the same time."""
+        sizes = [len(part.faces) for part in self._parts]
+        if not relaxes(self._options):
+            return [[i] for i in range(len(sizes))]
+        groups, room = [[i] for i, size in enumerate(sizes) if size > SMALL], 0
+        for i, size in enumerate(sizes):
+            if size > SMALL:
+                continue
+            if room < size:
+                groups.append([])
+                room = TOGETHER
+            groups[-1].append(i)
+            room -= size
+        return groups
+
+    def _relaxed(self, group: list[int]) -> dict[int, LaidOut | None]:
+        """Return the first layouts of small components relaxed, None where each has to see for itself."""
+        for i in group:
+            with self._at(i, HALF):
+                self._first(i)
+            self._stages.end_part()
+        layouts, parts = [self._begun[i] for i in group], [self._parts[i] for i in group]
+        self._stages.share = 0.0
+        with self._stages("relax"):
+            found = relaxed_together(layouts, parts, self._options, self._stages.tell)
+        return dict(zip(group, found, strict=True))
+
+    def _first(self, i: int) -> LaidOut:
+        if i not in self._begun:
+            self._begun[i] = next(self._runs[i])
+        return self._begun[i]
+
+    def _last(self, i: int, relaxed: LaidOut | None) -> LaidOut:
+        self._first(i)
+        last = self._runs[i].send(relaxed)
+        self._runs[i].close()  # and forgets what it has worked with
+        return last
+
+    def _copy(self, i: int, found: dict[int, LaidOut]) -> LaidOut | None:
+        """Return the layout of a component by that of the one that it is a copy of; None if that does not serve."""
+        copy = self._copies[i]
+        return None if copy is None else copied(found[copy.first], self._parts[i], copy.scale, self._options)
+
+    @contextmanager
+    def _at(self, i: int, portion: float = 1.0) -> Iterator[None]:
+        """Do a portion of the work on a component inside; errors say which one it is, if there are several."""
+        part = self._parts[i]
+        self._stages.share = portion * len(part.faces) / self._size
+        try:
+            yield
+        except (CurvatureError, MetricError, SeamError) as error:
+            if len(self._parts) == 1:
+                raise
+            first = part.constraints.names[0]
+            where = f"in the component of vertex {first} ({len(part.faces):,} triangles)"
+            raise type(error)(f"{where}: {error}") from error
 
 
 def flatten_component(
     part: Component, surface_of: SurfaceOf, options: Options, stages: Stages
-) -> Iterator[LaidOut]:
+) -> Generator[LaidOut, LaidOut | None, None]:
     """Flatten a connected mesh: find cones, scale the metric, cut, lay out, and part what overlaps.
 
-    The layout comes twice: as soon as there is one, and when it is what was asked for.
+    The layout comes twice: as soon as there is one, and when it is what was asked for. In between, what is sent is the
+    first one relaxed, or None where that is still to be done.
     """
     mesh = part.mesh
     with stages("cones", 0.1):
@@ -147,9 +227,13 @@ def flatten_component(
         return with_held_cones(once, part) if may_lack_room else once(part)
 
     first = flatten_held(options)
-    yield first
+    if options.quality is None:
+        surface.search = None  # It remembers what it was asked for, and takes much memory.
+    relaxed_first = yield first
 
     def flatten_by(asked: Options) -> LaidOut:
+        if asked is options and relaxed_first is not None:
+            return relaxed_first
         layout = first if asked is options else flatten_held(asked)
         if not relaxes(asked):
             return layout
@@ -157,7 +241,7 @@ def flatten_component(
             return relaxed(layout, part, asked, stages.tell)
 
     layout = with_quality(flatten_by, part, options)
-    surface.search = None  # It remembers what it was asked for, and takes much memory.
+    surface.search = None
     if options.charts == "atlas":
         with stages("atlas", 1.0):
             part_charts = overlaid if options.mirrored == "overlap" else without_overlaps
@@ -167,24 +251,3 @@ def flatten_component(
     if options.method in UNFOLDED:
         notes += unheld_notes(layout, part.constraints.names) + split_notes(layout, part.constraints.names)
     yield replace(layout, notes=layout.notes + notes)
-
-
-def _last(layouts: Iterator[LaidOut]) -> LaidOut:
-    """Return the last of a component's layouts."""
-    *_, last = layouts
-    return last
-
-
-@contextmanager
-def _at_component(prepared: Prepared, number: int, stages: Stages) -> Iterator[None]:
-    """Work on a component inside; errors say which one cannot be flattened, if there are several."""
-    part = prepared.components[number]
-    stages.share = len(part.faces) / len(prepared.checked.mesh.faces)
-    try:
-        yield
-    except (CurvatureError, MetricError, SeamError) as error:
-        if len(prepared.components) == 1:
-            raise
-        first = part.constraints.names[0]
-        where = f"in the component of vertex {first} ({len(part.faces):,} triangles)"
-        raise type(error)(f"{where}: {error}") from error

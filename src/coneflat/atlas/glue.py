@@ -39,6 +39,8 @@ def glue_charts(
     layout = replace(layout, seams=seams.edges)
     inner = np.flatnonzero(seams.charts[:, 0] == seams.charts[:, 1])
     layout = layout.joined(seams.coinciding(layout.places, inner, CONGRUENT))
+    if len(inner) == len(seams.edges):  # one chart
+        return layout
     refused: set[tuple[int, ...]] = set()
     gluing = _Gluing(mesh, layout, image)
     # What is glued changes which seams are stretches of one.

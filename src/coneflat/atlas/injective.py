@@ -157,6 +157,8 @@ def without_overlaps(laid_out: LaidOut, part: Component, options: Options) -> La
 
 def _forbidden_cuts(laid_out: LaidOut, part: Component, edges: IntArray) -> tuple[str, ...]:
     """Return a note if some edges (k,) of a layout's mesh that are cut must not be."""
+    if not part.is_forbidden.any():
+        return ()
     origin = edges if laid_out.cuts is None else laid_out.cuts.edge_origin[edges]
     is_forbidden = part.is_forbidden.ravel()[part.mesh.edge_halfedges[:, 0]]
     count = int(is_forbidden[np.unique(origin[origin >= 0])].sum())

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray, has_any
 from ..compiled import compiled
-from ..errors import LengthError, SeamError
+from ..errors import LengthError, MetricError, SeamError
 from ..geometry import double_areas, edge_lengths
 from ..geometry.operators import LEAST_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
 from ..geometry.planar import signed_double_areas
@@ -34,6 +34,8 @@ TOLERANCE, STEPS = 1e-2, 40
 BESIDES = 0.1
 # Where a patch's mean or the worst triangle of all would be worse, the same is tried with this sharpness.
 SHARP = 2.0
+# What is worse by less than this part is not: nothing may have moved, or what has as a whole.
+SAME = 1e-9
 
 
 def relaxes(options: Options) -> bool:
@@ -55,106 +57,159 @@ def relaxed(laid_out: LaidOut, part: Component, options: Options, tell: Callable
         options: which `relaxes`.
         tell: called after each step with what is being done.
     """
-    surface = _Surface(laid_out.mesh, part, laid_out)
-    before = surface.ratios(laid_out)
-    is_free = np.ones(len(surface.mesh.vertices), dtype=bool)
-    is_free[: len(part.mesh.vertices)] = ~held_boundary(part.mesh, part.constraints, options)
-    whole = options.stretch > 0 or options.polish == "whole"
-    if not whole:
-        is_free &= _around(surface.mesh, before > BENT) & ~surface.mesh.is_boundary_vertex
+    try:
+        return _relaxed([laid_out], [part], options, tell)[0]
+    except (SeamError, LengthError) as error:  # a metric that did not converge, or a cut at a sliver
+        is_whole = options.stretch > 0 or options.polish == "whole"
+        return replace(laid_out, notes=(*laid_out.notes, f"Not relaxed: {error}.")) if is_whole else laid_out
 
-    def relaxed_by(layout: LaidOut, sharpness: float, is_free: BoolArray) -> LaidOut:
+
+def relaxed_together(
+    layouts: Sequence[LaidOut], parts: Sequence[Component], options: Options, tell: Callable[[str], None]
+) -> Sequence[LaidOut | None]:
+    """Return the layouts of components relaxed as one mesh, by the work of each that has to be done.
+
+    None for each where one of them cannot be relaxed, and nobody knows which.
+    """
+    try:
+        return _relaxed(layouts, parts, options, tell)
+    except (SeamError, LengthError, MetricError):
+        return [None] * len(parts)
+
+
+def _relaxed(
+    layouts: Sequence[LaidOut], parts: Sequence[Component], options: Options, tell: Callable[[str], None]
+) -> list[LaidOut]:
+    surface = _Surface(layouts, parts)
+    mesh, points = surface.mesh, surface.points
+    before = surface.ratios(points)
+    is_free = surface.free_by(options)
+    if not options.stretch and options.polish != "whole":
+        is_free &= _around(mesh, before > BENT) & ~mesh.is_boundary_vertex
+
+    def relaxed_by(start: FloatArray, sharpness: float, is_free: BoolArray) -> FloatArray:
         if not is_free.any():
-            return layout
+            return start
         found: Relaxed = relax(
-            surface.mesh,
-            layout.points,
-            layout.corners,
+            mesh,
+            start,
+            surface.corners,
             StretchEnergy(options.stretch, sharpness),
-            lengths=surface.lengths,
+            lengths=surface.lengths_as_laid_out,
             weights=surface.weights,
             free=is_free,
             tolerance=TOLERANCE,
             steps=STEPS,
             progress=lambda step, _: tell(f"step {step}"),
         )
-        return replace(layout, points=found.points)
+        return found.points
 
-    moved = laid_out
-    try:
-        if options.stretch:
-            moved = relaxed_by(moved, 1.0, is_free)
-        else:
-            moved, is_lost = surface.without_losses(moved, relaxed_by(moved, 1.0, is_free), before, is_free)
-            if is_lost.any():
-                moved, _ = surface.without_losses(moved, relaxed_by(moved, SHARP, is_lost), before, is_lost)
-    except (SeamError, LengthError) as error:  # a metric that did not converge, or a cut at a sliver
-        return replace(laid_out, notes=(*laid_out.notes, f"Not relaxed: {error}.")) if whole else laid_out
-    return surface.described(moved, before, is_free, options)
+    if options.stretch:
+        points = relaxed_by(points, 1.0, is_free)
+    else:
+        points, is_lost = surface.without_losses(points, relaxed_by(points, 1.0, is_free), before, is_free)
+        if is_lost.any():
+            points, _ = surface.without_losses(points, relaxed_by(points, SHARP, is_lost), before, is_lost)
+    return surface.described(points, before, is_free, options)
 
 
 def mean_ratio(laid_out: LaidOut, part: Component) -> float:
     """Return the mean quasi-conformal distortion of a layout, by area."""
-    surface = _Surface(laid_out.mesh, part, laid_out)
-    return surface.mean(surface.ratios(laid_out))
+    surface = _Surface([laid_out], [part])
+    return float(surface.means(surface.ratios(surface.points))[0])
 
 
-@dataclass(frozen=True, eq=False)
 class _Surface:
-    """The triangles as they should be.
+    """The triangles of components as they should be, those of one after those of the other.
 
     Attributes:
-        mesh: what is laid out: the component's mesh, or that with edges cut.
-        part: the component.
-        laid_out: a layout of it.
+        layouts, parts: of each component.
+        mesh: what is laid out: the components' meshes, or these with edges cut.
+        points, corners: of all layouts.
+        lengths: (m, 3) side lengths.
+        areas: (m,) areas.
     """
 
-    mesh: TriangleMesh
-    part: Component
-    laid_out: LaidOut
+    def __init__(self, layouts: Sequence[LaidOut], parts: Sequence[Component]) -> None:
+        self.layouts, self.parts = layouts, parts
+        meshes = [one.mesh for one in layouts]
+        self._vertices = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+        self._faces = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])
+        self._points = np.cumsum([0, *(len(one.points) for one in layouts)])
+        self.mesh = meshes[0] if len(meshes) == 1 else _joined(meshes, self._vertices)
+        self.points = np.concatenate([one.points for one in layouts])
+        self.corners = np.concatenate(
+            [one.corners + start for one, start in zip(layouts, self._points, strict=False)]
+        )
+        self.lengths = np.concatenate(
+            [
+                part.lengths if mesh is part.mesh else edge_lengths(mesh.vertices, mesh.faces)
+                for mesh, part in zip(meshes, parts, strict=True)
+            ]
+        )
+        self.areas = double_areas(self.lengths) / 2
+        self._of_vertex = np.arange(len(parts)).repeat(np.diff(self._vertices))
+        self._of_face = np.arange(len(parts)).repeat(np.diff(self._faces))
+
+    def _sums(self, values: FloatArray, at: BoolArray | slice = slice(None)) -> FloatArray:
+        """Return the sum of values of faces of each component, over some faces."""
+        return np.bincount(self._of_face[at], values[at], len(self.parts)).astype(np.float64)
 
     @cached_property
-    def lengths(self) -> FloatArray:
-        """(m, 3) side lengths."""
-        if self.mesh is self.part.mesh:
-            return self.part.lengths
-        return edge_lengths(self.mesh.vertices, self.mesh.faces)
-
-    @cached_property
-    def areas(self) -> FloatArray:
-        """(m,) areas."""
-        return double_areas(self.lengths) / 2
+    def lengths_as_laid_out(self) -> FloatArray:
+        """(m, 3) side lengths at which each component has the area of its layout, so that all weigh the same."""
+        laid_out = self._sums(np.abs(signed_double_areas(self.points[self.corners])))
+        unit = np.sqrt(laid_out / (2 * self._sums(self.areas)))
+        return np.asarray(self.lengths * unit[self._of_face, None])
 
     @cached_property
     def weights(self) -> FloatArray:
         """(m,) what triangles count for their area."""
         least = np.finfo(np.float64).tiny
-        besides: FloatArray = 1 + BESIDES * self.areas.mean() / np.maximum(self.areas, least)
-        weights = self.part.constraints.weights
-        if weights is None:
-            return besides
-        of_faces = np.maximum(at_unit_scale(weights), LEAST_WEIGHT)[self.part.mesh.faces].mean(axis=1)
-        return besides * of_faces[self.laid_out.face_origin]
+        means = self._sums(self.areas) / np.diff(self._faces)
+        weights: FloatArray = 1 + BESIDES * means[self._of_face] / np.maximum(self.areas, least)
+        for part, one, start in zip(self.parts, self.layouts, self._faces, strict=False):
+            if part.constraints.weights is not None:
+                at_vertices = np.maximum(at_unit_scale(part.constraints.weights), LEAST_WEIGHT)
+                of_faces = at_vertices[part.mesh.faces].mean(axis=1)[one.face_origin]
+                weights[start : start + len(of_faces)] *= of_faces
+        return weights
 
-    def ratios(self, laid_out: LaidOut, chosen: IntArray | None = None) -> FloatArray:
+    def free_by(self, options: Options) -> BoolArray:
+        """Return (n,) True but for boundaries that are prescribed."""
+        is_free = np.ones(len(self.mesh.vertices), dtype=bool)
+        for part, start in zip(self.parts, self._vertices, strict=False):
+            stop = start + len(part.mesh.vertices)
+            is_free[start:stop] = ~held_boundary(part.mesh, part.constraints, options)
+        return is_free
+
+    def ratios(self, points: FloatArray, chosen: IntArray | None = None) -> FloatArray:
         """Return (m,) ratios of singular values, infinite for triangles that are turned over or have no area.
 
         chosen: the triangles of interest, the others are infinite; None for all.
         """
         ratios = np.full(len(self.mesh.faces), np.inf)
         chosen = np.arange(len(ratios)) if chosen is None else chosen
-        fill_ratios(np.ascontiguousarray(self.lengths), laid_out.points, laid_out.corners, chosen, ratios)
+        fill_ratios(np.ascontiguousarray(self.lengths), points, self.corners, chosen, ratios)
         return ratios
 
-    def mean(self, ratios: FloatArray) -> float:
-        """The mean ratio by area, over upright triangles."""
+    def means(self, ratios: FloatArray) -> FloatArray:
+        """Return the mean ratio of each component by area, over upright triangles; infinite if there are none."""
         upright = np.isfinite(ratios)
-        return float(np.average(ratios[upright], weights=self.areas[upright])) if upright.any() else np.inf
+        areas = self._sums(self.areas, upright)
+        sums = self._sums(np.where(upright, ratios, 0.0) * self.areas)
+        return np.divide(sums, areas, out=np.full(len(areas), np.inf), where=areas > 0)
+
+    def largest(self, ratios: FloatArray) -> FloatArray:
+        """Return the largest finite ratio of each component, or 1."""
+        largest: FloatArray = np.ones(len(self.parts))
+        np.maximum.at(largest, self._of_face, np.where(np.isfinite(ratios), ratios, 1.0))
+        return largest
 
     def without_losses(
-        self, laid_out: LaidOut, moved: LaidOut, before: FloatArray, was_free: BoolArray
-    ) -> tuple[LaidOut, BoolArray]:
-        """Return the moved layout, but as it was where its mean or its worst triangle would be worse.
+        self, points: FloatArray, moved: FloatArray, before: FloatArray, was_free: BoolArray
+    ) -> tuple[FloatArray, BoolArray]:
+        """Return the moved points, but as they were where their mean or their worst triangle would be worse.
 
         The vertices there, (n,), too. before: (m,) the ratios of the layout that nothing may be worse than.
         """
@@ -166,44 +221,71 @@ class _Surface:
         corner = np.argmax(was_free[faces[touched]], axis=1)
         of_face = patch[faces[touched, corner]]
         gain = before[touched] - after[touched]
-        gained = np.bincount(of_face, gain * self.areas[touched], count)
+        areas = self.areas[touched]
+        gained = np.bincount(of_face, gain * areas, count)
+        least = -SAME * np.bincount(of_face, before[touched] * areas, count)
         worst = np.zeros(count)
         np.maximum.at(worst, of_face, after[touched])
-        is_lost = ((gained < 0) | (worst > _largest(before)))[patch] & was_free
-        back = np.zeros(len(moved.points), dtype=bool)
-        back[moved.corners[is_lost[faces]]] = True
-        return replace(moved, points=np.where(back[:, None], laid_out.points, moved.points)), is_lost
+        is_worse = worst[patch] > (1 + SAME) * self.largest(before)[self._of_vertex]
+        is_lost = ((gained < least)[patch] | is_worse) & was_free
+        back = np.zeros(len(moved), dtype=bool)
+        back[self.corners[is_lost[faces]]] = True
+        return np.where(back[:, None], points, moved), is_lost
 
-    def described(self, moved: LaidOut, before: FloatArray, was_free: BoolArray, options: Options) -> LaidOut:
-        """Return the moved layout with the curvature and the scale that it has, and with what it was before."""
-        mesh, given = self.mesh, self.part.mesh
-        corners = moved.points[moved.corners]
+    def described(
+        self, points: FloatArray, before: FloatArray, was_free: BoolArray, options: Options
+    ) -> list[LaidOut]:
+        """Return the layouts with moved points, with the curvature and the scale that they have, and had before."""
+        mesh, corners = self.mesh, points[self.corners]
         # Where triangles were moved; elsewhere it is what it was.
         changed = np.zeros(len(mesh.vertices), dtype=bool)
         changed[mesh.faces[has_any(was_free, mesh.faces)]] = True
-        curvature = np.where(changed, laid_out_curvature(mesh, corners, changed), moved.curvature)
+        old = np.concatenate([one.curvature for one in self.layouts])
+        curvature = np.where(changed, laid_out_curvature(mesh, corners, changed), old)
+        # What counts as no area is so for each component.
+        unit = self._sums(self.areas)[self._of_face]
         after = np.abs(signed_double_areas(corners)) / 2
-        log_scale = np.where(was_free, vertex_log_scale(mesh, self.areas, after), moved.log_scale)
-        count = len(given.vertices)
-        areas = weighted_areas(
-            vertex_areas(given.faces, self.part.lengths, count), self.part.constraints.weights
-        )
-        statistics = replace(
-            moved.statistics,
-            relaxed_vertices=int(was_free.sum()),
-            qc_mean_unrelaxed=self.mean(before),
-            qc_max_unrelaxed=_largest(before),
-            area_distortion=area_distortion(log_scale[:count], areas),
-        )
+        old = np.concatenate([one.log_scale for one in self.layouts])
+        log_scale = np.where(was_free, vertex_log_scale(mesh, self.areas / unit, after / unit), old)
+        # Where the boundary is free, what comes out is what was wanted.
         is_open = mesh.is_boundary_vertex & (not options.prescribes_boundary)
-        return replace(
-            moved,
-            curvature=curvature,
-            # Where the boundary is free, what comes out is what was wanted.
-            target=np.where(is_open, curvature, moved.target),
-            log_scale=log_scale,
-            statistics=statistics,
-        )
+        target = np.where(is_open, curvature, np.concatenate([one.target for one in self.layouts]))
+        freed = np.bincount(self._of_vertex[was_free], minlength=len(self.parts)).tolist()
+        means, largest = self.means(before).tolist(), self.largest(before).tolist()
+        found = []
+        for i, one in enumerate(self.layouts):
+            own = slice(self._vertices[i], self._vertices[i + 1])
+            statistics = replace(
+                one.statistics,
+                relaxed_vertices=freed[i],
+                qc_mean_unrelaxed=means[i],
+                qc_max_unrelaxed=largest[i],
+                area_distortion=_area_distortion(self.parts[i], log_scale[own]),
+            )
+            found.append(
+                replace(
+                    one,
+                    points=points[self._points[i] : self._points[i + 1]],
+                    curvature=curvature[own],
+                    target=target[own],
+                    log_scale=log_scale[own],
+                    statistics=statistics,
+                )
+            )
+        return found
+
+
+def _joined(meshes: Sequence[TriangleMesh], starts: IntArray) -> TriangleMesh:
+    """Return meshes as one, the vertices of each from a number on."""
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+    return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+def _area_distortion(part: Component, log_scale: FloatArray) -> float:
+    """Return the area distortion of a component, some of whose edges may have been cut."""
+    count = len(part.mesh.vertices)
+    areas = weighted_areas(vertex_areas(part.mesh.faces, part.lengths, count), part.constraints.weights)
+    return area_distortion(log_scale[:count], areas)
 
 
 @compiled
@@ -234,10 +316,6 @@ def fill_ratios(
         has_area = (rest[0].conjugate() * rest[1]).imag != 0.0
         if has_area and one > two:
             ratios[f] = (one + two) / (one - two)
-
-
-def _largest(ratios: FloatArray) -> float:
-    return float(ratios[np.isfinite(ratios)].max(initial=1.0))
 
 
 def _around(mesh: TriangleMesh, is_bent: BoolArray) -> BoolArray:

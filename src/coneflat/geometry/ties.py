@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .._arrays import FloatArray, dots
+from ..compiled import compiled
 from ..kept import kept_with
 from ..mesh import TriangleMesh
 
@@ -21,8 +24,9 @@ def _own_vectors(centred: FloatArray) -> tuple[FloatArray | None, FloatArray | N
     """
     squares = dots(centred, centred)
     one, two = squares @ centred, squares**2 @ centred
-    across = np.cross(one, two)
-    lengths = np.linalg.norm(one), np.linalg.norm(two), np.linalg.norm(across)
+    (a, b, c), (d, e, f) = one.tolist(), two.tolist()
+    across = np.array([b * f - c * e, c * d - a * f, a * e - b * d])
+    lengths = [math.sqrt(vector @ vector) for vector in (one, two, across)]
     # What rounding leaves of vectors that vanish means nothing.
     has_one = lengths[0] > 1e-6 * len(centred)
     has_across = lengths[2] > 1e-6 * max(lengths[0] * lengths[1], 1e-12 * len(centred) ** 2)
@@ -63,12 +67,27 @@ def tie_key(vertices: FloatArray) -> FloatArray:
         key += 0.3 * (centred @ one)
     if across is not None:
         key += 0.1 * (centred @ across)
-    # On symmetric shapes many vertices are alike. Which of them come first does not matter, but from there on the
-    # others must follow alike: by their distances from the first, the second, the third.
-    for weight in (0.05, 0.02, 0.01):
-        first = np.argmax(key >= key.max() - EQUAL)
-        key += weight * np.linalg.norm(centred - centred[first], axis=1)
+    follow_first(np.ascontiguousarray(centred), key)
     return key
+
+
+@compiled
+def follow_first(centred: FloatArray, key: FloatArray) -> None:
+    """Add to a key (n,) small parts of the distances (n, 3) from the first vertex by it, the second, the third.
+
+    On symmetric shapes many vertices are alike. Which of them come first does not matter, but from there on the others
+    must follow alike.
+    """
+    for weight in (0.05, 0.02, 0.01):
+        enough = key.max() - EQUAL
+        first = 0
+        while key[first] < enough:
+            first += 1
+        for v in range(len(key)):
+            square = 0.0
+            for x in range(3):
+                square += (centred[v, x] - centred[first, x]) ** 2
+            key[v] += weight * math.sqrt(square)
 
 
 def mesh_tie_key(mesh: TriangleMesh) -> FloatArray:

@@ -38,9 +38,9 @@ class VertexCurvatures:
 
     def within(self, component: IntArray) -> VertexCurvatures:
         """Return those of a component, numbered there; `component` are its vertices."""
+        if not len(self):
+            return self
         inside = np.isin(self.vertices, component)
-        if not inside.any():
-            return VertexCurvatures(np.empty(0, dtype=np.int64), np.empty(0))
         order = np.argsort(component, kind="stable")
         places = order[np.searchsorted(component, self.vertices[inside], sorter=order)]
         return VertexCurvatures(places, self.curvatures[inside])

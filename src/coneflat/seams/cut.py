@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .._arrays import IntArray, has_any
+from .._arrays import BoolArray, IntArray
+from ..compiled import compiled
 from ..errors import MetricError
-from ..mesh import TriangleMesh, corner_fans, label_components
+from ..mesh import TriangleMesh, label_components
 from ..text import plural
 
 
@@ -59,24 +60,51 @@ def open_along(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
     """Return a mesh whose faces are not joined at given edges (k,); vertices are numbered as before, in their order."""
     on_seam = np.zeros(len(mesh.vertices), dtype=bool)
     on_seam[mesh.edges[seams]] = True
-    # Only the fans of vertices on seams fall apart.
-    is_near = has_any(on_seam, mesh.faces)
-    glued = has_any(on_seam, mesh.edges) & ~mesh.is_boundary_edge
-    glued[seams] = False
-    pairs = mesh.edge_halfedges[glued]
-    near = mesh.faces[is_near]
-    _, fan = corner_fans(near, *(3 * (np.cumsum(is_near) - 1)[pairs // 3] + pairs % 3).T)
-    at_seam = on_seam[near]
-    owner = near[at_seam]
-    fans, first, which = np.unique(fan[at_seam], return_index=True, return_inverse=True)
-    order = np.lexsort((first, owner[first]))
-    copies = np.ones(len(mesh.vertices), dtype=np.int64)
-    copies[on_seam] = np.bincount(owner[first], minlength=len(copies))[on_seam]
+    is_seam = np.zeros(len(mesh.edges), dtype=bool)
+    is_seam[seams] = True
+    copies, faces = np.where(on_seam, 0, 1), np.zeros(mesh.faces.shape, dtype=np.int64)
+    number_copies(mesh.faces, mesh.halfedge_edges, mesh.edge_halfedges, is_seam, copies, faces)
+    faces += (np.cumsum(copies) - copies)[mesh.faces]
     origin = np.repeat(np.arange(len(copies)), copies)
-    number = np.empty(len(fans), dtype=np.int64)
-    number[order] = np.flatnonzero(on_seam[origin])
-    faces = (np.cumsum(copies) - copies)[mesh.faces]
-    corners = faces[is_near]
-    corners[at_seam] = number[which]
-    faces[is_near] = corners
     return CutMesh(TriangleMesh(mesh.vertices[origin], faces), origin)
+
+
+@compiled
+def number_copies(
+    faces: IntArray,
+    edge_of: IntArray,
+    sides: IntArray,
+    is_seam: BoolArray,
+    copies: IntArray,
+    number: IntArray,
+) -> None:
+    """Number the copies of each vertex on a seam, from 0, in the order of their first corners.
+
+    Args:
+        faces: (m, 3), oriented alike.
+        edge_of, sides: (3m,) the edge of each half-edge, and (e, 2) the half-edges of each edge.
+        is_seam: (e,) the edges across which faces are not joined.
+        copies: (n,) 0 at the vertices on seams, 1 elsewhere; gets the number of copies.
+        number: (m, 3) 0; gets the copy at each corner.
+    """
+    is_done = np.empty(3 * len(faces), np.bool_)
+    for c in range(len(is_done)):
+        is_done[c] = copies[faces[c // 3, c % 3]] == 1
+    for first in range(len(is_done)):
+        if is_done[first]:
+            continue
+        vertex = faces[first // 3, first % 3]
+        # Around it one way as far as that goes, and then the other way.
+        for turn in (1, 2):
+            here = first
+            while here >= 0 and (here == first or not is_done[here]):
+                is_done[here] = True
+                number[here // 3, here % 3] = copies[vertex]
+                h = here - here % 3 + (here % 3 + turn) % 3
+                pair = sides[edge_of[h]]
+                other = pair[1] if pair[0] == h else pair[0]
+                is_end = other < 0 or is_seam[edge_of[h]]
+                here = -1 if is_end else other - other % 3 + (other % 3 + turn) % 3
+                if here == first:
+                    break
+        copies[vertex] += 1

@@ -47,7 +47,7 @@ class Reach:
     Attributes:
         distance: (n,) what the path to each vertex costs, infinite where the search did not get, -1 on the border.
         before: (n,) the slot by which each was reached, -1 where the search began.
-        origin: (n,) the terminal it was reached from, -1 if from a vertex off the border.
+        origin: (n,) the terminal it was reached from.
         reached: (n,) the vertices reached come first.
         count: how many were.
         arrival: (count of terminals,) what the path to each terminal costs.
@@ -127,45 +127,38 @@ class OpenMesh:
         self.height = np.zeros(n)
         self.effort = 0
         self.slots, self._slot_of, count = slots.halfedges, slots.of_halfedges, len(slots.halfedges)
-        self._enters = np.empty(count, dtype=INDEX)
-        self._graph = slots.starts, slots.heads, self.cost[self.slots], self._enters
+        self._graph = slots.starts, slots.heads, self.cost[self.slots], np.empty(count, dtype=INDEX)
         self._leaving = slots.leaving
         self._number, self._around = np.full(sides, -1, dtype=np.int64), np.empty(sides, dtype=np.int64)
         self._labelled = NOTHING
         # A slot is put on the heap twice at most: as a seed, and for the vertex it leads to.
         self.heap = np.empty(2 * count + n), np.empty(2 * count + n, dtype=INDEX)
-        self._spare: list[Reach] = []
+        # What searches fill, a row for each at the same time; all distances are infinite.
+        self._rows = self._new_rows(1)
 
     def label_terminals(self, points: IntArray) -> Terminals:
         """Return the curves of the border, and the points that are not on it; those returned before are void."""
         from .shortest_paths import label_terminals
 
-        self._number[self._labelled] = -1
-        sides = np.flatnonzero(self.cut)
-        starts = np.empty(len(sides) + len(points) + 1, dtype=np.int64)
-        labels = self._number, self._around, starts
-        count = label_terminals(self.twin, self._leaving, self.cut, sides, points, *labels)
-        self._labelled = self._around[: starts[count]]
+        enters = self._graph[-1]
+        labels = self._number, self._around, len(self._labelled), enters
+        starts = label_terminals(self.twin, self._leaving, self.cut, points, self._slot_of, *labels)
+        self._labelled = self._around[: starts[-1]]
         self.effort += len(self._labelled) // 4
-        across = self.twin[self._labelled]
-        glued = across >= 0
-        self._enters[self._slot_of[across[glued]]] = self._number[self._labelled[glued]]
-        return Terminals(count, self._number, self._labelled, starts[: count + 1])
+        return Terminals(len(starts) - 1, self._number, self._labelled, starts)
 
     def search(
         self,
         terminals: Terminals,
         seeds: IntArray,
         seed_costs: FloatArray,
-        inner: IntArray = NOTHING,
-        inner_costs: FloatArray = NO_COSTS,
         *,
         target: int = -1,
         limit: float = np.inf,
         farthest: float = np.inf,
     ) -> Reach:
-        """Search along half-edges that leave terminals, and from vertices off the border; see the kernel."""
-        reach = self._spare.pop() if self._spare else self._new_reach()
+        """Search along half-edges that leave terminals; see the kernel."""
+        reach = Reach(*(array[0] for array in self._rows))
         reach.arrival, reach.last = (
             np.full(terminals.count, np.inf),
             np.full(terminals.count, -1, dtype=np.int64),
@@ -176,16 +169,32 @@ class OpenMesh:
             self._slot_of[seeds[free]],
             seed_costs[free],
             terminals.number[seeds[free]],
-            inner,
-            inner_costs,
+            NOTHING,
+            NO_COSTS,
         )
         self._run(begin, self.height, (target, limit, farthest), reach)
         self.effort += reach.count
         return reach
 
-    def _new_reach(self) -> Reach:
-        n = len(self.height)
-        return Reach(np.full(n, np.inf), *np.empty((3, n), dtype=INDEX))
+    def shortest_tree(
+        self, terminals: Terminals, ends: IntArray, arms: FloatArray, limit: float
+    ) -> IntArray | None:
+        """Return the half-edges of the shortest tree that connects ends; None if it costs no less than the limit."""
+        from .reconnect import shortest_tree
+
+        sets = 2 ** (len(ends) - 1) - 1
+        if len(self._rows[0]) < sets:
+            self._rows = self._new_rows(sets)
+        graph = *self._graph, self.slots, self._slot_of, self.tail, self.cut
+        places = terminals.number, terminals.around, terminals.starts, ends, arms, limit, self.height
+        tree, reached = shortest_tree(*graph, *places, *self._rows, *self.heap)
+        self.effort += reached
+        return tree if len(tree) else None
+
+    def _new_rows(self, count: int) -> tuple[FloatArray, Int32Array, Int32Array, Int32Array]:
+        shape = count, len(self.height)
+        before, origin, reached = (np.empty(shape, dtype=INDEX) for _ in range(3))
+        return np.full(shape, np.inf), before, origin, reached
 
     def _run(
         self,
@@ -225,29 +234,21 @@ class OpenMesh:
         )
 
     def forget(self, terminals: Terminals, reach: Reach) -> None:
-        """Take back the arrays of a search that is no longer needed."""
+        """Take back the arrays of a search that is no longer needed, as it must be before the next."""
         reach.distance[reach.vertices] = np.inf
         reach.distance[self.tail[terminals.around]] = np.inf
-        self._spare.append(reach)
 
     def path_over(self, reach: Reach, halfedge: int) -> list[int]:
         """Return the half-edges of a path found, from the one over which it goes last back to the terminal."""
-        return self.path(reach, int(self._slot_of[halfedge]))[0]
-
-    def path(self, reach: Reach, slot: int) -> tuple[list[int], int]:
-        """Return the half-edges of a path found, from its last slot back, and the vertex it begins at.
-
-        The vertex is -1 if the path begins at a terminal.
-        """
-        path, v = [], -1
+        path, slot = [], int(self._slot_of[halfedge])
         while slot >= 0:
             h = int(self.slots[slot])
             path.append(h)
             v = int(self.tail[h])
             if reach.distance[v] == ON_BORDER:
-                return path, -1
+                break
             slot = int(reach.before[v])
-        return path, v
+        return path
 
     def cut_along(self, halfedges: IntArray) -> None:
         """Cut edges, given by either half."""
@@ -266,6 +267,5 @@ class OpenMesh:
         """Lower the heights to the distance from half-edges that became part of the border."""
         ends = np.unique([self.tail[halfedges], self.mesh.heads[halfedges]])
         begin = NOTHING, NO_COSTS, NOTHING, ends, np.zeros(len(ends))
-        fresh = self._new_reach()
-        reach = Reach(self.height, fresh.before, fresh.origin, fresh.reached)
+        reach = Reach(self.height, *(array[0] for array in self._rows[1:]))
         self._run(begin, np.zeros(len(self.height)), (-1, np.inf, np.inf), reach)

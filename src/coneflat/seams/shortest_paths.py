@@ -22,17 +22,27 @@ def label_terminals(
     twin: IntArray,
     leaving: IntArray,
     cut: BoolArray,
-    sides: IntArray,
     points: IntArray,
+    slot_of: IntArray,
     terminal: IntArray,
     around: IntArray,
-    starts: IntArray,
-) -> int:
-    """Number the border curves through given half-edges, then the points on none of them; return how many there are.
+    labelled: int,
+    enters: Int32Array,
+) -> IntArray:
+    """Number the border curves, then the points on none of them; return where each of them begins in `around`.
 
-    leaving: (n,) a half-edge that leaves each vertex. terminal: (3m,) -1; gets the number at each half-edge that leaves
-    a curve or point. around: these half-edges in order; starts: where each terminal begins there.
+    Args:
+        twin, leaving, cut, slot_of: (3m,) of the half-edges, but (n,) a half-edge that leaves each vertex.
+        points: vertices.
+        terminal: (3m,) gets the number at each half-edge that leaves a curve or point, and -1 elsewhere.
+        around: (3m,) gets these half-edges in order.
+        labelled: how many there are of those that had a number before.
+        enters: gets the number of the terminal that each slot enters, from those that leave it.
     """
+    for h in around[:labelled]:
+        terminal[h] = -1
+    sides = np.flatnonzero(cut)
+    starts = np.empty(len(sides) + len(points) + 1, np.int64)
     count = 0
     n = 0
     starts[0] = 0
@@ -44,12 +54,14 @@ def label_terminals(
             terminal[h] = count
             around[n] = h
             n += 1
+            if twin[h] >= 0:
+                enters[slot_of[twin[h]]] = count
             if not cut[h]:
                 h = twin[h]
             h = h - h % 3 + (h + 1) % 3
         count += 1
         starts[count] = n
-    return count
+    return starts[: count + 1].copy()
 
 
 @compiled

@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 from scipy.sparse import bmat, csc_matrix, csr_matrix
 
 from ..errors import OptionError
-from .factors import CholespyFactor, EmptyFactor, Factor, MultigridSolver, NotPositiveDefinite, SuperLUFactor
+from .factors import (
+    CholespyFactor,
+    DenseFactor,
+    EmptyFactor,
+    Factor,
+    MultigridSolver,
+    NotPositiveDefinite,
+    SuperLUFactor,
+)
 
 # The modules that the back ends need; those that are no dependencies, with what installs them.
 MODULES = {
@@ -24,6 +32,8 @@ MODULES = {
     "amg": "pyamg",
 }
 INSTALLED_BY = {"pardiso": "coneflat[fast]", "amg": "coneflat[amg]"}
+# Unknowns up to which a dense matrix takes less than the least of the others.
+TINY = 100
 # Unknowns below which loading MKL, 0.03 s in each process, takes longer than what it saves.
 LARGE = 12_000
 # Unknowns of scattered parts below which SuperLU is faster.
@@ -95,10 +105,15 @@ def factorize(
         return EmptyFactor()
     choice = _choice.get() or Choice("auto")
     name = choice.name
+    is_dense = name == "auto" and size <= TINY
     if name == "auto":
-        name = "scipy" if is_scattered and size < SCATTERED else best_for(max(size, min(whole, LARGE)))
+        is_for_lu = is_dense or (is_scattered and size < SCATTERED)
+        name = "scipy" if is_for_lu else best_for(max(size, min(whole, LARGE)))
     try:
-        factor = _open(name, matrix) if used_up is None else used_up.renewed(matrix)
+        if used_up is not None:
+            factor = used_up.renewed(matrix)
+        else:
+            factor = DenseFactor(matrix) if is_dense else _open(name, matrix)
     except NotPositiveDefinite:
         # Rounding has made it indefinite: with pivots it has a factorization all the same.
         name, factor = _pivoting(name, matrix)

@@ -9,6 +9,7 @@ import math
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.linalg import lapack
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
@@ -95,6 +96,28 @@ class SuperLUFactor:
     def renewed(self, matrix: csc_matrix) -> SuperLUFactor:
         """Return the factor of another matrix of the same size."""
         return SuperLUFactor(matrix)
+
+
+class DenseFactor:
+    """A dense Cholesky factorization by LAPACK: of tiny matrices, for which others take longer to begin."""
+
+    name = "scipy"
+    break_even = 60
+
+    def __init__(self, matrix: csc_matrix) -> None:
+        # Symmetric, so that its rows are the columns that LAPACK wants.
+        self._lower, failed = lapack.dpotrf(matrix.toarray().T, lower=1, clean=0, overwrite_a=1)
+        if failed:
+            raise NotPositiveDefinite(f"the minor of order {failed} is not positive")
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
+        solution: FloatArray = lapack.dpotrs(self._lower, right, lower=1)[0]
+        return solution
+
+    def renewed(self, matrix: csc_matrix) -> DenseFactor:
+        """Return the factor of another matrix of the same size."""
+        return DenseFactor(matrix)
 
 
 class CholespyFactor:

@@ -59,7 +59,10 @@ class ExactModel(DenseModel):
 
     def insert(self, unknowns: IntArray) -> IntArray:
         """Add vertices, if they are not in, and return the places of all."""
-        new = np.setdiff1d(unknowns, self.unknowns)
+        is_new = np.zeros(len(self._log_scale), dtype=bool)
+        is_new[unknowns] = True
+        is_new[self.unknowns] = False
+        new = np.flatnonzero(is_new)
         for some in self._operator.batches(new):
             self._add(some, self._operator.responses(some, self._room(len(some))))
         order = np.argsort(self.unknowns, kind="stable")
@@ -133,11 +136,13 @@ class ExactModel(DenseModel):
         # Some of the coarse model's functions wide: from there on its distances tell nothing.
         size = max(40, 4 * len(self._usable) // self._coarse.size)
         taken = self.unknowns[members]
+        is_free = self._usable.copy()
+        is_free[taken] = False
         targets = []
         for place in range(len(self.fixed), len(members)):
             s, k = int(taken[place]), curvatures[place]
-            near = self.near(s, size)
-            near = near[~np.isin(near, taken)]
+            near = ball(self._indptr, self._indices, s, size)
+            near = near[is_free[near]]
             if not len(near) or k == 0:
                 continue
             linear = 2 * k * (score[near] - score[s])

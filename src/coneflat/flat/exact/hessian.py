@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 from scipy.sparse import csc_matrix
 
@@ -29,6 +31,8 @@ class HessianPattern:
         self._starts, self._rows = starts, rows[:count].copy()
         self._entry = np.empty(len(tail), dtype=np.int32)
         find_entries(tail, self._starts, self._rows, self._entry)
+        # SciPy looks at a new matrix for longer than a small one takes to be filled.
+        self._matrix = csc_matrix((np.zeros(count), self._rows, self._starts), shape=(n, n))
 
     def matrix(self, cots: FloatArray, held: BoolArray) -> csc_matrix:
         """Return the (n, n) Laplacian, with rows and columns of the identity at the held vertices.
@@ -41,8 +45,9 @@ class HessianPattern:
         fill_values(
             self._tail, self._twin, cots, held, self._starts, self._rows, self._entry, self._diagonal, values
         )
-        n = len(held)
-        return csc_matrix((values, self._rows, self._starts), shape=(n, n))
+        matrix = copy(self._matrix)
+        matrix.data = values
+        return matrix
 
 
 @compiled

@@ -271,7 +271,9 @@ def checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> 
     pinned = np.zeros(len(target), dtype=bool)
     count, component = mesh.components
     target = target.copy()
-    for label in np.setdiff1d(np.arange(count), component[fixed]):
+    has_fixed = np.zeros(count, dtype=bool)
+    has_fixed[component[fixed]] = True
+    for label in np.flatnonzero(~has_fixed):
         inside = component == label
         faces = int(inside[mesh.faces[:, 0]].sum())
         edges = int(inside[mesh.edges[:, 0]].sum())

@@ -7,12 +7,13 @@ and so in the unknowns that move these.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ..._arrays import ComplexArray, FloatArray, Int32Array, IntArray, has_any
+from ..._arrays import BoolArray, ComplexArray, FloatArray, Int32Array, IntArray, has_any
 from ...compiled import compiled
 from ...geometry.planar import map_factors
 from ...mesh import label_components
@@ -88,6 +89,23 @@ class Elements:
         self._alpha = self._a_of.ravel()[entry] * motions.coefficient[at]
         self._beta = self._b_of.ravel()[entry] * motions.coefficient[at]
         self._find_pattern()
+
+    def of_parts(self, chosen: BoolArray) -> tuple[Elements, IntArray]:
+        """Return the elements of chosen parts (parts,), numbered anew, and (k',) the numbers of their unknowns here."""
+        some = chosen[self.part]
+        unknowns = np.flatnonzero(chosen[self.unknown_part])
+        number = np.zeros(self.count + 1, dtype=np.int64)
+        number[unknowns] = np.arange(len(unknowns))
+        number[-1] = len(unknowns)
+        found, sizes = copy(self), np.diff(self._start)
+        entries = some.repeat(sizes)
+        found.faces, found.weight, found.count = self.faces[some], self.weight[some], len(unknowns)
+        found._corners, found._a_of, found._b_of = self._corners[some], self._a_of[some], self._b_of[some]
+        found._start = np.concatenate([[0], np.cumsum(sizes[some])])
+        found._unknown = number[self._unknown[entries]]
+        found._alpha, found._beta = self._alpha[entries], self._beta[entries]
+        found._find_pattern()
+        return found, unknowns
 
     def _find_pattern(self) -> None:
         k, sizes = self.count, np.diff(self._start)

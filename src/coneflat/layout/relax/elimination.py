@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-import scipy.linalg
+from collections.abc import Iterator
 
-from ..._arrays import FloatArray
+import numpy as np
+from scipy.linalg import lapack
+from scipy.sparse import csr_matrix
+
+from ..._arrays import FloatArray, IntArray
+from ...mesh import label_components
 
 # Relative size below which what elimination leaves of an equation is rounding.
 ROUNDING = 1e-10
@@ -15,9 +19,11 @@ TINY = 1e-15
 NOT_WHOLE = 1e-9
 # Part of the largest coefficient of an equation that a pivot has at least.
 PIVOT = 0.5
+# Columns that LAPACK turns together.
+PANEL = 32
 
 
-def sparse_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+def sparse_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, FloatArray]:
     """Return (v, k + 1) a basis of the solutions of equations, one of these in the last column, and what was missed.
 
     Equations with the fewest variables are solved first, each for the variable that is in the fewest others (H. M.
@@ -32,9 +38,9 @@ def sparse_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, F
         The basis, and (d,) what is left of the right-hand sides of equations that depend on others: 0 unless they
         contradict these.
     """
-    work = np.concatenate([rows, right[:, None]], axis=1)
+    work = np.concatenate([rows.toarray(), right[:, None]], axis=1)
     count = rows.shape[1]
-    is_open = np.ones(len(rows), dtype=bool)
+    is_open = np.ones(len(work), dtype=bool)
     solved: list[tuple[int, int]] = []
     while True:
         filled = np.abs(work[:, :count]) > NOT_WHOLE
@@ -61,28 +67,80 @@ def sparse_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, F
     basis[pivots, :-1] = -work[np.ix_(at, free)]
     basis[pivots, -1] = work[at, count]
     basis[np.abs(basis) < NOT_WHOLE * max(1.0, float(np.abs(basis).max(initial=0.0)))] = 0.0
-    return basis, work[is_open, count]
+    return csr_matrix(basis), work[is_open, count]
 
 
-def orthogonal_solutions(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+def orthogonal_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, FloatArray]:
     """Return (v, k + 1) a basis of the solutions of equations, one of these in the last column, and what was missed.
+
+    Each set of variables that equations connect is solved for by itself.
 
     Args:
         rows: (r, v) coefficients, dependent ones among them are no harm.
         right: (r,).
 
     Returns:
-        The basis, and (r,) what is left of the right-hand sides: rounding unless equations contradict each other.
+        The basis, and (d,) what is left of the right-hand sides, turned: rounding unless equations contradict each
+        other.
     """
-    q, r, pivots = scipy.linalg.qr(rows, mode="economic", pivoting=True)
+    variables = rows.shape[1]
+    missed, at, columns, values, count = [np.empty(0)], [], [], [], 0
+    for own, rights, matrix in _blocks(rows):
+        basis, last, left = _solutions_of_block(matrix, right[rights])
+        whole = np.concatenate([last[:, None], basis], axis=1)
+        row, column = np.nonzero(whole)
+        at.append(own[row])
+        columns.append(np.where(column == 0, -1, count + column - 1))
+        values.append(whole[row, column])
+        missed.append(left)
+        count += basis.shape[1]
+    column = np.concatenate(columns)
+    column[column < 0] = count
+    solutions = csr_matrix(
+        (np.concatenate(values), (np.concatenate(at), column)), shape=(variables, count + 1)
+    )
+    return solutions, np.concatenate(missed)
+
+
+def _blocks(rows: csr_matrix) -> Iterator[tuple[IntArray, IntArray, FloatArray]]:
+    """Yield sets of variables, (w,), the equations that connect these, (h,), and their coefficients, (h, w)."""
+    equations, variables = rows.shape
+    entries = rows.tocoo()
+    count, block = label_components(variables + equations, entries.col, variables + entries.row)
+    order = np.argsort(block, kind="stable")  # the variables of each come before its equations
+    bounds = np.searchsorted(block[order], np.arange(count + 1))
+    place = np.empty(len(block), dtype=np.int64)
+    place[order] = np.arange(len(block)) - bounds[block[order]]
+    widths = np.bincount(block[:variables], minlength=count)
+    starts = np.concatenate([[0], np.cumsum(widths * (np.diff(bounds) - widths))])
+    of_entry = block[entries.col]
+    row = place[variables + entries.row] - widths[of_entry]
+    dense = np.zeros(starts[-1])
+    dense[starts[of_entry] + row * widths[of_entry] + place[entries.col]] = entries.data
+    for b, width in enumerate(widths.tolist()):
+        members = order[bounds[b] : bounds[b + 1]]
+        yield (
+            members[:width],
+            members[width:] - variables,
+            dense[starts[b] : starts[b + 1]].reshape(-1, width),
+        )
+
+
+def _solutions_of_block(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return (w, f) a basis of what equations (h, w) let free, (w,) a solution, and what is left, turned."""
+    height, width = rows.shape
+    if not height:
+        return np.eye(width), np.zeros(width), right
+    # By LAPACK itself: there may be thousands of blocks, and SciPy's checks take longer than all of it.
+    r, pivots, scales, _, _ = lapack.dgeqp3(rows, lwork=(width + 1) * PANEL)
+    turned = lapack.dormqr("L", "T", r[:, : len(scales)], scales, right[:, None], PANEL)[0][:, 0]
     diagonal = np.abs(np.diag(r))
     rank = int((diagonal > ROUNDING * max(diagonal[0], 1e-300)).sum())
-    turned = q.T @ right
-    solved = scipy.linalg.solve_triangular(
-        r[:rank, :rank], np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
-    )
-    count = rows.shape[1]
-    basis = np.zeros((count, count - rank + 1))
-    basis[pivots[:rank]] = np.where(np.abs(solved) > TINY, solved, 0.0)
-    basis[pivots[rank:], np.arange(count - rank)] = 1.0
-    return basis, right - q[:, :rank] @ turned[:rank]
+    wanted = np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
+    solved = lapack.dtrtrs(r[:rank, :rank], wanted)[0] if rank else wanted
+    solved = np.where(np.abs(solved) > TINY, solved, 0.0)
+    pivots -= 1  # LAPACK counts from 1
+    basis, last = np.zeros((width, width - rank)), np.zeros(width)
+    basis[pivots[:rank]], last[pivots[:rank]] = solved[:, :-1], solved[:, -1]
+    basis[pivots[rank:], np.arange(width - rank)] = 1.0
+    return basis, last, turned[rank:]

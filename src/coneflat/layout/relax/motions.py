@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_matrix, eye, vstack
 
 from ..._arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import OptionError
@@ -208,9 +209,9 @@ class _Builder:
         """Have points shifted by variables of the small system, each times a factor."""
         if not len(points):
             return
-        rows = self._basis[variables] + (1j * self._basis[variables + 1] if is_complex else 0)
-        row, column = np.nonzero(rows)
-        coefficient = rows[row, column] * factors[row]
+        rows = self._basis[variables]
+        found = (rows + 1j * self._basis[variables + 1] if is_complex else rows).tocoo()
+        row, column, coefficient = found.row, found.col, found.data * factors[found.row]
         self.entries.append(
             (points[row], np.where(column == self._basis.shape[1] - 1, -1, column), coefficient)
         )
@@ -312,24 +313,22 @@ class _Builder:
         )
         return here
 
-    def _solutions(self) -> FloatArray:
+    def _solutions(self) -> csr_matrix:
         """Return (v, k + 1) a basis of the variables' values, and one solution of the equations in the last column."""
-        if not self.size:
-            return np.zeros((0, 1))
         rows, right = self._equations()
-        if not len(rows):
-            return np.concatenate([np.eye(self.size), np.zeros((self.size, 1))], axis=1)
+        if not len(right):
+            return eye(self.size, self.size + 1, format="csr")
         has_whole = self.constraints.quarter_turns
-        basis, left = sparse_solutions(rows, right) if has_whole else orthogonal_solutions(rows, right)
+        basis, left = (sparse_solutions if has_whole else orthogonal_solutions)(rows, right)
         if has_whole or not self.is_closing:  # rounding may contradict itself, between points that stay
             _require_solved(float(np.abs(left).max(initial=0.0)), right)
         return basis
 
-    def _equations(self) -> tuple[FloatArray, FloatArray]:
+    def _equations(self) -> tuple[csr_matrix, FloatArray]:
         """Return (r, v) equations between the variables, and their right-hand sides (r,)."""
         ends, values = self._equations_of_ends()
-        rows: list[FloatArray] = list(ends)
-        right: list[float] = values.tolist()
+        rows: list[FloatArray] = []
+        right: list[float] = []
         c = self.constraints
 
         def add(terms: list[tuple[int, complex]], value: complex) -> None:
@@ -358,9 +357,11 @@ class _Builder:
                     row[self.of_line[line]] = -1.0
                 rows.append(row)
                 right.append(value)
-        return np.array(rows).reshape(-1, self.size), np.array(right)
+        if not rows:
+            return ends, values
+        return vstack([ends, csr_matrix(np.array(rows))], format="csr"), np.concatenate([values, right])
 
-    def _equations_of_ends(self) -> tuple[FloatArray, FloatArray]:
+    def _equations_of_ends(self) -> tuple[csr_matrix, FloatArray]:
         """Return equations (2 q, v) and right-hand sides (2 q,): at ends of chains left points go to right ones."""
         chains = self.chains
         edge, end = np.nonzero(chains.is_node[chains.vertices])
@@ -370,16 +371,15 @@ class _Builder:
         variables, chain, left, right = variables[some], chain[some], left[some], right[some]
         factors = np.full(variables.shape, 1.0 + 0.0j)
         factors[:, 1], factors[:, 2] = -chains.rotation[chain], -1.0
-        rows = np.zeros((len(chain), 2, self.size))
-        for variable, factor in zip(variables.T, factors.T, strict=True):
-            at = np.flatnonzero(variable >= 0)
-            column, factor = variable[at], factor[at]
-            rows[at, 0, column] += factor.real
-            rows[at, 0, column + 1] -= factor.imag
-            rows[at, 1, column] += factor.imag
-            rows[at, 1, column + 1] += factor.real
+        equation, which = np.nonzero(variables >= 0)
+        variable, factor = variables[equation, which], factors[equation, which]
+        entries = np.concatenate([factor.real, -factor.imag, factor.imag, factor.real])
+        row = np.concatenate([2 * equation, 2 * equation, 2 * equation + 1, 2 * equation + 1])
+        column = np.concatenate([variable, variable + 1, variable, variable + 1])
+        some = entries != 0
+        rows = csr_matrix((entries[some], (row[some], column[some])), shape=(2 * len(chain), self.size))
         missing = self._missing(left, right, chain)
-        return rows.reshape(-1, self.size), np.stack([missing.real, missing.imag], axis=1).ravel()
+        return rows, np.stack([missing.real, missing.imag], axis=1).ravel()
 
     def _tie(self, side: int, shift: complex) -> tuple[int, complex]:
         """Return a half-edge's chain, and the change of its translation that makes `shift` of that to the half-edge."""

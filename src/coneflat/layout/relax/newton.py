@@ -25,6 +25,8 @@ ARRIVED, STUCK = 1e-12, 1e-3
 TURNING_STRIDE = 0.1
 # Steps on the way there at most: what is reached takes ten or twenty.
 ON_THE_WAY = 60
+# Once less than this part of the unknowns is in parts that are not at their least, these go on alone.
+FEW = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,8 @@ def descend(
     """
     remaining = 1.0 if motions.has_offset else 0.0
     together = motions.has_offset
-    maps = elements.maps(points)
+    places = points
+    maps = elements.maps(places)
     part = np.zeros_like(elements.part) if together else elements.part
     parts = 1 if together else elements.parts
     unknown_part = np.zeros_like(elements.unknown_part) if together else elements.unknown_part
@@ -84,12 +87,18 @@ def descend(
         return np.bincount(part, values, parts).astype(np.float64)
 
     here = sums(elements.energies(energy, maps))
-    before, least = float(here.sum()), energy.least * sums(elements.weight)
-    total = np.zeros(elements.count + 1)
+    before, done, least = float(here.sum()), 0.0, energy.least * sums(elements.weight)
+    total, unknowns = np.zeros(elements.count + 1), np.arange(elements.count)
     active = np.ones(parts, dtype=bool)
     factor: Factor | None = None
     taken = 0
     while taken < steps and ((elements.count and active.any()) or remaining > ARRIVED):
+        if not together and elements.count and active[unknown_part].mean() < FEW:
+            done += float(here[~active].sum())
+            elements, of_chosen = elements.of_parts(active)
+            unknowns, here, least = unknowns[of_chosen], here[active], least[active]
+            part, parts, unknown_part = elements.part, elements.parts, elements.unknown_part
+            maps, active, factor = elements.maps(places), np.ones(parts, dtype=bool), None
         gradient, pull, matrix = elements.newton_system(energy, maps, remaining)
         factor = factorize(matrix, used_up=factor, is_noted=False, whole=len(points))
         step = np.append(factor.solve(-gradient - pull), remaining)
@@ -118,15 +127,16 @@ def descend(
             length[~good] /= 2
         length[~good] = 0.0
         active &= length > 0
-        total[:-1] += length[unknown_part] * step[:-1]
+        total[unknowns] += length[unknown_part] * step[:-1]
         total[-1] += length[0] * step[-1] if remaining else 0.0
-        maps = elements.maps(points + motions.shifts(total))
+        places = points + motions.shifts(total)
+        maps = elements.maps(places)
         here = sums(elements.energies(energy, maps))
         if remaining:
             remaining = 1.0 - float(total[-1])
             remaining = remaining if remaining > ARRIVED else 0.0
             if length[0] < STUCK or taken >= ON_THE_WAY:
                 break
-        if tell is not None and tell(taken, float(here.sum())):
+        if tell is not None and tell(taken, done + float(here.sum())):
             break
-    return Descent(points + motions.shifts(total), before, float(here.sum()), taken, remaining)
+    return Descent(places, before, done + float(here.sum()), taken, remaining)
