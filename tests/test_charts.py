@@ -9,7 +9,8 @@ from scipy.sparse.csgraph import maximum_flow
 import coneflat
 from coneflat.atlas import Layout, Seams, injective_charts, overlap_layers
 from coneflat.atlas.glue import glue_charts
-from coneflat.atlas.split import largest_layers, separate, split_overlaps, widen
+from coneflat.atlas.sheet import Sheet
+from coneflat.atlas.split import largest_layers, split_overlaps
 from coneflat.geometry.overlap import find_overlaps
 from coneflat.mesh import TriangleMesh
 
@@ -66,7 +67,9 @@ class TestSeparate:
         if first == second:
             second = (first + 1) % len(disk.faces)
         one[first] = other[second] = True
-        pieces = separate(disk, one, other, costs.astype(float)[disk.halfedge_edges].reshape(-1, 3))
+        sheet = Sheet(disk, costs.astype(float)[disk.halfedge_edges])
+        assert len(sheet.separate(0, one, other)) > 1
+        pieces = sheet.piece
         assert pieces[first] != pieces[second]
         inside = np.flatnonzero(~disk.is_boundary_edge)
         a, b = disk.edge_faces[inside].T
@@ -95,12 +98,13 @@ class TestSeparate:
         one, other = np.zeros((2, len(disk.faces)), dtype=bool)
         one[0] = other[-1] = True
         areas = np.ones(len(disk.faces))
-        wide, far = widen(disk, one, other, areas, 50.0)
+        sheet = Sheet(disk, np.ones(disk.faces.size))
+        wide, far = sheet.widened(0, one, other, areas, 50.0)
         assert wide.sum() == far.sum() == 50
         assert wide[0]
         assert far[-1]
         assert not (wide & far).any()
-        narrow, _ = widen(disk, one, other, areas, 0.0)
+        narrow, _ = sheet.widened(0, one, other, areas, 0.0)
         assert narrow.sum() == 1
 
 

@@ -240,8 +240,7 @@ def _seam_motion_mismatch(
     # rotation as seen by a walker along it, from the left side to the right.
     rotation = one * np.conj(two)
     rotation = rotation / np.maximum(np.abs(rotation), np.finfo(float).tiny)
-    starts = mesh.tails[mesh.edge_halfedges[seams, 0]]
-    ends = mesh.heads[mesh.edge_halfedges[seams, 0]]
+    starts, ends = mesh.ends_of(mesh.edge_halfedges[seams, 0])
     degree = np.bincount(np.concatenate([starts, ends]), minlength=len(mesh.vertices))
     passed = (degree == 2) & ~mesh.is_boundary_vertex
     if cones is not None:

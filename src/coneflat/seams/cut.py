@@ -41,7 +41,7 @@ def cut_open(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
     sides = np.concatenate(
         [mesh.edge_halfedges[seams].ravel(), mesh.edge_halfedges[mesh.is_boundary_edge, 0]]
     )
-    border, ends = np.unique([cut.mesh.tails[sides], cut.mesh.heads[sides]], return_inverse=True)
+    border, ends = np.unique(cut.mesh.ends_of(sides), return_inverse=True)
     loops, _ = label_components(len(border), *ends.reshape(2, -1))
     # Pieces all have borders, so there is one if there is one border.
     pieces = cut.mesh.components[0] if loops > 1 else 1
