@@ -20,6 +20,7 @@ from ..threads import meanwhile
 from .chart_seams import Layout, Seams
 from .glue import glue_charts
 from .mirrored import mirror_charts, split_alike
+from .sheet import edges_beside
 from .split import as_disk, split_overlaps
 
 # Parts of the area that charts should have at least. Where the cheapest cuts leave several charts, dearer ones that
@@ -60,7 +61,7 @@ def injective_charts(
     places = points[corners]
     areas = signed_double_areas(places)
     # The disk has to be made only where something overlaps, but the other core has nothing else to do.
-    with meanwhile(partial(as_disk, points, corners), len(corners)) as opening:
+    with meanwhile(partial(_ready_disk, points, corners), len(corners)) as opening:
         pairs = overlaps_of_mesh(mesh.edge_halfedges, places).pairs
         # What an inverted triangle covers is not to be had apart from its neighbours.
         pairs = pairs[(areas[pairs] > 0).all(axis=1)]
@@ -85,6 +86,13 @@ def injective_charts(
     if symmetry is None:
         return best
     return _most_alike(mesh, best, whole, lengths, np.abs(areas), pairs, symmetry)
+
+
+def _ready_disk(points: FloatArray, corners: IntArray) -> TriangleMesh:
+    """Return a layout as a mesh of its own, with what cutting it will need."""
+    disk = as_disk(points, corners)
+    edges_beside(disk)
+    return disk
 
 
 def _most_alike(

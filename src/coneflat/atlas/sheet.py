@@ -12,8 +12,9 @@ import numpy as np
 from .._arrays import BoolArray, FloatArray, IntArray
 from .._sets import unite
 from ..compiled import compiled
-from ..geometry.graph import MultiGraph, drop_first, push, trace_back
-from ..mesh import TriangleMesh, sort_few
+from ..geometry.graph import MultiGraph, drop_first, list_sides, push, trace_back
+from ..kept import kept_with
+from ..mesh import TriangleMesh
 
 
 class Sheet:
@@ -60,9 +61,10 @@ class Sheet:
             return None
         one, other = both
         mark = np.where(one[border // 3], 1, np.where(other[border // 3], 2, 0))
-        starts, ends = _between(border, mark)
+        starts, ends = (self.disk.ends_of(sides)[0] for sides in _between(border, mark))
+        disk, given = self.disk, (self.piece, own, self.costs, one, other)
         cut = find_cut(
-            self.disk.faces, *self._sides, self.piece, self.costs, one, other, starts, ends, self._distance
+            disk.edges, disk.edge_halfedges, *edges_beside(disk), *given, starts, ends, self._distance
         )
         ids, first, start = part_piece(
             *self._sides, self.piece, own, cut, self._owner, self._is_cut, len(self._first), self._first[own]
@@ -144,6 +146,18 @@ class Sheet:
         return widened
 
 
+def edges_beside(mesh: TriangleMesh) -> tuple[IntArray, IntArray]:
+    """Return the edges at each vertex of a mesh, see `list_sides`; they are kept with it."""
+
+    def find() -> tuple[IntArray, IntArray]:
+        begin = np.zeros(len(mesh.vertices) + 1, dtype=np.int64)
+        beside = np.empty(2 * len(mesh.edges), dtype=np.int64)
+        list_sides(*np.ascontiguousarray(mesh.edges.T), begin, beside)
+        return begin, beside
+
+    return kept_with(mesh, "edges_beside", find)
+
+
 def _single(chosen: BoolArray) -> BoolArray:
     """Return one of the chosen triangles alone."""
     first = np.zeros_like(chosen)
@@ -193,34 +207,13 @@ def walk_border(halfedge_edges: IntArray, edge_halfedges: IntArray, piece: IntAr
 
 
 @compiled
-def edges_around(
-    halfedge_edges: IntArray, edge_halfedges: IntArray, piece: IntArray, corner: int, found: IntArray
-) -> int:
-    """Fill the edges at a corner's vertex that lie between triangles of its piece, upwards; return how many."""
-    own, count = piece[corner // 3], 0
-    for turn in (1, 2):
-        here, is_round = corner, False
-        while not is_round:
-            h = here - here % 3 + (here + turn) % 3
-            t = across(halfedge_edges, edge_halfedges, h)
-            if t < 0 or piece[t // 3] != own:
-                break
-            found[count] = halfedge_edges[h]
-            count += 1
-            here = t - t % 3 + (t + turn) % 3
-            is_round = here == corner
-        if is_round:
-            break
-    sort_few(found[:count])
-    return count
-
-
-@compiled
 def find_cut(
-    faces: IntArray,
-    halfedge_edges: IntArray,
+    edges: IntArray,
     edge_halfedges: IntArray,
+    begin: IntArray,
+    beside: IntArray,
     piece: IntArray,
+    own: int,
     costs: FloatArray,
     one: BoolArray,
     other: BoolArray,
@@ -231,30 +224,24 @@ def find_cut(
     """Return the edges of the cheapest path inside a piece that runs through neither of two sets of triangles.
 
     Args:
-        faces, halfedge_edges, edge_halfedges: of the mesh.
-        piece: (m,) the piece of each triangle.
+        edges, edge_halfedges: of the mesh.
+        begin, beside: the edges at each vertex, see `list_sides`.
+        piece, own: (m,) the piece of each triangle, and which it is.
         costs: (3m,) of sides.
         one, other: (m,) the sets.
-        starts, ends: half-edges on the border of the piece; the path leads between tails of theirs.
+        starts, ends: vertices; the path leads from one of the first to one of the second.
         distance: (n,) infinite, on return again.
     """
     is_end = np.zeros(len(distance), np.bool_)
-    for h in ends:
-        is_end[faces[h // 3, (h + 1) % 3]] = True
-    # Of vertices that are reached: a corner there, the edge that led to them, and the vertex before.
-    corner, over, before = (
-        np.empty(len(distance), np.int64),
-        np.empty(len(distance), np.int64),
-        np.empty(len(distance), np.int64),
-    )
-    reached, count = np.empty(len(distance), np.int64), 0
-    room = len(halfedge_edges) + len(starts)
-    keys, items, around = np.empty(room), np.empty(room, np.int64), np.empty(len(edge_halfedges), np.int64)
-    size = 0
-    for h in starts:
-        v = faces[h // 3, (h + 1) % 3]
+    for v in ends:
+        is_end[v] = True
+    # Of vertices that are reached, the edge that led there, from its head on if odd.
+    over, reached, count = np.empty(len(distance), np.int64), np.empty(len(distance), np.int64), 0
+    room = len(beside) + len(starts)
+    keys, items, size = np.empty(room), np.empty(room, np.int64), 0
+    for v in starts:
         if distance[v] > 0.0:
-            distance[v], corner[v], over[v] = 0.0, h - h % 3 + (h + 1) % 3, -1
+            distance[v], over[v] = 0.0, -1
             reached[count] = v
             count += 1
             size = push(keys, items, size, 0.0, v)
@@ -265,32 +252,35 @@ def find_cut(
         size = drop_first(keys, items, size)
         if key > distance[v]:
             continue
-        for i in range(edges_around(halfedge_edges, edge_halfedges, piece, corner[v], around)):
-            e = around[i]
+        for at in range(begin[v], begin[v + 1]):
+            side = beside[at]
+            e = side >> 1
+            w = edges[e, 1 - (side & 1)]
             h, t = edge_halfedges[e]
-            left, right = h // 3, t // 3
-            if (one[left] and one[right]) or (other[left] and other[right]):
+            if t < 0 or not key + costs[h] < distance[w]:
                 continue
-            end = h - h % 3 + (h + 1) % 3
-            if faces[left, end % 3] == v:
-                end = h - h % 3 + (h + 2) % 3
-            w = faces[left, end % 3]
-            if key + costs[h] < distance[w]:
-                if distance[w] == np.inf:
-                    reached[count] = w
-                    count += 1
-                distance[w], corner[w], over[w], before[w] = key + costs[h], end, e, v
-                size = push(keys, items, size, distance[w], w)
+            left, right = h // 3, t // 3
+            if (
+                piece[left] != own
+                or piece[right] != own
+                or (one[left] and one[right])
+                or (other[left] and other[right])
+            ):
+                continue
+            if distance[w] == np.inf:
+                reached[count] = w
+                count += 1
+            distance[w], over[w] = key + costs[h], side
+            size = push(keys, items, size, distance[w], w)
     v, least = -1, np.inf
-    for h in ends:
-        w = faces[h // 3, (h + 1) % 3]
+    for w in ends:
         if distance[w] < least:
             v, least = w, distance[w]
     path, length = np.empty(count, np.int64), 0
     while v >= 0 and over[v] >= 0:
-        path[length] = over[v]
+        path[length] = over[v] >> 1
+        v = edges[path[length], over[v] & 1]
         length += 1
-        v = before[v]
     for i in range(count):
         distance[reached[i]] = np.inf
     return path[:length]
