@@ -20,6 +20,8 @@ from .compiled import compiled
 
 NEXT = np.array([1, 2, 0])
 PREVIOUS = np.array([2, 0, 1])
+# What is kept with a mesh and depends on its faces alone.
+CONNECTIVITY = ("_pairing", "tails", "heads", "is_boundary_edge", "is_boundary_vertex", "edges_beside")
 
 
 def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
@@ -84,9 +86,8 @@ class TriangleMesh:
 
     def moved_to(self, vertices: FloatArray) -> TriangleMesh:
         """Return the mesh with its vertices elsewhere, (n, 3); edges that have been found need not be found again."""
-        moved = TriangleMesh(vertices, self.faces)
-        if "_pairing" in self.__dict__:
-            moved.__dict__["_pairing"] = self._pairing
+        moved, known = TriangleMesh(vertices, self.faces), self.__dict__
+        moved.__dict__.update({name: known[name] for name in CONNECTIVITY if name in known})
         return moved
 
     @cached_property

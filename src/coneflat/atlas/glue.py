@@ -138,11 +138,17 @@ class _Gluing:
         if not self._fits(kept, moved):
             self.places = before
             return False
-        self.corners, seams.here, seams.there = joined[self.corners], joined[seams.here], joined[seams.there]
+        is_joined = np.zeros(len(before), dtype=bool)
+        is_joined[pairs] = True
+        changed = np.concatenate([with_points(self.corners, self.faces[kept], is_joined), self.faces[moved]])
+        if self.image is not None:  # what may be taken back
+            self.corners = self.corners.copy()
+        self.corners[changed] = joined[self.corners[changed]]
+        seams.here, seams.there = joined[seams.here], joined[seams.there]
         seams.charts[seams.charts == moved] = self.chart[self.faces[moved]] = kept
         self.faces[kept] = np.concatenate([self.faces[kept], self.faces[moved]])
         self.faces[moved] = self.faces[moved][:0]
-        fill_bounds(_pairs(self.places), self.corners, self.faces[kept], self.low, self.high)
+        fill_bounds(_pairs(self.places), self.corners, changed, self.low, self.high)
         return True
 
     def _corners(self, faces: IntArray) -> FloatArray:
@@ -173,6 +179,17 @@ def _pairs(places: NDArray[np.complex128]) -> FloatArray:
     """Return complex numbers as pairs of their parts, along a last axis more."""
     parts: FloatArray = np.ascontiguousarray(places).view(np.float64).reshape(*places.shape, 2)
     return parts
+
+
+@compiled
+def with_points(corners: IntArray, chosen: IntArray, is_wanted: BoolArray) -> IntArray:
+    """Return those of the chosen triangles, by their corners (m, 3), that have one of the wanted points (u,)."""
+    found, count = np.empty(len(chosen), np.int64), 0
+    for f in chosen:
+        if is_wanted[corners[f, 0]] or is_wanted[corners[f, 1]] or is_wanted[corners[f, 2]]:
+            found[count] = f
+            count += 1
+    return found[:count]
 
 
 @compiled

@@ -12,8 +12,7 @@ import numpy as np
 from .._arrays import BoolArray, FloatArray, IntArray
 from .._sets import unite
 from ..compiled import compiled
-from ..geometry.graph import MultiGraph, drop_first, list_sides, push, trace_back
-from ..kept import kept_with
+from ..geometry.graph import MultiGraph, drop_first, edges_beside, push, trace_back
 from ..mesh import TriangleMesh
 
 
@@ -144,18 +143,6 @@ class Sheet:
         widened = chosen.copy()
         widened[nodes] = True
         return widened
-
-
-def edges_beside(mesh: TriangleMesh) -> tuple[IntArray, IntArray]:
-    """Return the edges at each vertex of a mesh, see `list_sides`; they are kept with it."""
-
-    def find() -> tuple[IntArray, IntArray]:
-        begin = np.zeros(len(mesh.vertices) + 1, dtype=np.int64)
-        beside = np.empty(2 * len(mesh.edges), dtype=np.int64)
-        list_sides(*np.ascontiguousarray(mesh.edges.T), begin, beside)
-        return begin, beside
-
-    return kept_with(mesh, "edges_beside", find)
 
 
 def _single(chosen: BoolArray) -> BoolArray:

@@ -48,7 +48,7 @@ def split_overlaps(
     while waiting and count < most:
         go_on()
         sheet, own, pairs = waiting.pop()
-        if sheet.is_pinched(own):
+        if len(sheet.chart) > 1 and sheet.is_pinched(own):
             sheet, own, pairs = sheet.opened(own, pairs)
             sheets.append(sheet)
         one, other = np.zeros((2, len(sheet.faces)), dtype=bool)
