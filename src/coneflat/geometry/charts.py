@@ -110,13 +110,18 @@ def find_joined(edge_halfedges: IntArray, corner_uv: FloatArray, near: float) ->
         f, g = h // 3, t // 3
         start, end = corner_uv[f, (h + 1) % 3], corner_uv[f, (h + 2) % 3]
         other_end, other_start = corner_uv[g, (t + 1) % 3], corner_uv[g, (t + 2) % 3]
+        if (
+            start[0] == other_start[0]
+            and start[1] == other_start[1]
+            and end[0] == other_end[0]
+            and end[1] == other_end[1]
+        ):
+            joined[e] = True
+            continue
         gap = max(
             math.hypot(start[0] - other_start[0], start[1] - other_start[1]),
             math.hypot(end[0] - other_end[0], end[1] - other_end[1]),
         )
-        if gap == 0.0:
-            joined[e] = True
-            continue
         length = math.hypot(end[0] - start[0], end[1] - start[1])
         other_length = math.hypot(other_end[0] - other_start[0], other_end[1] - other_start[1])
         joined[e] = gap <= near * max(length, other_length)
