@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ HUGE, TINY = 3_000_000, 1000
 THREADS = 2
 
 _threads: ContextVar[int] = ContextVar("coneflat_threads", default=THREADS)
+# Whether this is done beside something else.
+_is_beside: ContextVar[bool] = ContextVar("coneflat_is_beside", default=False)
 
 
 class Later(Future[Result]):
@@ -53,10 +55,25 @@ def meanwhile(call: Callable[[], Result], triangles: int) -> Iterator[Future[Res
         yield Later(call)
         return
     with ThreadPoolExecutor(1, thread_name_prefix="coneflat") as executor:
-        future = executor.submit(copy_context().run, call)
+        context = copy_context()
+        context.run(_is_beside.set, True)
+        future = executor.submit(context.run, call)
         if triangles > HUGE or threads() == 1:
             wait([future])
         yield future
+
+
+def in_halves(work: Callable[[int, int], object], count: int) -> None:
+    """Have something done for numbers from 0 up to a count, one half of them on another thread.
+
+    work: called with the first number and the one after the last; for each it writes to places of its own.
+    """
+    if _is_beside.get():  # the other core is at work
+        work(0, count)
+        return
+    with meanwhile(partial(work, 0, count // 2), count) as first:
+        work(count // 2, count)
+        first.result()
 
 
 def threads() -> int:

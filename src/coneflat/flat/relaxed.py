@@ -19,6 +19,7 @@ from ..input.components import Component
 from ..layout.relax import Relaxed, StretchEnergy, relax
 from ..mesh import TriangleMesh, label_components
 from ..options import Options
+from ..threads import in_halves
 from .base import LaidOut, laid_out_curvature, vertex_log_scale
 from .methods import held_boundary
 
@@ -142,8 +143,13 @@ class _Surface:
         chosen: the triangles of interest, the others are infinite; None for all.
         """
         ratios = np.full(len(self.mesh.faces), np.inf)
-        chosen = np.arange(len(ratios)) if chosen is None else chosen
-        fill_ratios(np.ascontiguousarray(self.lengths), laid_out.points, laid_out.corners, chosen, ratios)
+        every = np.arange(len(ratios)) if chosen is None else chosen
+        lengths = np.ascontiguousarray(self.lengths)
+
+        def fill(start: int, stop: int) -> None:
+            fill_ratios(lengths, laid_out.points, laid_out.corners, every[start:stop], ratios)
+
+        in_halves(fill, len(every))
         return ratios
 
     def mean(self, ratios: FloatArray) -> float:
@@ -177,7 +183,7 @@ class _Surface:
     def described(self, moved: LaidOut, before: FloatArray, was_free: BoolArray, options: Options) -> LaidOut:
         """Return the moved layout with the curvature and the scale that it has, and with what it was before."""
         mesh, given = self.mesh, self.part.mesh
-        corners = moved.points[moved.corners]
+        corners = moved.points.take(moved.corners, axis=0)
         # Where triangles were moved; elsewhere it is what it was.
         changed = np.zeros(len(mesh.vertices), dtype=bool)
         changed[mesh.faces[has_any(was_free, mesh.faces)]] = True

@@ -15,6 +15,7 @@ from .coverage import covered_twice
 from .fans import find_fans, lie_apart
 from .layers import may_overlap, open_sides
 from .orientation import fill_orientations, orientation
+from ..threads import in_halves
 
 # Of the largest coordinate: what is smaller counts as 0, lest products underflow.
 TINY = 2.0**-420
@@ -126,15 +127,21 @@ def _at_unit_size(corners: FloatArray) -> tuple[FloatArray, int]:
         corners, factor = np.ldexp(corners, -exponent), 1.0
     else:
         factor = 2.0**-exponent
-    scaled = np.empty(corners.shape)
-    scale_numbers(np.ascontiguousarray(corners).reshape(-1), factor, TINY, scaled.reshape(-1))
+    numbers, scaled = np.ascontiguousarray(corners).reshape(-1), np.empty(corners.shape)
+    flat = scaled.reshape(-1)
+    in_halves(
+        lambda start, stop: scale_numbers(numbers[start:stop], factor, TINY, flat[start:stop]), len(flat)
+    )
     return scaled, exponent
 
 
 def _counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return the triangles, turned over where they are clockwise, and their orientations 1, -1 and 0."""
     signs = np.empty(len(corners), dtype=np.int64)
-    fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
+    flat = corners.reshape(-1, 6)
+    in_halves(
+        lambda start, stop: fill_orientations(flat[start:stop], np.empty(12), signs[start:stop]), len(flat)
+    )
     clockwise = np.flatnonzero(signs < 0)
     if not len(clockwise):
         return corners, signs
