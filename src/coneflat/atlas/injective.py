@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray, dots
+from .._arrays import FloatArray, IntArray, dots, rows_of
 from ..flat import LaidOut
 from ..geometry.graph import edges_beside
 from ..geometry.overlap import overlaps_of_mesh
@@ -60,7 +60,7 @@ def injective_charts(
         disk: a mesh whose faces are the corners, with a vertex for each point, if there is one.
     """
     whole = Layout(points, corners, np.zeros(len(corners), dtype=np.int64))
-    places = points[corners]
+    places = rows_of(points, corners)
     areas = signed_double_areas(places)
     # The disk has to be made only where something overlaps, but the other core has nothing else to do.
     with meanwhile(partial(_ready_disk, points, corners, disk), len(corners)) as opening:

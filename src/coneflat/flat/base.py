@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, rows_of
 from ..compiled import compiled
 from ..cones import ConeSolution
 from ..errors import ConvergenceError, MetricError
@@ -222,7 +222,7 @@ def laid_out_at(
     Raises:
         MetricError: the layout has no area.
     """
-    corners = points[disk.faces]
+    corners = rows_of(points, disk.faces)
     doubles = np.abs(signed_double_areas(corners))
     if not doubles.sum() > 0:
         raise MetricError(

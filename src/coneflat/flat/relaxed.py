@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray, has_any
+from .._arrays import BoolArray, FloatArray, IntArray, has_any, rows_of
 from ..compiled import compiled
 from ..errors import LengthError, SeamError
 from ..geometry import double_areas, edge_lengths
@@ -183,7 +183,7 @@ class _Surface:
     def described(self, moved: LaidOut, before: FloatArray, was_free: BoolArray, options: Options) -> LaidOut:
         """Return the moved layout with the curvature and the scale that it has, and with what it was before."""
         mesh, given = self.mesh, self.part.mesh
-        corners = moved.points.take(moved.corners, axis=0)
+        corners = rows_of(moved.points, moved.corners)
         # Where triangles were moved; elsewhere it is what it was.
         changed = np.zeros(len(mesh.vertices), dtype=bool)
         changed[mesh.faces[has_any(was_free, mesh.faces)]] = True

@@ -8,7 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import FloatArray, IntArray, as_faces, as_floats, require_finite, unit_exponent
+from .._arrays import (
+    FloatArray,
+    IntArray,
+    as_faces,
+    as_floats,
+    require_finite,
+    rows_of,
+    unit_exponent,
+)
 from ..compiled import compiled
 from ..errors import ArrayShapeError, OptionError
 from .coverage import covered_twice
@@ -157,9 +165,10 @@ def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tup
     """
     if len(chosen) < 2:
         return np.empty((0, 2), dtype=np.int64), True
-    boxes = snug_boxes(corners[chosen])
+    places = rows_of(corners.reshape(-1, 6), chosen)
+    boxes = snug_boxes(places.reshape(-1, 3, 2))
     order = z_order(boxes)
-    fans = find_fans(corners[chosen])
+    fans = find_fans(places.reshape(-1, 3, 2))
     if fans is not None:
         order = fans.sorted(order)
     tree = box_tree(boxes[order])
@@ -167,7 +176,7 @@ def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tup
     if fans is not None:
         around = fans.tree(order, (len(tree) + 1) // 2)
     chosen = chosen[order]
-    arrays = tree, *around, corners[chosen].reshape(-1, 6), np.empty(12)
+    arrays = tree, *around, rows_of(places, order), np.empty(12)
     stack, top = np.zeros((4 * len(tree).bit_length(), 2), dtype=np.int64), 1
     keys, room, left = [], len(chosen), np.inf if limit is None else limit + 1
     while top > 0 and left > 0:

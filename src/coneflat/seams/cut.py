@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .._arrays import IntArray, has_any
+from .._arrays import IntArray, has_any, rows_of
 from ..errors import MetricError
 from ..mesh import TriangleMesh, corner_fans, label_components
 from ..text import plural
@@ -79,4 +79,4 @@ def open_along(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
     corners = faces[is_near]
     corners[at_seam] = number[which]
     faces[is_near] = corners
-    return CutMesh(TriangleMesh(mesh.vertices[origin], faces), origin)
+    return CutMesh(TriangleMesh(rows_of(mesh.vertices, origin), faces), origin)

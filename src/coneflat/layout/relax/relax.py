@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import BoolArray, ComplexArray, FloatArray, as_faces, as_floats, has_any, require_finite
+from ..._arrays import BoolArray, ComplexArray, FloatArray, as_faces, as_floats, has_any, require_finite, rows_of
 from ...errors import ArrayShapeError, ConvergenceError, OptionError
 from ...geometry import double_areas, edge_lengths
 from ...geometry.lengths import check_lengths
@@ -110,7 +110,7 @@ def relax(
     is_free = _flags(free, len(mesh.vertices))
     areas = double_areas(own) / 2
     share = areas * _weights(weights, len(mesh.faces))
-    doubled = signed_double_areas(places.take(corner, axis=0))
+    doubled = signed_double_areas(rows_of(places, corner))
     # Of triangles that may move alone, mostly few.
     near = np.flatnonzero(has_any(is_free, mesh.faces))
     rest = np.empty(own.shape, dtype=np.complex128)
