@@ -68,7 +68,10 @@ def arrange_charts(
 
 
 def _turned_upright(
-    charts: Charts, mirrors: Sequence[ChartMirrors], space: FloatArray | None, up: tuple[float, float, float] | None
+    charts: Charts,
+    mirrors: Sequence[ChartMirrors],
+    space: FloatArray | None,
+    up: tuple[float, float, float] | None,
 ) -> FloatArray:
     """Return (m, 3, 2) charts whose axes of symmetry stand upright, pairs mirrored; the others straight."""
     outlines = charts.outlines()
@@ -88,7 +91,11 @@ def whole_turns(quantum: float) -> int:
 
 
 def _turned_together(
-    charts: Charts, component: IntArray, turns: int, space: FloatArray | None, up: tuple[float, float, float] | None
+    charts: Charts,
+    component: IntArray,
+    turns: int,
+    space: FloatArray | None,
+    up: tuple[float, float, float] | None,
 ) -> FloatArray:
     """Return (m, 3, 2) the charts, one of each component straight, and the others turned as far as it.
 

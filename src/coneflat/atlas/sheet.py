@@ -61,9 +61,18 @@ class Sheet:
         one, other = both
         mark = np.where(one[border // 3], 1, np.where(other[border // 3], 2, 0))
         starts, ends = (self.disk.ends_of(sides)[0] for sides in _between(border, mark))
-        disk, given = self.disk, (self.piece, own, self.costs, one, other)
         cut = find_cut(
-            disk.edges, disk.edge_halfedges, *edges_beside(disk), *given, starts, ends, self._distance
+            self.disk.edges,
+            self.disk.edge_halfedges,
+            *edges_beside(self.disk),
+            self.piece,
+            own,
+            self.costs,
+            one,
+            other,
+            starts,
+            ends,
+            self._distance,
         )
         ids, first, start = part_piece(
             *self._sides, self.piece, own, cut, self._owner, self._is_cut, len(self._first), self._first[own]
@@ -322,8 +331,8 @@ def part_piece(
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Part a piece along edges; return the pieces, the first triangle of each, and a half-edge on the border of each.
 
-    From both sides of the edges sets of triangles grow, a triangle of each in turn, and become one where they meet. When
-    only one grows still it is the rest, and keeps the number of the piece, however large it is.
+    From both sides of the edges sets of triangles grow, a triangle of each in turn, and become one where they meet.
+    When only one grows still it is the rest, and keeps the number of the piece, however large it is.
 
     Args:
         halfedge_edges, edge_halfedges: of the mesh.

@@ -220,8 +220,10 @@ def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
     """
     if not len(pairs):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    count = len(triangles)
-    one, two = _neighbours(np.unique(pairs), triangles)
+    # Numbered by themselves, as most triangles have no part in it.
+    chosen, index = np.unique(pairs, return_inverse=True)
+    pairs, count = index.reshape(-1, 2), len(chosen)
+    one, two = _neighbours(triangles[chosen])
     two = two[sort_by_counting(one, count)]
     degree = np.bincount(one, minlength=count)
     starts = np.cumsum(degree) - degree
@@ -238,10 +240,11 @@ def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
     return source[found], 2 * place[found] + (kept > moved)[found]
 
 
-def _neighbours(chosen: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the chosen triangles that share a side, two and two, each in both orders."""
-    tails, heads = triangles[chosen].ravel(), triangles[chosen][:, NEXT].ravel()
-    order, first = sort_pairs(tails, heads, int(triangles.max()) + 1)
+def _neighbours(triangles: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the triangles that share a side, two and two, each in both orders."""
+    points, corner = np.unique(triangles, return_inverse=True)
+    corners = corner.reshape(-1, 3)
+    order, first = sort_pairs(corners.ravel(), corners[:, NEXT].ravel(), len(points))
     again = np.flatnonzero(~first)
-    one, two = chosen[order[again - 1] // 3], chosen[order[again] // 3]
+    one, two = order[again - 1] // 3, order[again] // 3
     return np.concatenate([one, two]), np.concatenate([two, one])

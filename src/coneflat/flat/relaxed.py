@@ -165,7 +165,8 @@ class _Surface:
         The vertices there, (n,), too. before: (m,) the ratios of the layout that nothing may be worse than.
         """
         mesh, faces = self.mesh, self.mesh.faces
-        edges = mesh.edges[was_free[mesh.edges[:, 0]] & was_free[mesh.edges[:, 1]]]
+        inside = np.flatnonzero(was_free[mesh.edges[:, 0]] & was_free[mesh.edges[:, 1]])
+        edges = rows_of(mesh.edges, inside)
         count, patch = label_components(len(mesh.vertices), edges[:, 0], edges[:, 1])
         touched = np.flatnonzero(has_any(was_free, faces) & np.isfinite(before))
         after = self.ratios(moved, touched)

@@ -88,12 +88,13 @@ class MultiGraph:
 
 
 def edges_beside(mesh: TriangleMesh) -> tuple[IntArray, IntArray]:
-    """Return where the edges at each vertex of a mesh begin, and these, as `list_sides` has them; kept with the mesh."""
+    """Return where the edges at each vertex begin, and these, as `list_sides` has them; they are kept with the mesh."""
 
     def find() -> tuple[IntArray, IntArray]:
         begin = np.zeros(len(mesh.vertices) + 1, dtype=np.int64)
         beside = np.empty(2 * len(mesh.edges), dtype=np.int64)
-        list_sides(*np.ascontiguousarray(mesh.edges.T), begin, beside)
+        tails, heads = np.ascontiguousarray(mesh.edges.T)
+        list_sides(tails, heads, begin, beside)
         return begin, beside
 
     return kept_with(mesh, "edges_beside", find)

@@ -19,11 +19,11 @@ from .._arrays import (
 )
 from ..compiled import compiled
 from ..errors import ArrayShapeError, OptionError
+from ..threads import in_halves
 from .coverage import covered_twice
 from .fans import find_fans, lie_apart
 from .layers import may_overlap, open_sides
 from .orientation import fill_orientations, orientation
-from ..threads import in_halves
 
 # Of the largest coordinate: what is smaller counts as 0, lest products underflow.
 TINY = 2.0**-420

@@ -230,9 +230,7 @@ class _Equations:
         return step, slope
 
 
-def _corner_frames(
-    flat: FlatTriangles, faces: IntArray, rows: IntArray, movable: BoolArray
-) -> ComplexArray:
+def _corner_frames(flat: FlatTriangles, faces: IntArray, rows: IntArray, movable: BoolArray) -> ComplexArray:
     """Return (f, 3) unit numbers that take a shift of a movable vertex to the frame of the triangle there.
 
     All corners of a vertex are reached by turning around it from a first one, the same for all.

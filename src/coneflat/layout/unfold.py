@@ -12,7 +12,7 @@ from ..compiled import compiled
 from ..errors import ArrayShapeError
 from ..geometry.planar import as_pairs
 from ..geometry.straight import FlatTriangles
-from ..threads import meanwhile
+from ..threads import FEW, meanwhile
 
 # Iterations that spread the gaps; each costs as much as half a breadth-first search.
 SWEEPS = 10
@@ -69,7 +69,7 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
 
     on_cut = np.flatnonzero(cut)
     pinned = np.zeros(count, dtype=np.bool_)
-    with meanwhile(partial(weigh_sides, corner, flat.sides, NO_LENGTH, count), m) as weighing:
+    with meanwhile(partial(weigh_sides, corner, flat.sides, NO_LENGTH, count), m, FEW // 3) as weighing:
         while (seeds := on_cut[~reached[on_cut // 3]]).size:
             border, frames = _border(flat, cut, int(seeds[0]))
             tails = corner[_next(border)]

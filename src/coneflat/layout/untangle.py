@@ -277,10 +277,10 @@ def is_low(sides: ComplexArray, base: int, least: float) -> bool:
 @compiled
 def are_low(sides: ComplexArray, least: float) -> bool:
     """Return whether any triangle with sides (3m,) is not higher than a share of its longest side, or upside down."""
-    for f in range(len(sides) // 3):
-        if is_low(sides, 3 * f, least):
-            return True
-    return False
+    f = 0
+    while f < len(sides) // 3 and not is_low(sides, 3 * f, least):
+        f += 1
+    return f < len(sides) // 3
 
 
 @compiled

@@ -202,7 +202,10 @@ class ExactFlatMetric:
         mesh, edges = refined.mesh, refined.edges_on(seams)
         disk = cut_open(mesh, edges).mesh
         points = unfold(refined.flat, disk.faces) * self.shrink
-        curvature, added = laid_out_curvature(mesh, rows_of(points, disk.faces)), len(mesh.vertices) - len(self.target)
+        curvature, added = (
+            laid_out_curvature(mesh, rows_of(points, disk.faces)),
+            len(mesh.vertices) - len(self.target),
+        )
         target = np.concatenate([self.target, np.zeros(added)])
         is_open = np.concatenate([self.is_open, np.zeros(added, dtype=bool)])
         return LaidOut(

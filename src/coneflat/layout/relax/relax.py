@@ -8,7 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import BoolArray, ComplexArray, FloatArray, as_faces, as_floats, has_any, require_finite, rows_of
+from ..._arrays import (
+    BoolArray,
+    ComplexArray,
+    FloatArray,
+    as_faces,
+    as_floats,
+    has_any,
+    require_finite,
+    rows_of,
+)
 from ...errors import ArrayShapeError, ConvergenceError, OptionError
 from ...geometry import double_areas, edge_lengths
 from ...geometry.lengths import check_lengths
