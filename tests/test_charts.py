@@ -11,6 +11,7 @@ from coneflat.atlas import Layout, Seams, injective_charts, overlap_layers
 from coneflat.atlas.glue import glue_charts
 from coneflat.atlas.sheet import Sheet
 from coneflat.atlas.split import largest_layers, split_overlaps
+from coneflat.geometry.charts import label_charts
 from coneflat.geometry.overlap import find_overlaps
 from coneflat.mesh import TriangleMesh
 
@@ -85,6 +86,57 @@ class TestSeparate:
             assert cost == flow
         else:  # the way that one of them is given to the border is not cut
             assert flow <= cost <= 4 * flow
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_pieces_of_pieces_hang_together_and_keep_their_borders(self, seed):
+        disk = flat_grid(20, 20, seed)
+        rng = np.random.default_rng(seed)
+        sheet = Sheet(disk, lengths_of(disk)[disk.halfedge_edges])
+        inside = ~disk.is_boundary_edge
+        known = 1
+        for _ in range(8):
+            own = int(rng.choice(np.flatnonzero(np.bincount(sheet.piece) > 1)))
+            members = np.flatnonzero(sheet.piece == own)
+            before = sheet.piece.copy()
+            one, other = np.zeros((2, len(disk.faces)), dtype=bool)
+            first, second = rng.choice(members, 2, replace=False)
+            one[first] = other[second] = True
+            pieces = sheet.separate(own, one, other)
+            assert pieces is not None
+            assert sheet.piece[first] != sheet.piece[second]
+            assert own in pieces
+            assert set(pieces) == set(sheet.piece[members])
+            assert np.array_equal(before[before != own], sheet.piece[before != own])
+            lowest = [np.flatnonzero(sheet.piece == piece)[0] for piece in pieces]
+            assert lowest == sorted(lowest)
+            known += len(pieces) - 1
+            across = sheet.piece[disk.edge_faces]
+            count, _ = label_charts(disk, inside & (across[:, 0] == across[:, 1]))
+            assert count == known == sheet.piece.max() + 1
+        for piece in range(known):
+            border = sheet.border(piece)
+            sides = sheet.piece[np.arange(disk.faces.size) // 3] == piece
+            twins = np.where(
+                disk.edge_halfedges[disk.halfedge_edges, 0] == np.arange(disk.faces.size),
+                disk.edge_halfedges[disk.halfedge_edges, 1],
+                disk.edge_halfedges[disk.halfedge_edges, 0],
+            )
+            sides &= (twins < 0) | (sheet.piece[twins // 3] != piece)
+            assert np.array_equal(np.sort(border), np.flatnonzero(sides))
+            tails, heads = disk.ends_of(border)
+            assert np.array_equal(heads, np.roll(tails, -1))
+            assert sheet.is_pinched(piece) == (len(np.unique(tails)) < len(tails))
+
+    def test_one_kept_from_the_border_by_the_other_stays(self):
+        disk = flat_grid(9, 9)
+        middle = disk.vertices[disk.faces].mean(axis=1)
+        centre = int(np.argmin(np.abs(middle - middle.mean(axis=0)).sum(axis=1)))
+        one, other = np.zeros((2, len(disk.faces)), dtype=bool)
+        one[centre] = True
+        other[np.setdiff1d(np.arange(len(other)), centre)] = True
+        sheet = Sheet(disk, np.ones(disk.faces.size))
+        # Of what lies around, a single triangle will do.
+        assert len(sheet.separate(0, one, other)) > 1
 
     def test_the_border_is_one_round(self):
         disk = flat_grid()
@@ -167,6 +219,21 @@ class TestSplit:
             largest_layers(pairs, disk.faces, areas), every[int(np.argmax(sizes))], strict=True
         ):
             assert np.array_equal(found, largest)
+
+    @pytest.mark.parametrize("seed", range(4))
+    def test_charts_of_crumpled_paper_hang_together_and_do_not_overlap(self, seed):
+        """Many cuts, after which pieces touch themselves in points."""
+        disk = flat_grid(24, 24)
+        bends = np.random.default_rng(seed).normal(size=(4, 2, 2))
+        points = disk.vertices + 0.5 * np.sin(5 * disk.vertices @ bends).sum(axis=0)
+        pairs = find_overlaps(points, disk.faces).pairs
+        costs = lengths_of(disk)[disk.halfedge_edges]
+        chart = split_overlaps(points, disk.faces, costs, np.ones(len(disk.faces)), pairs)
+        assert chart.max() > 10
+        across = chart[disk.edge_faces]
+        count, _ = label_charts(disk, ~disk.is_boundary_edge & (across[:, 0] == across[:, 1]))
+        assert count == chart.max() + 1 == len(np.unique(chart))
+        assert (chart[pairs[:, 0]] != chart[pairs[:, 1]]).all()
 
     def test_too_many_charts_are_given_up(self):
         points, faces = spiral(3.5, 300)
