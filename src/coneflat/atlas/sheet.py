@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import BoolArray, FloatArray, IntArray
-from .._sets import unite
+from .._sets import find_root, unite
 from ..compiled import compiled
 from ..geometry.graph import MultiGraph, drop_first, edges_beside, push, trace_back
 from ..mesh import TriangleMesh
@@ -280,14 +280,6 @@ def find_cut(
     for i in range(count):
         distance[reached[i]] = np.inf
     return path[:length]
-
-
-@compiled
-def find_root(parent: IntArray, node: int) -> int:
-    """Return the root of a node's tree."""
-    while parent[node] != node:
-        node = parent[node]
-    return node
 
 
 @compiled
