@@ -9,7 +9,9 @@ from scipy.sparse.csgraph import maximum_flow
 import coneflat
 from coneflat.atlas import Layout, Seams, injective_charts, overlap_layers
 from coneflat.atlas.glue import glue_charts
-from coneflat.atlas.split import largest_layers, separate, split_overlaps, widen
+from coneflat.atlas.sheet import Sheet
+from coneflat.atlas.split import largest_layers, split_overlaps
+from coneflat.geometry.charts import label_charts
 from coneflat.geometry.overlap import find_overlaps
 from coneflat.mesh import TriangleMesh
 
@@ -66,7 +68,9 @@ class TestSeparate:
         if first == second:
             second = (first + 1) % len(disk.faces)
         one[first] = other[second] = True
-        pieces = separate(disk, one, other, costs.astype(float)[disk.halfedge_edges].reshape(-1, 3))
+        sheet = Sheet(disk, costs.astype(float)[disk.halfedge_edges])
+        assert len(sheet.separate(0, one, other)) > 1
+        pieces = sheet.piece
         assert pieces[first] != pieces[second]
         inside = np.flatnonzero(~disk.is_boundary_edge)
         a, b = disk.edge_faces[inside].T
@@ -83,6 +87,57 @@ class TestSeparate:
         else:  # the way that one of them is given to the border is not cut
             assert flow <= cost <= 4 * flow
 
+    @pytest.mark.parametrize("seed", range(6))
+    def test_pieces_of_pieces_hang_together_and_keep_their_borders(self, seed):
+        disk = flat_grid(20, 20, seed)
+        rng = np.random.default_rng(seed)
+        sheet = Sheet(disk, lengths_of(disk)[disk.halfedge_edges])
+        inside = ~disk.is_boundary_edge
+        known = 1
+        for _ in range(8):
+            own = int(rng.choice(np.flatnonzero(np.bincount(sheet.piece) > 1)))
+            members = np.flatnonzero(sheet.piece == own)
+            before = sheet.piece.copy()
+            one, other = np.zeros((2, len(disk.faces)), dtype=bool)
+            first, second = rng.choice(members, 2, replace=False)
+            one[first] = other[second] = True
+            pieces = sheet.separate(own, one, other)
+            assert pieces is not None
+            assert sheet.piece[first] != sheet.piece[second]
+            assert own in pieces
+            assert set(pieces) == set(sheet.piece[members])
+            assert np.array_equal(before[before != own], sheet.piece[before != own])
+            lowest = [np.flatnonzero(sheet.piece == piece)[0] for piece in pieces]
+            assert lowest == sorted(lowest)
+            known += len(pieces) - 1
+            across = sheet.piece[disk.edge_faces]
+            count, _ = label_charts(disk, inside & (across[:, 0] == across[:, 1]))
+            assert count == known == sheet.piece.max() + 1
+        for piece in range(known):
+            border = sheet.border(piece)
+            sides = sheet.piece[np.arange(disk.faces.size) // 3] == piece
+            twins = np.where(
+                disk.edge_halfedges[disk.halfedge_edges, 0] == np.arange(disk.faces.size),
+                disk.edge_halfedges[disk.halfedge_edges, 1],
+                disk.edge_halfedges[disk.halfedge_edges, 0],
+            )
+            sides &= (twins < 0) | (sheet.piece[twins // 3] != piece)
+            assert np.array_equal(np.sort(border), np.flatnonzero(sides))
+            tails, heads = disk.ends_of(border)
+            assert np.array_equal(heads, np.roll(tails, -1))
+            assert sheet.is_pinched(piece) == (len(np.unique(tails)) < len(tails))
+
+    def test_one_kept_from_the_border_by_the_other_stays(self):
+        disk = flat_grid(9, 9)
+        middle = disk.vertices[disk.faces].mean(axis=1)
+        centre = int(np.argmin(np.abs(middle - middle.mean(axis=0)).sum(axis=1)))
+        one, other = np.zeros((2, len(disk.faces)), dtype=bool)
+        one[centre] = True
+        other[np.setdiff1d(np.arange(len(other)), centre)] = True
+        sheet = Sheet(disk, np.ones(disk.faces.size))
+        # Of what lies around, a single triangle will do.
+        assert len(sheet.separate(0, one, other)) > 1
+
     def test_the_border_is_one_round(self):
         disk = flat_grid()
         edges = disk.halfedge_edges[disk.boundary_walk()]
@@ -95,12 +150,13 @@ class TestSeparate:
         one, other = np.zeros((2, len(disk.faces)), dtype=bool)
         one[0] = other[-1] = True
         areas = np.ones(len(disk.faces))
-        wide, far = widen(disk, one, other, areas, 50.0)
+        sheet = Sheet(disk, np.ones(disk.faces.size))
+        wide, far = sheet.widened(0, one, other, areas, 50.0)
         assert wide.sum() == far.sum() == 50
         assert wide[0]
         assert far[-1]
         assert not (wide & far).any()
-        narrow, _ = widen(disk, one, other, areas, 0.0)
+        narrow, _ = sheet.widened(0, one, other, areas, 0.0)
         assert narrow.sum() == 1
 
 
@@ -163,6 +219,21 @@ class TestSplit:
             largest_layers(pairs, disk.faces, areas), every[int(np.argmax(sizes))], strict=True
         ):
             assert np.array_equal(found, largest)
+
+    @pytest.mark.parametrize("seed", range(4))
+    def test_charts_of_crumpled_paper_hang_together_and_do_not_overlap(self, seed):
+        """Many cuts, after which pieces touch themselves in points."""
+        disk = flat_grid(24, 24)
+        bends = np.random.default_rng(seed).normal(size=(4, 2, 2))
+        points = disk.vertices + 0.5 * np.sin(5 * disk.vertices @ bends).sum(axis=0)
+        pairs = find_overlaps(points, disk.faces).pairs
+        costs = lengths_of(disk)[disk.halfedge_edges]
+        chart = split_overlaps(points, disk.faces, costs, np.ones(len(disk.faces)), pairs)
+        assert chart.max() > 10
+        across = chart[disk.edge_faces]
+        count, _ = label_charts(disk, ~disk.is_boundary_edge & (across[:, 0] == across[:, 1]))
+        assert count == chart.max() + 1 == len(np.unique(chart))
+        assert (chart[pairs[:, 0]] != chart[pairs[:, 1]]).all()
 
     def test_too_many_charts_are_given_up(self):
         points, faces = spiral(3.5, 300)

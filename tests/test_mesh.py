@@ -98,3 +98,24 @@ def test_pairs_are_sorted_stably_by_the_smaller_index_first():
     assert order.tolist() == np.lexsort((high, low)).tolist()
     keys = (9 * low + high)[order]
     assert first.tolist() == [True, *(np.diff(keys) > 0).tolist()]
+
+
+def test_ends_of_some_sides_are_those_of_all():
+    mesh = TriangleMesh(*shapes.hill(7, 5))
+    some = np.array([5, 0, 17, 5])
+    tails, heads = mesh.ends_of(some)
+    np.testing.assert_array_equal(tails, mesh.tails[some])
+    np.testing.assert_array_equal(heads, mesh.heads[some])
+    np.testing.assert_array_equal(mesh.tails.reshape(-1, 3)[:, 0], mesh.faces[:, 1])
+
+
+def test_a_mesh_that_is_moved_has_the_same_edges():
+    vertices, faces = shapes.hill(7, 5)
+    mesh = TriangleMesh(vertices, faces)
+    _ = mesh.is_boundary_vertex
+    moved = mesh.moved_to(2 * vertices)
+    assert moved.edges is mesh.edges
+    np.testing.assert_array_equal(
+        moved.is_boundary_vertex, TriangleMesh(2 * vertices, faces).is_boundary_vertex
+    )
+    np.testing.assert_array_equal(moved.vertices, 2 * vertices)

@@ -88,7 +88,7 @@ def test_the_gradient_of_a_cut_surface_is_that_of_its_energy(energy):
         mesh, corners, z, np.ones(len(mesh.vertices), dtype=bool), check_constraints(PointConstraints(), uv)
     )
     rest = rest_sides(edge_lengths(mesh.vertices, mesh.faces))
-    elements = Elements(motions, corners, rest, np.ones(len(corners)))
+    elements = Elements(motions, corners, rest, 1.0, np.ones(len(corners)))
 
     def total(step):
         return elements.energies(energy, elements.maps(z + motions.shifts(step))).sum()

@@ -37,6 +37,14 @@ def unite(parent: IntArray, one: int, two: int) -> bool:
 
 
 @compiled
+def find_root(parent: IntArray, node: int) -> int:
+    """Return the root of a node's tree."""
+    while parent[node] != node:
+        node = parent[node]
+    return node
+
+
+@compiled
 def number_sets(parent: IntArray) -> int:
     """Write the number of its tree, in the order of nodes, over the parent of each; return how many there are."""
     number = 0

@@ -20,6 +20,8 @@ from .compiled import compiled
 
 NEXT = np.array([1, 2, 0])
 PREVIOUS = np.array([2, 0, 1])
+# What is kept with a mesh and depends on its faces alone.
+CONNECTIVITY = ("_pairing", "tails", "heads", "is_boundary_edge", "is_boundary_vertex", "edges_beside")
 
 
 def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
@@ -84,20 +86,25 @@ class TriangleMesh:
 
     def moved_to(self, vertices: FloatArray) -> TriangleMesh:
         """Return the mesh with its vertices elsewhere, (n, 3); edges that have been found need not be found again."""
-        moved = TriangleMesh(vertices, self.faces)
-        if "_pairing" in self.__dict__:
-            moved.__dict__["_pairing"] = self._pairing
+        moved, known = TriangleMesh(vertices, self.faces), self.__dict__
+        moved.__dict__.update({name: known[name] for name in CONNECTIVITY if name in known})
         return moved
 
     @cached_property
     def tails(self) -> IntArray:
         """(3m,) vertex that each half-edge starts from."""
-        return self.faces[:, NEXT].ravel()
+        return _turned(self.faces, NEXT)
 
     @cached_property
     def heads(self) -> IntArray:
         """(3m,) vertex that each half-edge ends at."""
-        return self.faces[:, PREVIOUS].ravel()
+        return _turned(self.faces, PREVIOUS)
+
+    def ends_of(self, halfedges: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the vertices that some half-edges start from and end at; those of all need not be listed for it."""
+        flat = self.faces.ravel()
+        start, end = end_corners(halfedges)
+        return flat[start], flat[end]
 
     @property
     def edges(self) -> IntArray:
@@ -146,8 +153,9 @@ class TriangleMesh:
         """Return (b,) the half-edges of the one boundary loop in order, with the mesh to the left."""
         sides = self.edge_halfedges[self.is_boundary_edge, 0]
         leaving = np.empty(len(self.vertices), dtype=np.int64)
-        leaving[self.tails[sides]] = np.arange(len(sides))
-        after = leaving[self.heads[sides]].tolist()
+        tails, heads = self.ends_of(sides)
+        leaving[tails] = np.arange(len(sides))
+        after = leaving[heads].tolist()
         order = [0]
         while (following := after[order[-1]]) != 0:
             order.append(following)
@@ -184,6 +192,14 @@ class TriangleMesh:
             local[vertices] = np.arange(len(vertices))
             parts.append((TriangleMesh(self.vertices[vertices], local[self.faces[faces]]), vertices, faces))
         return parts
+
+
+def _turned(faces: IntArray, columns: IntArray) -> IntArray:
+    """Return (3m,) other columns (3,) of faces (m, 3), one by one: NumPy is slow at picking several."""
+    turned = np.empty(faces.shape, dtype=np.int64)
+    for i, column in enumerate(columns):
+        turned[:, i] = faces[:, column]
+    return turned.ravel()
 
 
 def corner_fans(faces: IntArray, one: IntArray, two: IntArray) -> tuple[int, IntArray]:

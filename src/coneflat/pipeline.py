@@ -32,7 +32,7 @@ from .progress import Stages
 from .result.assemble import assemble
 from .result.flattening import Flattening
 from .solver import fitting_solver, solving
-from .threads import using_threads
+from .threads import meanwhile, using_threads
 
 #: Takes the first layout that there is.
 Early: TypeAlias = Callable[[Flattening], object]
@@ -215,11 +215,12 @@ def flatten_component(
                 metric = find_metric(surface, cones, part.constraints, options)
             with stages("cut", 0.85):
                 disk = being_cut.result()
-        with stages("layout", 0.95):
+        with stages("layout", 0.95), meanwhile(partial(disk.get_ready, options), len(mesh.faces)):
             areas = weighted_areas(surface.areas, part.constraints.weights)
             laid_out = metric.lay_out(disk.mesh, disk.seams).with_area_distortion(cones.log_scale, areas)
             use = None if symmetry is None else SymmetryUse(symmetry, is_mirrored, disk.is_symmetric)
-            return replace(laid_out, symmetry=use)
+            opened = disk.mesh if laid_out.corners is disk.mesh.faces else None
+            return replace(laid_out, symmetry=use, disk=opened)
 
     def flatten_held(options: Options) -> LaidOut:
         once = partial(flatten_once, options=options)

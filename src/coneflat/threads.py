@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
-from functools import cache
-from typing import TYPE_CHECKING, TypeVar
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
@@ -16,10 +16,14 @@ Result = TypeVar("Result")
 
 # Triangles from which on memory is what matters, and up to which a thread takes longer to start than it saves.
 HUGE, TINY = 3_000_000, 1000
+# The same where it is not a stage that another thread takes, but a loop of a few nanoseconds for each of so many.
+FEW = 50_000
 # How many are used unless told otherwise, on any machine: the last digits depend on it.
 THREADS = 2
 
 _threads: ContextVar[int] = ContextVar("coneflat_threads", default=THREADS)
+# What the other core is at work on, if it is.
+_beside: ContextVar[Future[Any] | None] = ContextVar("coneflat_beside", default=None)
 
 
 class Later(Future[Result]):
@@ -40,23 +44,45 @@ class Later(Future[Result]):
 
 
 @contextmanager
-def meanwhile(call: Callable[[], Result], triangles: int) -> Iterator[Future[Result]]:
+def meanwhile(
+    call: Callable[[], Result], triangles: int, tiny: int | None = None
+) -> Iterator[Future[Result]]:
     """Have something done on another thread while what is inside runs, and yield its future.
 
     Of a huge mesh, and where there is to be one thread, it is done before, as what both hold in memory would be too
-    much; of a tiny one when its result is asked for.
+    much; of a tiny one, of up to so many triangles, when its result is asked for.
 
     Both are the same as one after the other: they share no data that either changes. Compiled loops, factorizations
     and most of numpy leave the interpreter to the other thread.
     """
-    if triangles <= TINY:
+    if triangles <= (TINY if tiny is None else tiny):
         yield Later(call)
         return
     with ThreadPoolExecutor(1, thread_name_prefix="coneflat") as executor:
-        future = executor.submit(copy_context().run, call)
+        context = copy_context()
+        context.run(_beside.set, Future())  # that of the thread which waits for this one
+        future = executor.submit(context.run, call)
         if triangles > HUGE or threads() == 1:
             wait([future])
-        yield future
+        token = _beside.set(future)
+        try:
+            yield future
+        finally:
+            _beside.reset(token)
+
+
+def in_halves(work: Callable[[int, int], object], count: int) -> None:
+    """Have something done for numbers from 0 up to a count, one half on another thread where the other core is idle.
+
+    work: called with the first number and the one after the last; for each it writes to places of its own.
+    """
+    beside = _beside.get()
+    if count <= FEW or (beside is not None and not beside.done()):
+        work(0, count)
+        return
+    with meanwhile(partial(work, 0, count // 2), count) as first:
+        work(count // 2, count)
+        first.result()
 
 
 def threads() -> int:

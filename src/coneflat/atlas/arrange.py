@@ -24,7 +24,7 @@ def arrange_charts(
     corner_uv: FloatArray,
     chart: IntArray,
     component: IntArray,
-    space: FloatArray,
+    space: FloatArray | None,
     *,
     resolution: int,
     padding: float,
@@ -40,7 +40,7 @@ def arrange_charts(
         corner_uv: (m, 3, 2) points of the triangle corners; those of a component are in one frame.
         chart: (m,) the chart of each triangle, from 0.
         component: (k,) the component of each chart.
-        space: (m, 3, 3) the triangles' corners on the model.
+        space: (m, 3, 3) the triangles' corners on the model; needed for an up direction only.
         resolution, padding, tiles: see `pack_charts`.
         up: direction in space that is to be v; None to fill the texture best.
         quantum: the charts of a component are turned against each other by multiples of this angle only, so that the
@@ -68,7 +68,10 @@ def arrange_charts(
 
 
 def _turned_upright(
-    charts: Charts, mirrors: Sequence[ChartMirrors], space: FloatArray, up: tuple[float, float, float] | None
+    charts: Charts,
+    mirrors: Sequence[ChartMirrors],
+    space: FloatArray | None,
+    up: tuple[float, float, float] | None,
 ) -> FloatArray:
     """Return (m, 3, 2) charts whose axes of symmetry stand upright, pairs mirrored; the others straight."""
     outlines = charts.outlines()
@@ -88,7 +91,11 @@ def whole_turns(quantum: float) -> int:
 
 
 def _turned_together(
-    charts: Charts, component: IntArray, turns: int, space: FloatArray, up: tuple[float, float, float] | None
+    charts: Charts,
+    component: IntArray,
+    turns: int,
+    space: FloatArray | None,
+    up: tuple[float, float, float] | None,
 ) -> FloatArray:
     """Return (m, 3, 2) the charts, one of each component straight, and the others turned as far as it.
 

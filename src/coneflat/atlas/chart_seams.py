@@ -34,7 +34,7 @@ class Layout:
     @property
     def places(self) -> NDArray[np.complex128]:
         """(u,) the points as complex numbers."""
-        return self.points @ np.array([1, 1j])
+        return np.ascontiguousarray(self.points).view(np.complex128)[:, 0]
 
     def split(self, chart: IntArray) -> Layout:
         """Return the layout in other charts, parts of these, with points of their own."""
@@ -88,7 +88,7 @@ class Seams:
     def __init__(self, mesh: TriangleMesh, layout: Layout) -> None:
         self.edges = point_seams(mesh, layout.corners, layout.seams)
         self.here, self.there = both_sides(mesh, self.edges, layout.corners)
-        self.charts = layout.chart[mesh.edge_faces[self.edges]]
+        self.charts = layout.chart[mesh.edge_halfedges[self.edges] // 3]
 
     def within(self, *charts: int) -> IntArray:
         """Return which of the edges have both sides in given charts."""

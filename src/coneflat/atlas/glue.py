@@ -17,6 +17,7 @@ from ..geometry.overlap import find_overlaps
 from ..geometry.planar import bounds, fill_bounds, signed_double_areas
 from ..mesh import TriangleMesh
 from ..progress import go_on
+from ..threads import in_halves
 from .chart_seams import Layout, Seams, same_points
 
 # Relative to the length of a seam edge: how far its two sides may be apart, moved together, to be glued.
@@ -45,23 +46,33 @@ def glue_charts(
     gluing = _Gluing(mesh, layout, image)
     # What is glued changes which seams are stretches of one.
     while gluing.glue_longest(lengths, refused):
-        gluing = _Gluing(mesh, gluing.layout, image)
+        gluing = _Gluing(mesh, gluing.layout, image, gluing)
     return gluing.layout
 
 
 class _Gluing:
     """Charts of a layout that are glued one by one, at the expense of what is near only."""
 
-    def __init__(self, mesh: TriangleMesh, layout: Layout, image: IntArray | None) -> None:
+    def __init__(
+        self, mesh: TriangleMesh, layout: Layout, image: IntArray | None, before: _Gluing | None = None
+    ) -> None:
+        """Start from a layout; `before` has led to it, and is done with."""
         self.image = image
         self.seams, self.places = Seams(mesh, layout), layout.places
         between = np.flatnonzero(self.seams.charts[:, 0] != self.seams.charts[:, 1])
         stretches = _members(self.seams.stretches(mesh)[between], between)
         self.stretches = [members for members in stretches if len(members)]
-        self.corners, self.chart = layout.corners.copy(), layout.chart.copy()
         self.faces = _members(layout.chart, np.arange(len(layout.chart)))
-        self.low, self.high = np.empty((2, len(self.corners), 2))
-        fill_bounds(layout.points, self.corners, np.arange(len(self.corners)), self.low, self.high)
+        if before is None:
+            self.corners, self.chart = layout.corners.copy(), layout.chart.copy()
+            self.low, self.high = np.empty((2, len(self.corners), 2))
+            in_halves(self._fill_bounds, len(self.corners))
+        else:
+            self.corners, self.chart = before.corners, before.chart
+            self.low, self.high = before.low, before.high
+
+    def _fill_bounds(self, start: int, stop: int) -> None:
+        fill_bounds(_pairs(self.places), self.corners, np.arange(start, stop), self.low, self.high)
 
     @property
     def layout(self) -> Layout:
@@ -140,11 +151,17 @@ class _Gluing:
         if not self._fits(kept, moved):
             self.places = before
             return False
-        self.corners, seams.here, seams.there = joined[self.corners], joined[seams.here], joined[seams.there]
+        is_joined = np.zeros(len(before), dtype=bool)
+        is_joined[pairs] = True
+        changed = np.concatenate([with_points(self.corners, self.faces[kept], is_joined), self.faces[moved]])
+        if self.image is not None:  # what may be taken back
+            self.corners = self.corners.copy()
+        self.corners[changed] = joined[self.corners[changed]]
+        seams.here, seams.there = joined[seams.here], joined[seams.there]
         seams.charts[seams.charts == moved] = self.chart[self.faces[moved]] = kept
         self.faces[kept] = np.concatenate([self.faces[kept], self.faces[moved]])
         self.faces[moved] = self.faces[moved][:0]
-        fill_bounds(_pairs(self.places), self.corners, self.faces[kept], self.low, self.high)
+        fill_bounds(_pairs(self.places), self.corners, changed, self.low, self.high)
         return True
 
     def _corners(self, faces: IntArray) -> FloatArray:
@@ -175,6 +192,17 @@ def _pairs(places: NDArray[np.complex128]) -> FloatArray:
     """Return complex numbers as pairs of their parts, along a last axis more."""
     parts: FloatArray = np.ascontiguousarray(places).view(np.float64).reshape(*places.shape, 2)
     return parts
+
+
+@compiled
+def with_points(corners: IntArray, chosen: IntArray, is_wanted: BoolArray) -> IntArray:
+    """Return those of the chosen triangles, by their corners (m, 3), that have one of the wanted points (u,)."""
+    found, count = np.empty(len(chosen), np.int64), 0
+    for f in chosen:
+        if is_wanted[corners[f, 0]] or is_wanted[corners[f, 1]] or is_wanted[corners[f, 2]]:
+            found[count] = f
+            count += 1
+    return found[:count]
 
 
 @compiled

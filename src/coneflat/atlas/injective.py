@@ -7,8 +7,9 @@ from functools import partial
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray, dots
+from .._arrays import FloatArray, IntArray, dots, rows_of
 from ..flat import LaidOut
+from ..geometry.graph import edges_beside
 from ..geometry.overlap import overlaps_of_mesh
 from ..geometry.planar import signed_double_areas
 from ..input.components import Component, seam_costs
@@ -20,7 +21,7 @@ from ..threads import meanwhile
 from .chart_seams import Layout, Seams
 from .glue import glue_charts
 from .mirrored import mirror_charts, split_alike
-from .split import as_disk, split_overlaps
+from .split import as_disk, split_overlaps, unpinched
 
 # Parts of the area that charts should have at least. Where the cheapest cuts leave several charts, dearer ones that
 # leave larger pieces may leave fewer.
@@ -43,6 +44,7 @@ def injective_charts(
     corners: IntArray,
     lengths: FloatArray,
     symmetry: Symmetry | None = None,
+    disk: TriangleMesh | None = None,
 ) -> Layout:
     """Return a layout of a connected mesh in charts that do not overlap themselves.
 
@@ -55,12 +57,13 @@ def injective_charts(
         corners: (m, 3) the point of each triangle corner; one disk.
         lengths: (e,) of the edges, which cuts and seams cost.
         symmetry: of mesh and layout; charts are split alike on both sides then, if that takes few more of them.
+        disk: a mesh whose faces are the corners, with a vertex for each point, if there is one.
     """
     whole = Layout(points, corners, np.zeros(len(corners), dtype=np.int64))
-    places = points[corners]
+    places = rows_of(points, corners)
     areas = signed_double_areas(places)
     # The disk has to be made only where something overlaps, but the other core has nothing else to do.
-    with meanwhile(partial(as_disk, points, corners), len(corners)) as opening:
+    with meanwhile(partial(_ready_disk, points, corners, disk), len(corners)) as opening:
         pairs = overlaps_of_mesh(mesh.edge_halfedges, places).pairs
         # What an inverted triangle covers is not to be had apart from its neighbours.
         pairs = pairs[(areas[pairs] > 0).all(axis=1)]
@@ -85,6 +88,13 @@ def injective_charts(
     if symmetry is None:
         return best
     return _most_alike(mesh, best, whole, lengths, np.abs(areas), pairs, symmetry)
+
+
+def _ready_disk(points: FloatArray, corners: IntArray, known: TriangleMesh | None) -> TriangleMesh:
+    """Return a layout as a mesh of its own, with what cutting it will need; `known` has the same faces."""
+    disk = as_disk(points, corners) if known is None else unpinched(known.moved_to(points))
+    edges_beside(disk)
+    return disk
 
 
 def _most_alike(
@@ -143,13 +153,15 @@ def without_overlaps(laid_out: LaidOut, part: Component, options: Options) -> La
     mesh, use = laid_out.mesh, laid_out.symmetry
     symmetry = use.symmetry if use is not None and use.seams and mesh is part.mesh else None
     costs = cut_costs(laid_out, part, options)
-    charts = injective_charts(mesh, laid_out.points, laid_out.corners, costs, symmetry)
+    disk = laid_out.disk
+    charts = injective_charts(mesh, laid_out.points, laid_out.corners, costs, symmetry, disk)
     edges = Seams(mesh, charts).edges
     return replace(
         laid_out,
         points=charts.points,
         corners=charts.corners,
         chart=charts.chart,
+        disk=None,
         seams=mesh.edges[edges],
         notes=(*laid_out.notes, *_forbidden_cuts(laid_out, part, edges)),
     )

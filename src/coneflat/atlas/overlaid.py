@@ -50,6 +50,7 @@ def overlaid(laid_out: LaidOut, part: Component, options: Options) -> LaidOut:
         points=found.points,
         corners=found.corners,
         chart=found.chart,
+        disk=None,
         seams=mesh.edges[Seams(mesh, found).edges],
         # All points of the left are used, so that they are numbered as before.
         lies_on=np.where(used < count, np.arange(len(used)), used - count),

@@ -125,12 +125,14 @@ def pack_known(
     scale = room / (packing.side or 1.0)
     factors = scale * frame * np.exp(1j * packing.angle)
     border = (1 + 1j) * margin / resolution
-    uv = np.clip(charts.moved(factors, packing.shift * scale + border), 0.0, 1.0)
+    uv = charts.moved(factors, packing.shift * scale + border)
+    np.clip(uv, 0.0, 1.0, out=uv)
     corner = np.stack([packing.tile % TILES_IN_A_ROW, packing.tile // TILES_IN_A_ROW], axis=1)
+    uv += corner[charts.chart][:, None] if packing.tile.any() else 0.0  # no -0.0
     return Packed(
-        corner_uv=uv + corner[charts.chart][:, None],
+        corner_uv=uv,
         scale=scale,
-        efficiency=float(np.abs(charts.areas * np.abs(factors[charts.chart]) ** 2).sum()) / tiles,
+        efficiency=float(np.abs(charts.areas * np.abs(factors)[charts.chart] ** 2).sum()) / tiles,
         tile_of_chart=packing.tile,
         angle_of_chart=np.angle(factors),
     )

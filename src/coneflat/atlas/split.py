@@ -1,23 +1,17 @@
-"""A layout that overlaps itself split into charts: the layers of its overlaps, and the cheapest cuts between them.
-
-In the plane a minimum cut between two triangles, with lengths of edges as capacities, is a shortest path between the
-two parts of the border that lie between them (planar duality): no flow has to be computed.
-"""
+"""A layout that overlaps itself split into charts: the layers of its overlaps, and the cheapest cuts between them."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats
-from ..compiled import compiled
+from .._arrays import FloatArray, IntArray, as_faces, as_floats
 from ..errors import ArrayShapeError, FaceIndexError, OptionError
-from ..geometry.charts import label_charts
-from ..geometry.graph import MultiGraph, trace_back
 from ..geometry.parts import part_of
 from ..mesh import NEXT, TriangleMesh, corner_fans, label_components, sort_by_counting, sort_pairs
 from ..progress import go_on
 from ..text import list_some, plural
+from .sheet import Sheet
 
 
 def split_overlaps(
@@ -46,35 +40,68 @@ def split_overlaps(
         whole: what `as_disk` returns of all triangles, if that is known.
     """
     chart, count = np.zeros(len(corners), dtype=np.int64), 1
-    # Triangles of all, their pairs, a disk, and the triangles of the disk that they are.
-    waiting = []
-    if len(pairs):
-        disk = as_disk(points, corners) if whole is None else whole
-        waiting.append((np.arange(len(corners)), pairs, disk, np.arange(len(corners))))
+    if not len(pairs):
+        return chart
+    sheets = [_Sheet.of(as_disk(points, corners) if whole is None else whole, costs, areas)]
+    # Pieces of sheets, and the pairs in each.
+    waiting = [(sheets[0], 0, pairs)]
     while waiting and count < most:
         go_on()
-        faces, pairs, disk, members = waiting.pop()
-        if len(members) < len(disk.faces):
-            disk = unpinched(part_of(disk, members))
-        one, other = np.zeros((2, len(faces)), dtype=bool)
-        for layer, members in zip((one, other), largest_layers(pairs, disk.faces, areas[faces]), strict=True):
+        sheet, own, pairs = waiting.pop()
+        if len(sheet.chart) > 1 and sheet.is_pinched(own):
+            sheet, own, pairs = sheet.opened(own, pairs)
+            sheets.append(sheet)
+        one, other = np.zeros((2, len(sheet.faces)), dtype=bool)
+        for layer, members in zip(
+            (one, other), largest_layers(pairs, sheet.disk.faces, sheet.areas), strict=True
+        ):
             layer[members] = True
         if least > 0:
-            one, other = widen(disk, one, other, areas[faces], least)
-        pieces = separate(disk, one, other, costs.reshape(-1, 3)[faces])
+            one, other = sheet.widened(own, one, other, sheet.areas, least)
+        pieces = sheet.separate(own, one, other)
         if pieces is None:
             # They stay together and overlap, which the measures show.
             continue
-        left = np.where(pieces[pairs[:, 0]] == pieces[pairs[:, 1]], pieces[pairs[:, 0]], -1)
-        for piece in range(int(pieces.max()) + 1):
-            members = np.flatnonzero(pieces == piece)
-            if piece:
-                chart[faces[members]] = count
-                count += 1
-            if (left == piece).any():
-                within = np.searchsorted(members, pairs[left == piece])
-                waiting.append((faces[members], within, disk, members))
+        sheet.chart += [0] * (len(pieces) - 1)
+        number = sheet.chart[own]
+        for i, piece in enumerate(pieces):
+            sheet.chart[piece] = number if i == 0 else count
+            count += i > 0
+            within = pairs[(sheet.piece[pairs] == piece).all(axis=1)]
+            if len(within):
+                waiting.append((sheet, piece, within))
+    for sheet in sheets:  # what was opened comes after what it was part of
+        chart[sheet.faces] = np.array(sheet.chart)[sheet.piece]
     return None if waiting else chart
+
+
+class _Sheet(Sheet):
+    """A sheet of some of the triangles.
+
+    Attributes:
+        faces: (m,) which they are.
+        areas: (m,) of them.
+        chart: the number of the chart that each piece is.
+    """
+
+    def __init__(
+        self, disk: TriangleMesh, costs: FloatArray, areas: FloatArray, faces: IntArray, chart: int
+    ) -> None:
+        super().__init__(disk, costs)
+        self.areas, self.faces, self.chart = areas, faces, [chart]
+
+    @classmethod
+    def of(cls, disk: TriangleMesh, costs: FloatArray, areas: FloatArray) -> _Sheet:
+        """Return a sheet of all triangles."""
+        return cls(disk, costs, areas, np.arange(len(areas)), 0)
+
+    def opened(self, own: int, pairs: IntArray) -> tuple[_Sheet, int, IntArray]:
+        """Return a piece that touches itself in a point as a sheet, opened there, with its pairs of triangles."""
+        members = np.flatnonzero(self.piece == own)
+        disk = unpinched(part_of(self.disk, members))
+        costs = self.costs.reshape(-1, 3)[members].ravel()
+        sheet = _Sheet(disk, costs, self.areas[members], self.faces[members], self.chart[own])
+        return sheet, 0, np.searchsorted(members, pairs)
 
 
 def as_disk(points: FloatArray, corners: IntArray) -> TriangleMesh:
@@ -93,142 +120,6 @@ def unpinched(mesh: TriangleMesh) -> TriangleMesh:
     vertices = np.empty((count, 2))
     vertices[fans] = mesh.vertices[mesh.faces]
     return TriangleMesh(vertices, fans)
-
-
-def separate(disk: TriangleMesh, one: BoolArray, other: BoolArray, costs: FloatArray) -> IntArray | None:
-    """Return (m,) the piece of each triangle after the cheapest cut between two sets of them, from 0.
-
-    None if each set, down to a single triangle, keeps the other from the border.
-
-    Args:
-        disk: a topological disk.
-        one, other: (m,) True for the triangles to be separated: two sets, connected each, without a common member.
-        costs: (m, 3) of the side opposite each corner, positive, and the same from both triangles.
-    """
-    border = disk.halfedge_edges[disk.boundary_walk()]
-    both = _both_to_the_border(disk, border, one, other)
-    if both is None:
-        return None
-    one, other = both
-    beside = disk.edge_faces[border, 0]
-    mark = np.where(one[beside], 1, np.where(other[beside], 2, 0))
-    starts, ends = _between(disk, border, mark)
-    cut = _cheapest_path(disk, starts, ends, one, other, costs)
-    glued = ~disk.is_boundary_edge
-    glued[cut] = False
-    return label_charts(disk, glued)[1]
-
-
-def _both_to_the_border(
-    disk: TriangleMesh, border: IntArray, one: BoolArray, other: BoolArray
-) -> tuple[BoolArray, BoolArray] | None:
-    """Return two sets of triangles with a path from each to the border; of one around the other, a single triangle."""
-    for first, second in (
-        (one, other),
-        (_single(one), other),
-        (one, _single(other)),
-        (_single(one), _single(other)),
-    ):
-        wide = _to_the_border(disk, border, first, second)
-        if wide is None:
-            continue
-        wider = _to_the_border(disk, border, second, wide)
-        if wider is not None:
-            return wide, wider
-    return None
-
-
-def _single(chosen: BoolArray) -> BoolArray:
-    """Return one of the chosen triangles alone."""
-    first = np.zeros_like(chosen)
-    first[np.argmax(chosen)] = True
-    return first
-
-
-def _to_the_border(
-    disk: TriangleMesh, border: IntArray, chosen: BoolArray, barred: BoolArray
-) -> BoolArray | None:
-    """Return chosen triangles, with the shortest path from them to the border if none of them is there.
-
-    None if there is no path that does not lead through those that are barred.
-    """
-    beside = disk.edge_faces[border, 0]
-    if chosen[beside].any():
-        return chosen
-    inside = disk.edge_faces[~disk.is_boundary_edge]
-    inside = inside[~barred[inside].any(axis=1)]
-    dual = MultiGraph(len(disk.faces), inside[:, 0], inside[:, 1], np.ones(len(inside)))
-    free = beside[~barred[beside]]
-    distance, before, _ = dual.shortest_paths(np.flatnonzero(chosen), free)
-    if not np.isfinite(distance[free]).any():
-        return None
-    nodes, _ = trace_back(free[[np.argmin(distance[free])]], before)
-    widened = chosen.copy()
-    widened[nodes] = True
-    return widened
-
-
-def widen(
-    disk: TriangleMesh, one: BoolArray, other: BoolArray, areas: FloatArray, least: float
-) -> tuple[BoolArray, BoolArray]:
-    """Return two sets of triangles, each with those nearest to it, and nearer to it than to the other, up to an area.
-
-    areas: (m,) of the triangles.
-    """
-    inside = disk.edge_faces[~disk.is_boundary_edge]
-    middles = (
-        disk.vertices[disk.faces[:, 0]] + disk.vertices[disk.faces[:, 1]] + disk.vertices[disk.faces[:, 2]]
-    )
-    steps = (middles[inside[:, 0]] - middles[inside[:, 1]]) / 3
-    lengths = np.hypot(steps[:, 0], steps[:, 1])
-    dual = MultiGraph(len(disk.faces), inside[:, 0], inside[:, 1], lengths)
-    wide = dual.widened(np.where(one, 0, np.where(other, 1, -1)), areas, least)
-    return wide == 0, wide == 1
-
-
-def _between(disk: TriangleMesh, border: IntArray, mark: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the vertices of the border between the sides marked 1 and those marked 2, and between 2 and 1.
-
-    border: (b,) edges in order. mark: (b,).
-    """
-    # Turned so that the sides marked 1 come last; as both sets are connected, they do not alternate.
-    marked = np.flatnonzero(mark)
-    turn = marked[np.flatnonzero((mark[marked] == 1) & (mark[np.roll(marked, -1)] == 2))[0]] + 1
-    border, mark = np.roll(border, -turn), np.roll(mark, -turn)
-    twos, ones = np.flatnonzero(mark == 2), np.flatnonzero(mark == 1)
-    tails = disk.tails[disk.edge_halfedges[border, 0]]
-    return tails[: twos[0] + 1], tails[twos[-1] + 1 : ones[0] + 1]
-
-
-def _cheapest_path(
-    disk: TriangleMesh,
-    starts: IntArray,
-    ends: IntArray,
-    one: BoolArray,
-    other: BoolArray,
-    costs: FloatArray,
-) -> IntArray:
-    """Return the edges of the cheapest path inside a disk that runs through neither set of triangles."""
-    one_end, other_end = np.ascontiguousarray(disk.edges.T)
-    ways = cost_of_edges(disk.edge_halfedges, one, other, costs)
-    graph = MultiGraph(len(disk.vertices), one_end, other_end, ways)
-    distance, before, _ = graph.shortest_paths(starts, ends)
-    nodes, previous = trace_back(ends[[np.argmin(distance[ends])]], before)
-    return graph.edges_between(nodes, previous)
-
-
-@compiled
-def cost_of_edges(
-    edge_halfedges: IntArray, one: BoolArray, other: BoolArray, costs: FloatArray
-) -> FloatArray:
-    """Return (e,) what edges cost with costs (m, 3) of sides: without end on the border and within one set."""
-    found = np.full(len(edge_halfedges), np.inf)
-    for e in range(len(found)):
-        h, t = edge_halfedges[e]
-        left, right = h // 3, t // 3
-        if t >= 0 and not (one[left] and one[right]) and not (other[left] and other[right]):
-            found[e] = costs[left, h % 3]
-    return found
 
 
 def overlap_regions(pairs: ArrayLike, triangles: ArrayLike) -> tuple[int, IntArray]:
@@ -329,8 +220,10 @@ def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
     """
     if not len(pairs):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    count = len(triangles)
-    one, two = _neighbours(np.unique(pairs), triangles)
+    # Numbered by themselves, as most triangles have no part in it.
+    chosen, index = np.unique(pairs, return_inverse=True)
+    pairs, count = index.reshape(-1, 2), len(chosen)
+    one, two = _neighbours(triangles[chosen])
     two = two[sort_by_counting(one, count)]
     degree = np.bincount(one, minlength=count)
     starts = np.cumsum(degree) - degree
@@ -347,10 +240,11 @@ def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
     return source[found], 2 * place[found] + (kept > moved)[found]
 
 
-def _neighbours(chosen: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the chosen triangles that share a side, two and two, each in both orders."""
-    tails, heads = triangles[chosen].ravel(), triangles[chosen][:, NEXT].ravel()
-    order, first = sort_pairs(tails, heads, int(triangles.max()) + 1)
+def _neighbours(triangles: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the triangles that share a side, two and two, each in both orders."""
+    points, corner = np.unique(triangles, return_inverse=True)
+    corners = corner.reshape(-1, 3)
+    order, first = sort_pairs(corners.ravel(), corners[:, NEXT].ravel(), len(points))
     again = np.flatnonzero(~first)
-    one, two = chosen[order[again - 1] // 3], chosen[order[again] // 3]
+    one, two = order[again - 1] // 3, order[again] // 3
     return np.concatenate([one, two]), np.concatenate([two, one])

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from .._arrays import BoolArray, FloatArray, IntArray, rows_of
 from ..compiled import compiled
 from ..cones import ConeSolution
 from ..errors import ConvergenceError, MetricError
@@ -61,6 +61,7 @@ class LaidOut:
         notes: what falls short, one sentence each.
         symmetry: the symmetry that was found, and what it was used for; None if there is none.
         lies_on: (c,) the point that each is to lie on, itself for most: both sides of a model in one place; or None.
+        disk: the mesh cut open, whose faces are the corners, with a vertex for each point; None if there is none.
     """
 
     mesh: TriangleMesh
@@ -78,6 +79,7 @@ class LaidOut:
     notes: tuple[str, ...] = ()
     symmetry: SymmetryUse | None = None
     lies_on: IntArray | None = None
+    disk: TriangleMesh | None = None
 
     @property
     def area(self) -> float:
@@ -220,7 +222,7 @@ def laid_out_at(
     Raises:
         MetricError: the layout has no area.
     """
-    corners = points[disk.faces]
+    corners = rows_of(points, disk.faces)
     doubles = np.abs(signed_double_areas(corners))
     if not doubles.sum() > 0:
         raise MetricError(

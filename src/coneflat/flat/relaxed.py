@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray, has_any
+from .._arrays import BoolArray, FloatArray, IntArray, has_any, rows_of
 from ..compiled import compiled
 from ..errors import LengthError, MetricError, SeamError
 from ..geometry import double_areas, edge_lengths
@@ -19,6 +19,7 @@ from ..input.components import Component
 from ..layout.relax import Relaxed, StretchEnergy, relax
 from ..mesh import TriangleMesh, label_components
 from ..options import Options
+from ..threads import in_halves
 from .base import LaidOut, laid_out_curvature, vertex_log_scale
 from .methods import held_boundary
 
@@ -189,8 +190,13 @@ class _Surface:
         chosen: the triangles of interest, the others are infinite; None for all.
         """
         ratios = np.full(len(self.mesh.faces), np.inf)
-        chosen = np.arange(len(ratios)) if chosen is None else chosen
-        fill_ratios(np.ascontiguousarray(self.lengths), points, self.corners, chosen, ratios)
+        every = np.arange(len(ratios)) if chosen is None else chosen
+        lengths, corners = np.ascontiguousarray(self.lengths), self.corners
+
+        def fill(start: int, stop: int) -> None:
+            fill_ratios(lengths, points, corners, every[start:stop], ratios)
+
+        in_halves(fill, len(every))
         return ratios
 
     def means(self, ratios: FloatArray) -> FloatArray:
@@ -214,7 +220,8 @@ class _Surface:
         The vertices there, (n,), too. before: (m,) the ratios of the layout that nothing may be worse than.
         """
         mesh, faces = self.mesh, self.mesh.faces
-        edges = mesh.edges[was_free[mesh.edges[:, 0]] & was_free[mesh.edges[:, 1]]]
+        inside = np.flatnonzero(was_free[mesh.edges[:, 0]] & was_free[mesh.edges[:, 1]])
+        edges = rows_of(mesh.edges, inside)
         count, patch = label_components(len(mesh.vertices), edges[:, 0], edges[:, 1])
         touched = np.flatnonzero(has_any(was_free, faces) & np.isfinite(before))
         after = self.ratios(moved, touched)
@@ -236,7 +243,7 @@ class _Surface:
         self, points: FloatArray, before: FloatArray, was_free: BoolArray, options: Options
     ) -> list[LaidOut]:
         """Return the layouts with moved points, with the curvature and the scale that they have, and had before."""
-        mesh, corners = self.mesh, points[self.corners]
+        mesh, corners = self.mesh, rows_of(points, self.corners)
         # Where triangles were moved; elsewhere it is what it was.
         changed = np.zeros(len(mesh.vertices), dtype=bool)
         changed[mesh.faces[has_any(was_free, mesh.faces)]] = True

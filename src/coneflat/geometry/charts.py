@@ -11,6 +11,7 @@ from .._arrays import BoolArray, FloatArray, IntArray
 from .._sets import number_sets, unite
 from ..compiled import compiled
 from ..mesh import TriangleMesh, end_corners
+from ..threads import in_halves
 
 # UV distance over UV edge length at which two sides of an edge count as one.
 JOINED = 1e-6
@@ -33,9 +34,16 @@ def point_seams(mesh: TriangleMesh, corners: IntArray, among: IntArray | None = 
 
     among: edges among which they are; None for all.
     """
+    corners = np.ascontiguousarray(corners)
     if among is not None:
-        return among[find_split(mesh.edge_halfedges[among], np.ascontiguousarray(corners))]
-    return np.flatnonzero(find_split(mesh.edge_halfedges, np.ascontiguousarray(corners)))
+        return among[find_split(mesh.edge_halfedges[among], corners)]
+    is_split = np.empty(len(mesh.edges), dtype=bool)
+
+    def fill(start: int, stop: int) -> None:
+        is_split[start:stop] = find_split(mesh.edge_halfedges[start:stop], corners)
+
+    in_halves(fill, len(is_split))
+    return np.flatnonzero(is_split)
 
 
 def point_vertices(faces: IntArray, corners: IntArray, count: int) -> IntArray:
@@ -110,13 +118,18 @@ def find_joined(edge_halfedges: IntArray, corner_uv: FloatArray, near: float) ->
         f, g = h // 3, t // 3
         start, end = corner_uv[f, (h + 1) % 3], corner_uv[f, (h + 2) % 3]
         other_end, other_start = corner_uv[g, (t + 1) % 3], corner_uv[g, (t + 2) % 3]
+        if (
+            start[0] == other_start[0]
+            and start[1] == other_start[1]
+            and end[0] == other_end[0]
+            and end[1] == other_end[1]
+        ):
+            joined[e] = True
+            continue
         gap = max(
             math.hypot(start[0] - other_start[0], start[1] - other_start[1]),
             math.hypot(end[0] - other_end[0], end[1] - other_end[1]),
         )
-        if gap == 0.0:
-            joined[e] = True
-            continue
         length = math.hypot(end[0] - start[0], end[1] - start[1])
         other_length = math.hypot(other_end[0] - other_start[0], other_end[1] - other_start[1])
         joined[e] = gap <= near * max(length, other_length)

@@ -37,8 +37,7 @@ def covered_twice(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
         rounding. Only triangles that overlap others count, the outline of what they cover is short, and its
         sides cross in those pairs alone.
     """
-    edges = corners[:, NEXT] - corners
-    total = float(_cross(edges[:, 0], edges[:, 1]).sum()) / 2
+    total = float(_cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1]).sum()) / 2
     if not len(pairs):
         return 0.0, total
     used, index = np.unique(pairs, return_inverse=True)

@@ -10,6 +10,8 @@ import numpy as np
 from .._arrays import BoolArray, FloatArray, Int32Array, IntArray
 from .._sets import unite
 from ..compiled import compiled
+from ..kept import kept_with
+from ..mesh import TriangleMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +85,19 @@ class MultiGraph:
         in_tree = np.zeros(len(self.costs), dtype=bool)
         grow_forest(np.argsort(self.costs, kind="stable"), *self._ends, self.nodes, in_tree)
         return np.flatnonzero(in_tree)
+
+
+def edges_beside(mesh: TriangleMesh) -> tuple[IntArray, IntArray]:
+    """Return where the edges at each vertex begin, and these, as `list_sides` has them; they are kept with the mesh."""
+
+    def find() -> tuple[IntArray, IntArray]:
+        begin = np.zeros(len(mesh.vertices) + 1, dtype=np.int64)
+        beside = np.empty(2 * len(mesh.edges), dtype=np.int64)
+        tails, heads = np.ascontiguousarray(mesh.edges.T)
+        list_sides(tails, heads, begin, beside)
+        return begin, beside
+
+    return kept_with(mesh, "edges_beside", find)
 
 
 def trace_back(starts: IntArray, predecessor: IntArray) -> tuple[IntArray, IntArray]:

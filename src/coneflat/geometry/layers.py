@@ -13,6 +13,7 @@ import numpy as np
 
 from .._arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..compiled import compiled
+from ..threads import in_halves
 
 # Cells along a side of the grid for the root of the number of triangles, and at most.
 FINENESS, MOST_CELLS = 1.5, 2048
@@ -29,7 +30,11 @@ def open_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray) -
         group: (m,) only sides of the same group, from 0 on, cancel; below, all are open.
     """
     is_open = np.ones(3 * len(corners), dtype=bool)
-    close_sides(edge_halfedges, np.ascontiguousarray(corners), group, is_open)
+    places = np.ascontiguousarray(corners)
+    in_halves(
+        lambda start, stop: close_sides(edge_halfedges[start:stop], places, group, is_open),
+        len(edge_halfedges),
+    )
     return is_open
 
 

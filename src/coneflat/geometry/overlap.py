@@ -8,9 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import FloatArray, IntArray, as_faces, as_floats, require_finite, unit_exponent
+from .._arrays import (
+    FloatArray,
+    IntArray,
+    as_faces,
+    as_floats,
+    require_finite,
+    rows_of,
+    unit_exponent,
+)
 from ..compiled import compiled
 from ..errors import ArrayShapeError, OptionError
+from ..threads import in_halves
 from .coverage import covered_twice
 from .fans import find_fans, lie_apart
 from .layers import may_overlap, open_sides
@@ -126,15 +135,21 @@ def _at_unit_size(corners: FloatArray) -> tuple[FloatArray, int]:
         corners, factor = np.ldexp(corners, -exponent), 1.0
     else:
         factor = 2.0**-exponent
-    scaled = np.empty(corners.shape)
-    scale_numbers(np.ascontiguousarray(corners).reshape(-1), factor, TINY, scaled.reshape(-1))
+    numbers, scaled = np.ascontiguousarray(corners).reshape(-1), np.empty(corners.shape)
+    flat = scaled.reshape(-1)
+    in_halves(
+        lambda start, stop: scale_numbers(numbers[start:stop], factor, TINY, flat[start:stop]), len(flat)
+    )
     return scaled, exponent
 
 
 def _counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return the triangles, turned over where they are clockwise, and their orientations 1, -1 and 0."""
     signs = np.empty(len(corners), dtype=np.int64)
-    fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
+    flat = corners.reshape(-1, 6)
+    in_halves(
+        lambda start, stop: fill_orientations(flat[start:stop], np.empty(12), signs[start:stop]), len(flat)
+    )
     clockwise = np.flatnonzero(signs < 0)
     if not len(clockwise):
         return corners, signs
@@ -150,9 +165,10 @@ def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tup
     """
     if len(chosen) < 2:
         return np.empty((0, 2), dtype=np.int64), True
-    boxes = snug_boxes(corners[chosen])
+    places = rows_of(corners.reshape(-1, 6), chosen)
+    boxes = snug_boxes(places.reshape(-1, 3, 2))
     order = z_order(boxes)
-    fans = find_fans(corners[chosen])
+    fans = find_fans(places.reshape(-1, 3, 2))
     if fans is not None:
         order = fans.sorted(order)
     tree = box_tree(boxes[order])
@@ -160,7 +176,7 @@ def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tup
     if fans is not None:
         around = fans.tree(order, (len(tree) + 1) // 2)
     chosen = chosen[order]
-    arrays = tree, *around, corners[chosen].reshape(-1, 6), np.empty(12)
+    arrays = tree, *around, rows_of(places, order), np.empty(12)
     stack, top = np.zeros((4 * len(tree).bit_length(), 2), dtype=np.int64), 1
     keys, room, left = [], len(chosen), np.inf if limit is None else limit + 1
     while top > 0 and left > 0:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +31,7 @@ class FlatTriangles:
     turns: ComplexArray
     twin: IntArray
 
-    @property
+    @cached_property
     def is_inverted(self) -> BoolArray:
         """(m,) True for triangles that are turned over or have no area."""
         sides = self.sides.reshape(-1, 3)
@@ -111,7 +112,8 @@ def find_turns(twin: IntArray, sides: ComplexArray, turns: ComplexArray) -> None
         t = twin[h]
         if t > h:
             turn = -sides[h] * sides[t].conjugate()
-            turns[h] = turn / abs(turn)
+            size = abs(turn)
+            turns[h] = complex(turn.real / size, turn.imag / size)
             turns[t] = turns[h].conjugate()
         elif t < 0:
             turns[h] = 1.0

@@ -12,12 +12,13 @@ import numpy as np
 from .._arrays import BoolArray, FloatArray, IntArray
 from ..cones import ConeSolution
 from ..errors import MetricError, SeamError
+from ..geometry.graph import edges_beside
 from ..input.components import Component, seam_costs
 from ..input.symmetry import Symmetry
 from ..mesh import TriangleMesh
 from ..options import Options
 from ..seams import cut_open, detail_factors, find_seams, mirrored_seams
-from ..threads import meanwhile
+from ..threads import HUGE, meanwhile
 
 # A log scale that varies by less is constant.
 FLAT = 1e-9
@@ -38,6 +39,12 @@ class Disk:
     mesh: TriangleMesh
     seams: IntArray
     is_symmetric: bool = False
+
+    def get_ready(self, options: Options) -> None:
+        """Find what charts will need of it, unless it is huge: while it is laid out, which takes the faces alone."""
+        if options.method == "exact" and options.charts == "atlas" and len(self.mesh.faces) <= HUGE:
+            _ = self.mesh.is_boundary_vertex
+            edges_beside(self.mesh)
 
 
 def cutting(

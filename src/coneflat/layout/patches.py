@@ -70,7 +70,7 @@ class Patches:
         lengths = np.abs(self.sides)
         around = (lengths.sum(axis=1, keepdims=True) - lengths)[is_loose] / 2
         size = np.bincount(self.corners[is_loose], around) / np.bincount(self.corners[is_loose])
-        frames = _corner_frames(flat, faces, movable)[self.faces]
+        frames = _corner_frames(flat, faces[self.faces], self.faces, movable)
         self.shift = np.where(is_loose, frames * size[self.corners], 0)
         self._find_maps(wanted(self.sides))
         ends = self.corners[:, [1, 2, 0]].ravel(), self.corners[:, [2, 0, 1]].ravel()
@@ -230,23 +230,26 @@ class _Equations:
         return step, slope
 
 
-def _corner_frames(flat: FlatTriangles, faces: IntArray, movable: BoolArray) -> ComplexArray:
-    """Return (m, 3) unit numbers that take a shift of a movable vertex to the frame of the triangle there.
+def _corner_frames(flat: FlatTriangles, faces: IntArray, rows: IntArray, movable: BoolArray) -> ComplexArray:
+    """Return (f, 3) unit numbers that take a shift of a movable vertex to the frame of the triangle there.
 
     All corners of a vertex are reached by turning around it from a first one, the same for all.
+
+    faces, rows: (f, 3) the triangles that have a movable vertex, and (f,) which these are, upwards.
     """
-    tails = faces[:, [1, 2, 0]].ravel()
+    tails = faces[:, [1, 2, 0]]
     frames = np.zeros(faces.shape, dtype=np.complex128)
-    leaving = np.flatnonzero(movable[tails])
+    leaves = movable[tails]
+    leaving, tails = (3 * rows[:, None] + np.arange(3))[leaves], tails[leaves]
     # Where the fan of a boundary vertex begins there is a half-edge without twin; it must come last to stay.
-    leaving = leaving[np.argsort(flat.twin[leaving] < 0, kind="stable")]
+    order = np.argsort(flat.twin[leaving] < 0, kind="stable")
     first = np.full(len(movable), -1)
-    first[tails[leaving]] = leaving
+    first[tails[order]] = leaving[order]
     at = first[movable]
     start = at.copy()
     turn = np.ones(len(at), dtype=np.complex128)
     while len(at):
-        frames[at // 3, (at % 3 + 1) % 3] = turn
+        frames[np.searchsorted(rows, at // 3), (at % 3 + 1) % 3] = turn
         over = flat.twin[at - at % 3 + (at + 2) % 3]
         on = (over >= 0) & (over != start)
         at, start = over[on], start[on]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -10,6 +12,7 @@ from ..compiled import compiled
 from ..errors import ArrayShapeError
 from ..geometry.planar import as_pairs
 from ..geometry.straight import FlatTriangles
+from ..threads import FEW, meanwhile
 
 # Iterations that spread the gaps; each costs as much as half a breadth-first search.
 SWEEPS = 10
@@ -66,22 +69,23 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
 
     on_cut = np.flatnonzero(cut)
     pinned = np.zeros(count, dtype=np.bool_)
-    while (seeds := on_cut[~reached[on_cut // 3]]).size:
-        border, frames = _border(flat, cut, int(seeds[0]))
-        tails = corner[_next(border)]
-        points[tails] = closed_chain(frames * flat.sides[border])
-        placed[tails] = pinned[tails] = True
-        along, first = np.unique(border // 3, return_index=True)
-        frame[along] = frames[first]
-        reached[along] = True
-        queue[: len(along)] = along
-        spread(*arrays, len(along), reached, frame, placed, points)
-    while not reached.all():  # charts without a border
-        seed = int(reached.argmin())
-        reached[seed] = placed[corner[3 * seed]] = pinned[corner[3 * seed]] = True
-        queue[0] = seed
-        spread(*arrays, 1, reached, frame, placed, points)
-    _close_gaps(flat.sides, corner, frame, points, pinned)
+    with meanwhile(partial(weigh_sides, corner, flat.sides, NO_LENGTH, count), m, FEW // 3) as weighing:
+        while (seeds := on_cut[~reached[on_cut // 3]]).size:
+            border, frames = _border(flat, cut, int(seeds[0]))
+            tails = corner[_next(border)]
+            points[tails] = closed_chain(frames * flat.sides[border])
+            placed[tails] = pinned[tails] = True
+            along, first = np.unique(border // 3, return_index=True)
+            frame[along] = frames[first]
+            reached[along] = True
+            queue[: len(along)] = along
+            spread(*arrays, len(along), reached, frame, placed, points)
+        while not reached.all():  # charts without a border
+            seed = int(reached.argmin())
+            reached[seed] = placed[corner[3 * seed]] = pinned[corner[3 * seed]] = True
+            queue[0] = seed
+            spread(*arrays, 1, reached, frame, placed, points)
+        _close_gaps(flat.sides, corner, frame, points, pinned, *weighing.result())
     return as_pairs(points)
 
 
@@ -109,7 +113,13 @@ def closed_chain(steps: ComplexArray) -> ComplexArray:
 
 
 def _close_gaps(
-    sides: ComplexArray, corner: IntArray, frame: ComplexArray, points: ComplexArray, pinned: BoolArray
+    sides: ComplexArray,
+    corner: IntArray,
+    frame: ComplexArray,
+    points: ComplexArray,
+    pinned: BoolArray,
+    weight: FloatArray,
+    diagonal: FloatArray,
 ) -> None:
     """Move the points that are not pinned, in place, to spread the gaps in the layout.
 
@@ -117,7 +127,6 @@ def _close_gaps(
     jumps along lines where fronts have met; k iterations spread a jump over about k triangles. SciPy's would divide by
     zero where no gap is left, as on small charts.
     """
-    weight, diagonal = weigh_sides(corner, sides, NO_LENGTH, len(points))
     damping = np.divide(1.0, diagonal, out=np.zeros(len(points)), where=~pinned & (diagonal > 0))
     residual, pull = np.empty_like(points), np.empty_like(points)
     gap_forces(corner, sides, weight, frame, points, residual)
@@ -144,10 +153,11 @@ def weigh_sides(
     for h in range(len(sides)):
         weight[h] = sides[h].real ** 2 + sides[h].imag ** 2
         longest = max(longest, weight[h])
-    for h in range(len(sides)):
-        weight[h] = 1.0 / max(weight[h], no_length**2 * longest)
-        diagonal[corner[h - h % 3 + (h + 1) % 3]] += weight[h]
-        diagonal[corner[h - h % 3 + (h + 2) % 3]] += weight[h]
+    for base in range(0, len(sides), 3):
+        for x in range(3):
+            weight[base + x] = 1.0 / max(weight[base + x], no_length**2 * longest)
+            diagonal[corner[base + (x + 1) % 3]] += weight[base + x]
+            diagonal[corner[base + (x + 2) % 3]] += weight[base + x]
     return weight, diagonal
 
 
@@ -166,11 +176,17 @@ def take_step(
         slope += direction[v].real * pull[v].real + direction[v].imag * pull[v].imag
     length, after = product / slope, 0.0
     for v in range(len(pull)):
-        shift[v] += length * direction[v]
-        residual[v] -= length * pull[v]
+        d, p = direction[v], pull[v]
+        shift[v] += complex(length * d.real, length * d.imag)
+        residual[v] -= complex(length * p.real, length * p.imag)
         after += damping[v] * (residual[v].real ** 2 + residual[v].imag ** 2)
+    share = after / product
     for v in range(len(pull)):
-        direction[v] = damping[v] * residual[v] + after / product * direction[v]
+        d, r = direction[v], residual[v]
+        direction[v] = complex(
+            damping[v] * r.real + share * d.real,
+            damping[v] * r.imag + share * d.imag,
+        )
     return after
 
 
@@ -178,12 +194,14 @@ def take_step(
 def find_cut(twin: IntArray, corner: IntArray) -> BoolArray:
     """Return (3m,) True for half-edges on the boundary, or with other points at their ends than their twins have."""
     cut = np.ones(len(twin), np.bool_)
-    for h in range(len(twin)):
-        t = twin[h]
-        if t >= 0:
-            start, end = h - h % 3 + (h + 1) % 3, h - h % 3 + (h + 2) % 3
-            other_start, other_end = t - t % 3 + (t + 1) % 3, t - t % 3 + (t + 2) % 3
-            cut[h] = corner[start] != corner[other_end] or corner[end] != corner[other_start]
+    for base in range(0, len(twin), 3):
+        for x in range(3):
+            t = twin[base + x]
+            if t > base + x:  # and so for its twin
+                start, end = base + (x + 1) % 3, base + (x + 2) % 3
+                other_start, other_end = t - t % 3 + (t + 1) % 3, t - t % 3 + (t + 2) % 3
+                cut[base + x] = corner[start] != corner[other_end] or corner[end] != corner[other_start]
+                cut[t] = cut[base + x]
     return cut
 
 
@@ -242,17 +260,20 @@ def spread(
     while first < last:
         f = queue[first]
         first += 1
-        # Side h runs from corner h + 1 to corner h + 2; the second round closes the gaps of the first.
-        for step in range(6):
-            start, end = corner[3 * f + (step + 1) % 3], corner[3 * f + (step + 2) % 3]
-            if placed[start] and not placed[end]:
-                points[end] = points[start] + frame[f] * sides[3 * f + step % 3]
-                placed[end] = True
+        i, j, k = corner[3 * f], corner[3 * f + 1], corner[3 * f + 2]
+        if not (placed[i] and placed[j] and placed[k]):
+            # Side h runs from corner h + 1 to corner h + 2; the second round closes the gaps of the first.
+            for step in range(6):
+                start, end = corner[3 * f + (step + 1) % 3], corner[3 * f + (step + 2) % 3]
+                if placed[start] and not placed[end]:
+                    points[end] = points[start] + frame[f] * sides[3 * f + step % 3]
+                    placed[end] = True
         for h in range(3 * f, 3 * f + 3):
             t = twin[h]
             if t >= 0 and not cut[h] and not reached[t // 3]:
                 turned = frame[f] * turns[h]
-                frame[t // 3] = turned / abs(turned)
+                size = abs(turned)
+                frame[t // 3] = complex(turned.real / size, turned.imag / size)
                 reached[t // 3] = True
                 queue[last] = t // 3
                 last += 1
@@ -273,12 +294,13 @@ def gap_forces(
     Weights of one over the squared length of a side make relative gaps what is measured.
     """
     force[:] = 0.0
-    for h in range(len(sides)):
-        start = corner[h - h % 3 + (h + 1) % 3]
-        end = corner[h - h % 3 + (h + 2) % 3]
-        gap = (frame[h // 3] * sides[h] - (points[end] - points[start])) * weight[h]
-        force[end] += gap
-        force[start] -= gap
+    for base in range(0, len(sides), 3):
+        for x in range(3):
+            start, end, w = corner[base + (x + 1) % 3], corner[base + (x + 2) % 3], weight[base + x]
+            gap = frame[base // 3] * sides[base + x] - (points[end] - points[start])
+            gap = complex(gap.real * w, gap.imag * w)  # a number as a complex one takes twice the products
+            force[end] += gap
+            force[start] -= gap
 
 
 @compiled
@@ -288,7 +310,10 @@ def apply_stiffness(corner: IntArray, weight: FloatArray, shift: ComplexArray, f
     for h in range(0, len(weight), 3):
         i, j, k = corner[h], corner[h + 1], corner[h + 2]
         a, b, c = shift[i], shift[j], shift[k]
-        one, two, three = weight[h] * (c - b), weight[h + 1] * (a - c), weight[h + 2] * (b - a)
-        force[i] += two - three
-        force[j] += three - one
-        force[k] += one - two
+        # Real and imaginary parts by themselves: a number as a complex one takes twice the products.
+        one, two, three = weight[h], weight[h + 1], weight[h + 2]
+        x, y, z = one * (c.real - b.real), two * (a.real - c.real), three * (b.real - a.real)
+        u, v, w = one * (c.imag - b.imag), two * (a.imag - c.imag), three * (b.imag - a.imag)
+        force[i] += complex(y - z, v - w)
+        force[j] += complex(z - x, w - u)
+        force[k] += complex(x - y, u - v)

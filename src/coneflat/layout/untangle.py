@@ -123,10 +123,11 @@ class _Untangling:
         whole: BoolArray | None,
     ) -> None:
         self.flat, self.faces, self.angles, self.on_boundary = flat, faces, angles, on_boundary
-        self.sides = flat.sides.reshape(-1, 3).copy()
+        self.sides, self.is_own = flat.sides.reshape(-1, 3), False
         self.moves = np.zeros(len(angles))
         self.work, self.most_work = 0, WORK * max(len(faces), LEAST_WORK)
-        self.is_bad = ~(heights(self.sides) > DEGENERATE)
+        self.is_bad = np.empty(len(faces), dtype=bool)
+        find_low(flat.sides, DEGENERATE, self.is_bad)
         self.cut = None if whole is None else ~whole.reshape(-1, 3)
         if self.cut is not None:
             self.is_bad |= self.cut.any(axis=1)
@@ -182,6 +183,8 @@ class _Untangling:
         failed[patches.face_patch[winds[self.faces[patches.faces]].any(axis=1)]] = True
         self._failed.update(key for key, one in zip(patches.fingerprints(), failed, strict=True) if one)
         good = ~failed[patches.face_patch]
+        if not self.is_own:
+            self.sides, self.is_own = self.sides.copy(), True
         self.sides[patches.faces[good]] = result[good]
         self.is_bad[patches.faces[good]] = False
         self.moves[patches.vertices] += np.where(failed[patches.patch], 0.0, np.abs(shifts))
@@ -262,13 +265,26 @@ def _wanted_shapes(sides: ComplexArray, least: float) -> ComplexArray:
 
 
 @compiled
+def is_low(sides: ComplexArray, base: int, least: float) -> bool:
+    """Return whether a triangle, by its first side, is not higher than a share of its longest side, or upside down."""
+    doubled = sides[base].real * sides[base + 1].imag - sides[base].imag * sides[base + 1].real
+    longest = 0.0
+    for h in range(base, base + 3):
+        longest = max(longest, sides[h].real ** 2 + sides[h].imag ** 2)
+    return not doubled > least * longest
+
+
+@compiled
 def are_low(sides: ComplexArray, least: float) -> bool:
     """Return whether any triangle with sides (3m,) is not higher than a share of its longest side, or upside down."""
-    for base in range(0, len(sides), 3):
-        doubled = sides[base].real * sides[base + 1].imag - sides[base].imag * sides[base + 1].real
-        longest = 0.0
-        for h in range(base, base + 3):
-            longest = max(longest, sides[h].real ** 2 + sides[h].imag ** 2)
-        if not doubled > least * longest:
-            return True
-    return False
+    f = 0
+    while f < len(sides) // 3 and not is_low(sides, 3 * f, least):
+        f += 1
+    return f < len(sides) // 3
+
+
+@compiled
+def find_low(sides: ComplexArray, least: float, found: BoolArray) -> None:
+    """Fill in (m,) for each triangle what `are_low` returns for all."""
+    for f in range(len(found)):
+        found[f] = is_low(sides, 3 * f, least)

@@ -177,10 +177,13 @@ def measure_map(
     shapes = (mesh.vertices, mesh.faces) if lengths is None else _drawn(lengths)
     area, has_area, uv_area, has_uv_area, qc = measure_triangles(*shapes, corner_uv, ZERO_AREA)
     valid = has_area & has_uv_area
+    # Of most meshes all are: no copies then.
+    chosen = slice(None) if valid.all() else valid
+    weights = area[chosen]
+    scales = np.log(np.abs(uv_area[chosen]) / weights) / 2
     log_scale = np.full(len(area), np.nan)
-    log_scale[valid] = np.log(np.abs(uv_area[valid]) / area[valid]) / 2
-    weights = area[valid]
-    mean_scale = _mean(log_scale[valid], weights)
+    log_scale[chosen] = scales
+    mean_scale = _mean(scales, weights)
 
     joined = joined_edges(mesh, corner_uv)
     seams = np.flatnonzero(~joined & ~mesh.is_boundary_edge)
@@ -194,10 +197,10 @@ def measure_map(
     return Distortion(
         qc=qc,
         log_area_scale=log_scale,
-        qc_mean=_mean(qc[valid], weights),
-        qc_p95=quantile(qc[valid], weights, 0.95),
-        qc_max=float(qc[valid].max()) if len(weights) else float("nan"),
-        area_std=float(np.sqrt(_mean((log_scale[valid] - mean_scale) ** 2, weights))),
+        qc_mean=_mean(qc[chosen], weights),
+        qc_p95=quantile(qc[chosen], weights, 0.95),
+        qc_max=float(qc[chosen].max()) if len(weights) else float("nan"),
+        area_std=float(np.sqrt(_mean((scales - mean_scale) ** 2, weights))),
         flipped=int(against.sum()),
         degenerate=int((has_area & ~has_uv_area).sum()),
         degenerate_input=int((~has_area).sum()),
@@ -207,7 +210,7 @@ def measure_map(
         seam_mismatch=_mean(mismatches, seam_lengths) if len(seams) else 0.0,
         seam_mismatch_max=float(mismatches.max()) if len(seams) else 0.0,
         seam_motion_mismatch=_seam_motion_mismatch(mesh, corner_uv, seams, cones),
-        density_spread=_spread(log_scale[valid], weights),
+        density_spread=_spread(scales, weights),
         overlap=float("nan"),
         overlapping_pairs=0,
         curvature_error=curvature_error[0],
@@ -240,8 +243,7 @@ def _seam_motion_mismatch(
     # rotation as seen by a walker along it, from the left side to the right.
     rotation = one * np.conj(two)
     rotation = rotation / np.maximum(np.abs(rotation), np.finfo(float).tiny)
-    starts = mesh.tails[mesh.edge_halfedges[seams, 0]]
-    ends = mesh.heads[mesh.edge_halfedges[seams, 0]]
+    starts, ends = mesh.ends_of(mesh.edge_halfedges[seams, 0])
     degree = np.bincount(np.concatenate([starts, ends]), minlength=len(mesh.vertices))
     passed = (degree == 2) & ~mesh.is_boundary_vertex
     if cones is not None:
@@ -364,14 +366,20 @@ def sum_angles(faces: IntArray, corner_uv: FloatArray, count: int) -> tuple[Floa
         count: n.
     """
     sums, change = np.zeros(count), np.zeros(count)
+    u, v, length = np.empty(3), np.empty(3), np.empty(3)
     for f in range(len(faces)):
+        for i in range(3):  # the sides from each corner to the next
+            u[i] = corner_uv[f, (i + 1) % 3, 0] - corner_uv[f, i, 0]
+            v[i] = corner_uv[f, (i + 1) % 3, 1] - corner_uv[f, i, 1]
+            length[i] = math.hypot(u[i], v[i])
+            if length[i] > 0.0:
+                # Of length one, lest products of tiny or huge ones are no numbers.
+                u[i], v[i] = u[i] / length[i], v[i] / length[i]
         for i in range(3):
-            at, one, two = corner_uv[f, i], corner_uv[f, (i + 1) % 3], corner_uv[f, (i + 2) % 3]
-            u1, v1, u2, v2 = one[0] - at[0], one[1] - at[1], two[0] - at[0], two[1] - at[1]
-            length1, length2 = math.hypot(u1, v1), math.hypot(u2, v2)
-            change[faces[f, i]] += 1.0 / length1 + 1.0 / length2
-            if length1 > 0.0 and length2 > 0.0:
-                # Of sides of length one, lest products of tiny or huge ones are no numbers.
-                u1, v1, u2, v2 = u1 / length1, v1 / length1, u2 / length2, v2 / length2
-                sums[faces[f, i]] += abs(math.atan2(u1 * v2 - v1 * u2, u1 * u2 + v1 * v2))
+            before = (i + 2) % 3
+            change[faces[f, i]] += 1.0 / length[i] + 1.0 / length[before]
+            if length[i] > 0.0 and length[before] > 0.0:
+                across = u[i] * v[before] - v[i] * u[before]
+                along = -(u[i] * u[before] + v[i] * v[before])
+                sums[faces[f, i]] += abs(math.atan2(across, along))
     return sums, change

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import FloatArray, IntArray, rows_of
 from ..atlas import part_touching
 from ..atlas.arrange import arrange_charts
 from ..atlas.chart_seams import numbered
@@ -78,16 +78,20 @@ class _Triangles:
     """The triangles of the result, in the order of the input's faces.
 
     Attributes:
-        order: (m,) which triangle each is, of those of all components.
+        order: (m,) which triangle each is, of those of all components; None where they are in order as they are.
         faces: (m, 3) vertices of the result.
         checked: (m,) the face of the checked mesh.
         face_origin: (m,) the face of the input.
     """
 
-    order: IntArray
+    order: IntArray | None
     faces: IntArray
     checked: IntArray
     face_origin: IntArray
+
+    def sorted(self, values: IntArray) -> IntArray:
+        """Return values, (m,) or (m, 3), of the triangles of all components in the order of the result."""
+        return values if self.order is None else rows_of(values, self.order)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,16 +146,16 @@ def assemble(
     checked = prepared.checked
     numbering = _number_vertices(prepared, laid_out)
     triangles = _sort_triangles(prepared, laid_out, numbering)
-    corners_in_space = numbering.positions[triangles.faces]
     mesh = _known_or_new(checked.mesh, np.ldexp(numbering.positions, checked.exponent), triangles.faces)
     with stages("pack"):
         mirrors = [mirrors_of(one) for one in laid_out]
-        layout = _pack(laid_out, mirrors, triangles, mesh, corners_in_space, options)
+        layout = _pack(laid_out, mirrors, triangles, numbering.positions, mesh, options)
     source, face_corners = _polygons(prepared, laid_out, numbering, triangles)
     if face_corners is not None and source is not None:
         polygons = Polygons(source.offsets, face_corners)
         with stages("polygons"):
-            uv = make_convex(layout.uv, layout.corners, polygons, corners_in_space)
+            in_space = rows_of(numbering.positions, triangles.faces)
+            uv = make_convex(layout.uv, layout.corners, polygons, in_space)
             layout = replace(layout, uv=uv)
     curvature = _curvature(prepared, laid_out, numbering, options)
     cones = numbering.renumber([one.cones for one in laid_out])
@@ -257,31 +261,34 @@ def _sort_triangles(prepared: Prepared, laid_out: Sequence[LaidOut], numbering: 
     origin = np.concatenate(
         [part.faces[one.face_origin] for part, one in zip(prepared.components, laid_out, strict=True)]
     )
-    order = np.argsort(origin, kind="stable")
-    faces = numbering.renumber([one.mesh.faces for one in laid_out])[order]
-    return _Triangles(order, faces, origin[order], prepared.checked.face_origin[origin[order]])
+    faces = numbering.renumber([one.mesh.faces for one in laid_out])
+    order = None
+    if not (origin[1:] >= origin[:-1]).all():
+        order = np.argsort(origin, kind="stable")
+        faces, origin = rows_of(faces, order), origin[order]
+    return _Triangles(order, faces, origin, prepared.checked.face_origin[origin])
 
 
 def _pack(
     laid_out: Sequence[LaidOut],
     mirrors: Sequence[ChartMirrors],
     triangles: _Triangles,
+    positions: FloatArray,
     mesh: TriangleMesh,
-    corners_in_space: FloatArray,
     options: Options,
 ) -> _Layout:
     """Return the charts of all components, packed."""
     points, own, chart, component, lies_on = _all_charts(laid_out)
-    corners = own[triangles.order]
+    corners = triangles.sorted(own)
     # What lies on other points is not packed.
     is_whole = np.array_equal(lies_on, np.arange(len(lies_on)))
     below = slice(None) if is_whole else (lies_on[corners] == corners).all(axis=1)
-    of_all, of_below = numbered(chart[triangles.order][below], int(chart.max()) + 1)
+    of_all, of_below = numbered(triangles.sorted(chart)[below], int(chart.max()) + 1)
     packed = arrange_charts(
-        points[corners[below]],
+        rows_of(points, corners[below]),
         of_below,
         component[of_all],
-        corners_in_space[below],
+        None if options.up is None else rows_of(positions, triangles.faces[below]),
         resolution=options.resolution,
         padding=options.padding,
         tiles=options.tiles,
@@ -291,7 +298,8 @@ def _pack(
         edge_halfedges=mesh.edge_halfedges if is_whole else None,
     )
     uv = np.empty_like(points)
-    uv[corners[below]] = packed.corner_uv
+    # Both coordinates at once: so NumPy is several times as fast.
+    uv.view(np.complex128)[:, 0][corners[below]] = packed.corner_uv.view(np.complex128)[..., 0]
     if not is_whole:
         uv = _laid_on(uv, lies_on, max(APART * _longest_side(packed.corner_uv), LEAST_APART))
     return _Layout(uv, corners, own, packed.scale, packed.efficiency)
@@ -328,7 +336,7 @@ def _measure(
         prescribed=curvature.prescribed,
         lengths=prepared.own_lengths,
     )
-    distortion = measured(layout.uv[layout.corners], overlaps=overlaps)
+    distortion = measured(rows_of(layout.uv, layout.corners), overlaps=overlaps)
     is_meant = any(one.lies_on is not None for one in laid_out)
     if options.charts == "atlas" and distortion.overlapping_pairs and not is_meant:
         parted, left = part_touching(layout.uv, layout.corners)

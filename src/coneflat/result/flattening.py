@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .._arrays import FloatArray, IntArray
+from .._arrays import FloatArray, IntArray, rows_of
 from ..input.mesh_file import MeshFile
 from ..quality.distortion import Distortion
 from ..quality.rotations import Rotations
@@ -91,7 +91,7 @@ class Flattening:
     @property
     def corner_uv(self) -> FloatArray:
         """(m, 3, 2) the point of every triangle corner."""
-        return self.uv[self.uv_faces]
+        return rows_of(self.uv, self.uv_faces)
 
     @cached_property
     def seam_data(self) -> SeamData:

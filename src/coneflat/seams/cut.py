@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .._arrays import BoolArray, IntArray
+from .._arrays import BoolArray, IntArray, rows_of
 from ..compiled import compiled
 from ..errors import MetricError
 from ..mesh import TriangleMesh, label_components
@@ -42,7 +42,7 @@ def cut_open(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
     sides = np.concatenate(
         [mesh.edge_halfedges[seams].ravel(), mesh.edge_halfedges[mesh.is_boundary_edge, 0]]
     )
-    border, ends = np.unique([cut.mesh.tails[sides], cut.mesh.heads[sides]], return_inverse=True)
+    border, ends = np.unique(cut.mesh.ends_of(sides), return_inverse=True)
     loops, _ = label_components(len(border), *ends.reshape(2, -1))
     # Pieces all have borders, so there is one if there is one border.
     pieces = cut.mesh.components[0] if loops > 1 else 1
@@ -66,7 +66,7 @@ def open_along(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
     number_copies(mesh.faces, mesh.halfedge_edges, mesh.edge_halfedges, is_seam, copies, faces)
     faces += (np.cumsum(copies) - copies)[mesh.faces]
     origin = np.repeat(np.arange(len(copies)), copies)
-    return CutMesh(TriangleMesh(mesh.vertices[origin], faces), origin)
+    return CutMesh(TriangleMesh(rows_of(mesh.vertices, origin), faces), origin)
 
 
 @compiled

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._arrays import BoolArray, FloatArray, IntArray
+from ..._arrays import BoolArray, FloatArray, IntArray, rows_of
 from ...cones import ConeSolution
 from ...geometry import double_areas
 from ...geometry.intrinsic import IntrinsicTriangulation
@@ -145,7 +145,7 @@ class ExactFlatMetric:
     ) -> LaidOut:
         mesh, solved = self.mesh, self.solved
         points = unfold(untangled.flat, disk.faces) * self.shrink
-        curvature = laid_out_curvature(mesh, points[disk.faces])
+        curvature = laid_out_curvature(mesh, rows_of(points, disk.faces))
         return LaidOut(
             mesh=mesh,
             face_origin=all_faces(mesh),
@@ -202,7 +202,10 @@ class ExactFlatMetric:
         mesh, edges = refined.mesh, refined.edges_on(seams)
         disk = cut_open(mesh, edges).mesh
         points = unfold(refined.flat, disk.faces) * self.shrink
-        curvature, added = laid_out_curvature(mesh, points[disk.faces]), len(mesh.vertices) - len(self.target)
+        curvature, added = (
+            laid_out_curvature(mesh, rows_of(points, disk.faces)),
+            len(mesh.vertices) - len(self.target),
+        )
         target = np.concatenate([self.target, np.zeros(added)])
         is_open = np.concatenate([self.is_open, np.zeros(added, dtype=bool)])
         return LaidOut(

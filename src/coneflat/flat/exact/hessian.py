@@ -10,27 +10,25 @@ from scipy.sparse import csc_matrix
 from ..._arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ...compiled import compiled
 from ...geometry.intrinsic import IntrinsicTriangulation
+from ...mesh import sort_few
 
 
 class HessianPattern:
-    """The sparsity pattern of the Laplacian of one triangulation, to be filled for many metrics.
+    """The sparsity pattern of the Laplacian of one triangulation, to be filled for many metrics until it is flipped.
 
     Every matrix made has the same index arrays (the same objects), whichever vertices are held, so that a
     solver may keep its symbolic analysis.
     """
 
     def __init__(self, triangulation: IntrinsicTriangulation) -> None:
-
         n, tail, twin = triangulation.vertex_count, triangulation.tail, triangulation.twin
         starts = np.zeros(n + 1, dtype=np.int32)
-        rows = np.empty(n + len(tail) + int((twin < 0).sum()), dtype=np.int32)
-        list_columns(tail, twin, starts, rows)
-        self._diagonal = np.empty(n, dtype=np.int32)
-        count = drop_repetitions(starts, rows, self._diagonal)
-        self._tail, self._twin = tail.copy(), twin.copy()
-        self._starts, self._rows = starts, rows[:count].copy()
-        self._entry = np.empty(len(tail), dtype=np.int32)
-        find_entries(tail, self._starts, self._rows, self._entry)
+        keys = np.empty(n + len(tail) + int(np.count_nonzero(twin < 0)), dtype=np.int64)
+        list_columns(tail, twin, starts, keys)
+        rows, self._diagonal = np.empty(len(keys), dtype=np.int32), np.empty(n, dtype=np.int32)
+        self._entry = np.full(len(tail), -1, dtype=np.int32)
+        count = number_entries(starts, keys, rows, self._entry, self._diagonal)
+        self._tail, self._twin, self._starts, self._rows = tail, twin, starts, rows[:count].copy()
         # SciPy looks at a new matrix for longer than a small one takes to be filled.
         self._matrix = csc_matrix((np.zeros(count), self._rows, self._starts), shape=(n, n))
 
@@ -51,60 +49,68 @@ class HessianPattern:
 
 
 @compiled
-def list_columns(tail: IntArray, twin: IntArray, starts: Int32Array, rows: Int32Array) -> None:
-    """Write the sorted rows of each column, with repetitions, behind its start.
+def list_columns(tail: IntArray, twin: IntArray, starts: Int32Array, keys: IntArray) -> None:
+    """Write the entries of each column, with repetitions, behind its start: the row, above 32 bits, and a half-edge.
 
-    starts: (n + 1,) zeros on entry, starts of the columns on return. rows: room for n + 6m entries.
+    The bits below are one more than the half-edge from column to row, or 0 for none.
+
+    starts: (n + 1,) zeros on entry, starts of the columns on return. keys: room for n + 6m entries.
     """
     n = len(starts) - 1
     for v in range(n):
         starts[v + 1] = 1
-    for h in range(len(tail)):
-        head = tail[h - h % 3 + (h + 1) % 3]
-        if head != tail[h]:
-            starts[tail[h] + 1] += 1
-            if twin[h] < 0:
-                starts[head + 1] += 1
+    for base in range(0, len(tail), 3):
+        for x in range(3):
+            i, j = tail[base + x], tail[base + (x + 1) % 3]
+            if i != j:
+                starts[i + 1] += 1
+                if twin[base + x] < 0:
+                    starts[j + 1] += 1
     for v in range(n):
         starts[v + 1] += starts[v]
     place = starts.copy()
     for v in range(n):
-        rows[place[v]] = v
+        keys[place[v]] = np.int64(v) << 32
         place[v] += 1
-    for h in range(len(tail)):
-        i, j = tail[h], tail[h - h % 3 + (h + 1) % 3]
-        if i != j:
-            rows[place[i]] = j
-            place[i] += 1
-            if twin[h] < 0:
-                rows[place[j]] = i
-                place[j] += 1
-    for v in range(n):
-        for at in range(starts[v] + 1, starts[v + 1]):
-            row = rows[at]
-            before = at - 1
-            while before >= starts[v] and rows[before] > row:
-                rows[before + 1] = rows[before]
-                before -= 1
-            rows[before + 1] = row
+    for base in range(0, len(tail), 3):
+        for x in range(3):
+            i, j = tail[base + x], tail[base + (x + 1) % 3]
+            if i != j:
+                keys[place[i]] = (j << 32) | (base + x + 1)
+                place[i] += 1
+                if twin[base + x] < 0:
+                    keys[place[j]] = i << 32
+                    place[j] += 1
 
 
 @compiled
-def drop_repetitions(starts: Int32Array, rows: Int32Array, diagonal: Int32Array) -> int:
-    """Keep each row of each column once, in place; note the diagonal; return the number of entries."""
-    kept = 0
-    begin = 0
+def number_entries(
+    starts: Int32Array, keys: IntArray, rows: Int32Array, entry: Int32Array, diagonal: Int32Array
+) -> int:
+    """Sort the rows of each column and keep each once; return the number of entries.
+
+    Args:
+        starts, keys: see `list_columns`; where columns start without repetitions on return.
+        rows: filled.
+        entry: (3m,) -1; filled with where the entry of each half-edge, (head, tail), is, unless these are one vertex.
+        diagonal: (n,) filled with where the diagonal is.
+    """
+    kept, begin = 0, 0
     for v in range(len(starts) - 1):
         end = starts[v + 1]
         starts[v] = kept
+        sort_few(keys[begin:end])
         last = -1
         for at in range(begin, end):
-            if rows[at] != last:
-                last = rows[at]
-                rows[kept] = last
-                if last == v:
+            row, h = keys[at] >> 32, (keys[at] & 0xFFFFFFFF) - 1
+            if row != last:
+                last = row
+                rows[kept] = row
+                if row == v:
                     diagonal[v] = kept
                 kept += 1
+            if h >= 0:
+                entry[h] = kept - 1
         begin = end
     starts[len(starts) - 1] = kept
     return kept
@@ -125,14 +131,6 @@ def find_entry(starts: Int32Array, rows: Int32Array, row: int, column: int) -> i
 
 
 @compiled
-def find_entries(tail: IntArray, starts: Int32Array, rows: Int32Array, entry: Int32Array) -> None:
-    """Write, for each half-edge, where the entry (head, tail) is stored; -1 if they are one vertex."""
-    for h in range(len(tail)):
-        i, j = tail[h], tail[h - h % 3 + (h + 1) % 3]
-        entry[h] = -1 if i == j else find_entry(starts, rows, j, i)
-
-
-@compiled
 def fill_values(
     tail: IntArray,
     twin: IntArray,
@@ -146,20 +144,21 @@ def fill_values(
 ) -> None:
     """Fill in w_ij = (cot a + cot b) / 2, with unit rows and columns at the held vertices."""
     values[:] = 0.0
-    for h in range(len(tail)):
-        if entry[h] < 0:
-            continue
-        i, j = tail[h], tail[h - h % 3 + (h + 1) % 3]
-        t = twin[h]
-        weight = cots[h] / 2 if t < 0 else (cots[h] + cots[t]) / 2
-        values[diagonal[i]] += weight
-        if t < 0:
-            values[diagonal[j]] += weight
-        if held[i] or held[j]:
-            continue
-        values[entry[h]] -= weight
-        if t < 0:
-            values[find_entry(starts, rows, i, j)] -= weight
+    for base in range(0, len(tail), 3):
+        for x in range(3):
+            h = base + x
+            if entry[h] < 0:
+                continue
+            i, j, t = tail[h], tail[base + (x + 1) % 3], twin[h]
+            weight = cots[h] / 2 if t < 0 else (cots[h] + cots[t]) / 2
+            values[diagonal[i]] += weight
+            if t < 0:
+                values[diagonal[j]] += weight
+            if held[i] or held[j]:
+                continue
+            values[entry[h]] -= weight
+            if t < 0:
+                values[find_entry(starts, rows, i, j)] -= weight
     for v in range(len(held)):
         if held[v]:
             values[diagonal[v]] = 1.0

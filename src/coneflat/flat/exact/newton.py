@@ -14,7 +14,6 @@ from ..._arrays import BoolArray, FloatArray, IntArray
 from ...compiled import compiled
 from ...geometry.delaunay import make_delaunay
 from ...geometry.intrinsic import IntrinsicTriangulation
-from ...mesh import NEXT
 from ...solver import Factor, factorize
 from ...solver.newton import Limits, Point, minimise
 from .hessian import HessianPattern
@@ -106,10 +105,15 @@ class ConformalProblem:
 
     def flat_lengths(self, log_scale: FloatArray) -> FloatArray:
         """Return (3m,) the scaled lengths, the same bits on both sides of an edge."""
-        tail = self.triangulation.tail
-        head = tail.reshape(-1, 3)[:, NEXT].ravel()
+        at_tail = log_scale[self.triangulation.tail].reshape(-1, 3)
+        sums = np.empty(at_tail.shape)
+        for i in range(3):
+            np.add(at_tail[:, i], at_tail[:, (i + 1) % 3], out=sums[:, i])
+        sums /= 2
         # Multiplication commutes, and the background lengths agree.
-        return self.triangulation.length * np.exp((log_scale[tail] + log_scale[head]) / 2)
+        lengths: FloatArray = np.exp(sums, out=sums).ravel()
+        lengths *= self.triangulation.length
+        return lengths
 
     def sum_angles(self, log_scale: FloatArray, sums: FloatArray, cots: FloatArray) -> int:
         """Fill the (n,) angle sums and (3m,) weights of the scaled metric; return the number of broken triangles."""

@@ -68,13 +68,19 @@ class Elements:
         weight: (f,) what each triangle's energy counts.
     """
 
-    def __init__(self, motions: Motions, corners: IntArray, rest: ComplexArray, weight: FloatArray) -> None:
+    def __init__(
+        self, motions: Motions, corners: IntArray, rest: ComplexArray, unit: float, weight: FloatArray
+    ) -> None:
+        """Find the triangles (m, 3) with sides (m, 3) at rest, times a unit, that motions move, and how.
+
+        rest: of these triangles; those of others are not looked at.
+        """
         moves = np.diff(motions.start) > 0
         self.faces = np.flatnonzero(has_any(moves, corners))
         self.count, self.weight = motions.count, weight[self.faces]
         corners = corners[self.faces]
         self._corners = corners
-        self._a_of, self._b_of = map_factors(rest[self.faces])
+        self._a_of, self._b_of = map_factors(unit * rest[self.faces])
         # The unknowns of an element are those of its corners, one after the other; the same one may come twice.
         sizes = np.diff(motions.start)[corners.ravel()]
         ends = np.cumsum(sizes)

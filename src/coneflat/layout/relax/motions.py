@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_matrix, eye, vstack
@@ -57,10 +58,16 @@ class Motions:
     def shifts(self, step: FloatArray) -> ComplexArray:
         """Return (u,) the shifts of the points, with step (k + 1,)."""
         size = len(self.start) - 1
-        point = np.arange(size).repeat(np.diff(self.start))
         moved = self.coefficient * step[self.unknown]
-        total: ComplexArray = np.bincount(point, moved.real, size) + 1j * np.bincount(point, moved.imag, size)
+        total = np.empty(size, dtype=np.complex128)
+        total.real = np.bincount(self._point, moved.real, size)
+        total.imag = np.bincount(self._point, moved.imag, size)
         return total
+
+    @cached_property
+    def _point(self) -> IntArray:
+        """The point that each of the coefficients is of."""
+        return np.arange(len(self.start) - 1).repeat(np.diff(self.start))
 
 
 def find_motions(

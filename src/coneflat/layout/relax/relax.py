@@ -8,7 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import BoolArray, ComplexArray, FloatArray, as_faces, as_floats, require_finite
+from ..._arrays import (
+    BoolArray,
+    ComplexArray,
+    FloatArray,
+    as_faces,
+    as_floats,
+    has_any,
+    require_finite,
+    rows_of,
+)
 from ...errors import ArrayShapeError, ConvergenceError, OptionError
 from ...geometry import double_areas, edge_lengths
 from ...geometry.lengths import check_lengths
@@ -110,16 +119,19 @@ def relax(
     is_free = _flags(free, len(mesh.vertices))
     areas = double_areas(own) / 2
     share = areas * _weights(weights, len(mesh.faces))
-    doubled = signed_double_areas(places[corner])
-    rest = rest_sides(own)
-    is_thin = (np.conj(rest[:, 0]) * rest[:, 1]).imag <= 0  # but for rounding
-    is_free[mesh.faces[(doubled <= 0) | (areas <= 0) | is_thin]] = False
+    doubled = signed_double_areas(rows_of(places, corner))
+    # Of triangles that may move alone, mostly few.
+    near = np.flatnonzero(has_any(is_free, mesh.faces))
+    rest = np.empty(own.shape, dtype=np.complex128)
+    rest[near] = at_rest = rest_sides(own[near])
+    is_thin = (np.conj(at_rest[:, 0]) * at_rest[:, 1]).imag <= 0  # but for rounding
+    is_free[mesh.faces[near[(doubled[near] <= 0) | (areas[near] <= 0) | is_thin]]] = False
     if not is_free.any():
         return Relaxed(places, 0.0, 0.0, 0, is_free)
     unit = float(np.sqrt(np.abs(doubled).sum() / (2 * areas.sum())))
     z = as_complex(places)
     motions = find_motions(mesh, corner, z, is_free, checked)
-    elements = Elements(motions, corner, unit * rest, share)
+    elements = Elements(motions, corner, rest, unit, share)
     if not elements.count and not motions.has_offset:
         return Relaxed(places, 0.0, 0.0, 0, is_free)
     stride = TURNING_STRIDE if checked.quarter_turns else 1.0

@@ -66,7 +66,7 @@ def find_chains(
     """
     edges = point_seams(mesh, corners)
     h, t = mesh.edge_halfedges[edges].T
-    vertices = np.stack([mesh.tails[h], mesh.heads[h]], axis=1)
+    vertices = np.stack(mesh.ends_of(h), axis=1)
     sides = np.stack(both_sides(mesh, edges, corners))
     one, two = (points[side[:, 1]] - points[side[:, 0]] for side in sides)
     if not quarter_turns:

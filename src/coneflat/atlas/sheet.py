@@ -1,0 +1,400 @@
+"""A disk of triangles that is cut to pieces, at the expense of what is near the cuts.
+
+In the plane a minimum cut between two triangles, with lengths of edges as capacities, is a shortest path between the
+two parts of the border that lie between them (planar duality): no flow has to be computed. Most of what is cut off is
+small: neither the search for a cut nor what tells its sides apart goes over all triangles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import BoolArray, FloatArray, IntArray
+from .._sets import find_root, unite
+from ..compiled import compiled
+from ..geometry.graph import MultiGraph, drop_first, edges_beside, push, trace_back
+from ..mesh import TriangleMesh
+
+
+class Sheet:
+    """A disk in pieces.
+
+    Attributes:
+        disk: the mesh, a topological disk.
+        costs: (3m,) positive, what it costs to cut the side opposite each corner, the same from both triangles.
+        piece: (m,) the piece of each triangle.
+    """
+
+    def __init__(self, disk: TriangleMesh, costs: FloatArray) -> None:
+        self.disk, self.costs = disk, costs
+        self.piece = np.zeros(len(disk.faces), dtype=np.int64)
+        self._sides = disk.halfedge_edges, disk.edge_halfedges
+        # Of each piece its first triangle, or one before it, and a half-edge on its border.
+        self._first, self._start = [0], [int(disk.edge_halfedges[np.argmax(disk.is_boundary_edge), 0])]
+        self._distance = np.full(len(disk.vertices), np.inf)
+        self._owner = np.full(len(disk.faces), -1, dtype=np.int64)
+        self._is_cut = np.zeros(len(disk.edges), dtype=bool)
+
+    def border(self, own: int) -> IntArray:
+        """Return (b,) the half-edges on the border of a piece in order, with the piece to the left."""
+        around: IntArray = walk_border(*self._sides, self.piece, self._start[own])
+        return np.roll(around, -int(np.argmin(self._sides[0][around])))
+
+    def is_pinched(self, own: int) -> bool:
+        """Whether a piece touches itself in a point."""
+        border = self.border(own)
+        return len(np.unique(self.disk.ends_of(border)[0])) < len(border)
+
+    def separate(self, own: int, one: BoolArray, other: BoolArray) -> list[int] | None:
+        """Cut a piece in two, or more, between two sets of its triangles; return these, by their first triangles.
+
+        None if each set, down to a single triangle, keeps the other from the border.
+
+        Args:
+            own: the piece, whose number one of the new ones keeps.
+            one, other: (m,) True for the triangles to be separated: two sets, connected each, without a common member.
+        """
+        border = self.border(own)
+        both = self._both_to_the_border(own, border // 3, one, other)
+        if both is None:
+            return None
+        one, other = both
+        mark = np.where(one[border // 3], 1, np.where(other[border // 3], 2, 0))
+        starts, ends = (self.disk.ends_of(sides)[0] for sides in _between(border, mark))
+        cut = find_cut(
+            self.disk.edges,
+            self.disk.edge_halfedges,
+            *edges_beside(self.disk),
+            self.piece,
+            own,
+            self.costs,
+            one,
+            other,
+            starts,
+            ends,
+            self._distance,
+        )
+        ids, first, start = part_piece(
+            *self._sides, self.piece, own, cut, self._owner, self._is_cut, len(self._first), self._first[own]
+        )
+        if len(ids) < 2:
+            return None
+        self._first += [0] * (len(ids) - 1)
+        self._start += [0] * (len(ids) - 1)
+        for piece, low, side in zip(ids.tolist(), first.tolist(), start.tolist(), strict=True):
+            self._first[piece], self._start[piece] = low, side
+        found: list[int] = ids[np.argsort(first)].tolist()
+        return found
+
+    def widened(
+        self, own: int, one: BoolArray, other: BoolArray, areas: FloatArray, least: float
+    ) -> tuple[BoolArray, BoolArray]:
+        """Return two sets of a piece's triangles, each with those nearest to it, and nearer than to the other.
+
+        Args:
+            own: the piece.
+            one, other: (m,) True for the sets.
+            areas: (m,) of the triangles.
+            least: the area that each is to have at least, if it can.
+        """
+        disk, inside = self.disk, self._inside(own)
+        a, b, c = (disk.vertices[disk.faces[:, corner]] for corner in range(3))
+        middles = a + b + c
+        steps = (middles[inside[:, 0]] - middles[inside[:, 1]]) / 3
+        lengths = np.hypot(steps[:, 0], steps[:, 1])
+        dual = MultiGraph(len(disk.faces), inside[:, 0], inside[:, 1], lengths)
+        wide = dual.widened(np.where(one, 0, np.where(other, 1, -1)), areas, least)
+        return wide == 0, wide == 1
+
+    def _inside(self, own: int) -> IntArray:
+        """Return (k, 2) the pairs of triangles of a piece that share an edge, by edges."""
+        pairs = self.disk.edge_faces[~self.disk.is_boundary_edge]
+        return pairs[(self.piece[pairs[:, 0]] == own) & (self.piece[pairs[:, 1]] == own)]
+
+    def _both_to_the_border(
+        self, own: int, beside: IntArray, one: BoolArray, other: BoolArray
+    ) -> tuple[BoolArray, BoolArray] | None:
+        """Return two sets with a path from each to the border; of one around the other, a single triangle.
+
+        beside: the triangles along the border.
+        """
+        for first, second in (
+            (one, other),
+            (_single(one), other),
+            (one, _single(other)),
+            (_single(one), _single(other)),
+        ):
+            wide = self._to_the_border(own, beside, first, second)
+            if wide is None:
+                continue
+            wider = self._to_the_border(own, beside, second, wide)
+            if wider is not None:
+                return wide, wider
+        return None
+
+    def _to_the_border(
+        self, own: int, beside: IntArray, chosen: BoolArray, barred: BoolArray
+    ) -> BoolArray | None:
+        """Return chosen triangles, with the shortest path from them to the border if none of them is there.
+
+        None if there is no path that does not lead through those that are barred.
+        """
+        if chosen[beside].any():
+            return chosen
+        inside = self._inside(own)
+        inside = inside[~barred[inside].any(axis=1)]
+        dual = MultiGraph(len(chosen), inside[:, 0], inside[:, 1], np.ones(len(inside)))
+        free = beside[~barred[beside]]
+        distance, before, _ = dual.shortest_paths(np.flatnonzero(chosen), free)
+        if not np.isfinite(distance[free]).any():
+            return None
+        nodes, _ = trace_back(free[[np.argmin(distance[free])]], before)
+        widened = chosen.copy()
+        widened[nodes] = True
+        return widened
+
+
+def _single(chosen: BoolArray) -> BoolArray:
+    """Return one of the chosen triangles alone."""
+    first = np.zeros_like(chosen)
+    first[np.argmax(chosen)] = True
+    return first
+
+
+def _between(border: IntArray, mark: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the half-edges of the border whose tails lie between the sides marked 1 and those marked 2, and 2 and 1.
+
+    border: (b,) in order. mark: (b,).
+    """
+    # Turned so that the sides marked 1 come last; as both sets are connected, they do not alternate.
+    marked = np.flatnonzero(mark)
+    turn = marked[np.flatnonzero((mark[marked] == 1) & (mark[np.roll(marked, -1)] == 2))[0]] + 1
+    border, mark = np.roll(border, -turn), np.roll(mark, -turn)
+    twos, ones = np.flatnonzero(mark == 2), np.flatnonzero(mark == 1)
+    return border[: twos[0] + 1], border[twos[-1] + 1 : ones[0] + 1]
+
+
+@compiled
+def across(halfedge_edges: IntArray, edge_halfedges: IntArray, h: int) -> int:
+    """Return the half-edge on the other side of a half-edge, -1 on the boundary."""
+    e = halfedge_edges[h]
+    other: int = edge_halfedges[e, 1] if edge_halfedges[e, 0] == h else edge_halfedges[e, 0]
+    return other
+
+
+@compiled
+def walk_border(halfedge_edges: IntArray, edge_halfedges: IntArray, piece: IntArray, start: int) -> IntArray:
+    """Return the half-edges on the border of a piece in order, from one of them on."""
+    own, around = piece[start // 3], np.empty(0, np.int64)
+    for is_known in (False, True):  # how many they are, and then which
+        count, h = 0, start
+        while count == 0 or h != start:
+            if is_known:
+                around[count] = h
+            count += 1
+            h = h - h % 3 + (h + 1) % 3
+            t = across(halfedge_edges, edge_halfedges, h)
+            while t >= 0 and piece[t // 3] == own:
+                h = t - t % 3 + (t + 1) % 3
+                t = across(halfedge_edges, edge_halfedges, h)
+        if not is_known:
+            around = np.empty(count, np.int64)
+    return around
+
+
+@compiled
+def find_cut(
+    edges: IntArray,
+    edge_halfedges: IntArray,
+    begin: IntArray,
+    beside: IntArray,
+    piece: IntArray,
+    own: int,
+    costs: FloatArray,
+    one: BoolArray,
+    other: BoolArray,
+    starts: IntArray,
+    ends: IntArray,
+    distance: FloatArray,
+) -> IntArray:
+    """Return the edges of the cheapest path inside a piece that runs through neither of two sets of triangles.
+
+    Args:
+        edges, edge_halfedges: of the mesh.
+        begin, beside: the edges at each vertex, see `list_sides`.
+        piece, own: (m,) the piece of each triangle, and which it is.
+        costs: (3m,) of sides.
+        one, other: (m,) the sets.
+        starts, ends: vertices; the path leads from one of the first to one of the second.
+        distance: (n,) infinite, on return again.
+    """
+    is_end = np.zeros(len(distance), np.bool_)
+    for v in ends:
+        is_end[v] = True
+    # Of vertices that are reached, the edge that led there, from its head on if odd.
+    over, reached, count = np.empty(len(distance), np.int64), np.empty(len(distance), np.int64), 0
+    room = len(beside) + len(starts)
+    keys, items, size = np.empty(room), np.empty(room, np.int64), 0
+    for v in starts:
+        if distance[v] > 0.0:
+            distance[v], over[v] = 0.0, -1
+            reached[count] = v
+            count += 1
+            size = push(keys, items, size, 0.0, v)
+    while size > 0:
+        key, v = keys[0], items[0]
+        if is_end[v]:
+            break
+        size = drop_first(keys, items, size)
+        if key > distance[v]:
+            continue
+        for at in range(begin[v], begin[v + 1]):
+            side = beside[at]
+            e = side >> 1
+            w = edges[e, 1 - (side & 1)]
+            h, t = edge_halfedges[e]
+            if t < 0 or not key + costs[h] < distance[w]:
+                continue
+            left, right = h // 3, t // 3
+            if (
+                piece[left] != own
+                or piece[right] != own
+                or (one[left] and one[right])
+                or (other[left] and other[right])
+            ):
+                continue
+            if distance[w] == np.inf:
+                reached[count] = w
+                count += 1
+            distance[w], over[w] = key + costs[h], side
+            size = push(keys, items, size, distance[w], w)
+    v, least = -1, np.inf
+    for w in ends:
+        if distance[w] < least:
+            v, least = w, distance[w]
+    path, length = np.empty(count, np.int64), 0
+    while v >= 0 and over[v] >= 0:
+        path[length] = over[v] >> 1
+        v = edges[path[length], over[v] & 1]
+        length += 1
+    for i in range(count):
+        distance[reached[i]] = np.inf
+    return path[:length]
+
+
+@compiled
+def join_lists(parent: IntArray, head: IntArray, last: IntArray, after: IntArray, i: int, j: int) -> int:
+    """Make two sets one, with the triangles that wait in either; return its root."""
+    one, two = find_root(parent, i), find_root(parent, j)
+    if unite(parent, one, two):
+        kept, gone = min(one, two), max(one, two)
+        if head[gone] >= 0:
+            if head[kept] < 0:
+                head[kept] = head[gone]
+            else:
+                after[last[kept]] = head[gone]
+            last[kept] = last[gone]
+            head[gone] = -1
+    return find_root(parent, i)
+
+
+@compiled
+def append_to(head: IntArray, last: IntArray, after: IntArray, i: int, f: int) -> None:
+    """Let a triangle wait in a set."""
+    if head[i] < 0:
+        head[i] = f
+    else:
+        after[last[i]] = f
+    last[i] = f
+    after[f] = -1
+
+
+@compiled
+def part_piece(
+    halfedge_edges: IntArray,
+    edge_halfedges: IntArray,
+    piece: IntArray,
+    own: int,
+    cut: IntArray,
+    owner: IntArray,
+    is_cut: BoolArray,
+    following: int,
+    first: int,
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Part a piece along edges; return the pieces, the first triangle of each, and a half-edge on the border of each.
+
+    From both sides of the edges sets of triangles grow, a triangle of each in turn, and become one where they meet.
+    When only one grows still it is the rest, and keeps the number of the piece, however large it is.
+
+    Args:
+        halfedge_edges, edge_halfedges: of the mesh.
+        piece: (m,) the piece of each triangle, changed.
+        own: the piece.
+        cut: the edges, between triangles of it.
+        owner: (m,) -1, and (e,) `is_cut` False; on return again.
+        following: the number of the next new piece.
+        first: the first triangle of the piece, or one before it.
+    """
+    sets = 2 * len(cut)
+    parent, head, last = np.arange(sets), np.full(sets, -1), np.full(sets, -1)
+    after, known, count = np.empty(len(piece), np.int64), np.empty(len(piece), np.int64), 0
+    for i in range(sets):
+        is_cut[cut[i // 2]] = True
+        f = edge_halfedges[cut[i // 2], i % 2] // 3
+        if owner[f] < 0:
+            owner[f] = i
+            append_to(head, last, after, i, f)
+            known[count] = f
+            count += 1
+        else:
+            join_lists(parent, head, last, after, i, owner[f])
+    growing, left = np.arange(sets), sets
+    while left > 1:
+        still = 0
+        for at in range(left):
+            i = growing[at]
+            if parent[i] != i or head[i] < 0:
+                continue
+            growing[still] = i
+            still += 1
+            f = head[i]
+            head[i] = after[f]
+            for h in range(3 * f, 3 * f + 3):
+                t = across(halfedge_edges, edge_halfedges, h)
+                if t < 0 or is_cut[halfedge_edges[h]] or piece[t // 3] != own:
+                    continue
+                g = t // 3
+                if owner[g] < 0:
+                    owner[g] = i
+                    append_to(head, last, after, find_root(parent, i), g)
+                    known[count] = g
+                    count += 1
+                else:
+                    join_lists(parent, head, last, after, i, owner[g])
+        left = still
+    rest = find_root(parent, growing[0]) if sets > 0 else -1
+    number = np.full(sets, -1)
+    ids, low = np.full(sets + 1, own), np.full(sets + 1, len(piece))
+    found = 1
+    for i in range(count):
+        f = known[i]
+        root = find_root(parent, owner[f])
+        owner[f] = -1
+        if root == rest:
+            continue
+        if number[root] < 0:
+            number[root] = found
+            ids[found] = following + found - 1
+            found += 1
+        piece[f] = ids[number[root]]
+        low[number[root]] = min(low[number[root]], f)
+    while piece[first] != own:
+        first += 1
+    low[0] = first
+    start = np.full(found, -1)
+    for i in range(sets):
+        is_cut[cut[i // 2]] = False
+        h, t = edge_halfedges[cut[i // 2], i % 2], edge_halfedges[cut[i // 2], 1 - i % 2]
+        if piece[h // 3] != piece[t // 3]:
+            start[0 if piece[h // 3] == own else piece[h // 3] - following + 1] = h
+    return ids[:found], low[:found], start
