@@ -70,3 +70,26 @@ def test_where_much_is_missed_or_nothing_it_is_left_to_newton():
     start = linear_start(problem, target)
     solved, _ = find_scale(problem, start.place, 1e-10, 50)
     assert settled(problem, solved) is None
+
+
+def test_flips_of_settling_that_fails_are_taken_into_account(monkeypatch):
+    _, _, target, problem = problem_on(0.2)
+    start = linear_start(problem, target).place
+
+    def flips_and_fails(problem, state):
+        rough = state.place + 0.3 * np.sin(np.arange(len(state.place)))
+        flipped = problem.flip(rough, np.arange(len(problem.triangulation.tail)))
+        problem.record(flipped)
+        assert len(flipped) > 100
+
+    direction = problem.direction
+
+    def checked_direction(here, exactly):
+        cots = np.empty_like(here.cots)
+        problem.sum_angles(here.place, np.empty(len(target)), cots)
+        assert np.array_equal(here.cots, cots)
+        return direction(here, exactly)
+
+    monkeypatch.setattr(problem, "direction", checked_direction)
+    found, _ = find_scale(problem, start, 1e-10, 50, flips_and_fails)
+    assert found.largest < 1e-10

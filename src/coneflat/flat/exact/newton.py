@@ -204,7 +204,11 @@ def find_scale(
     start = problem.evaluate(log_scale)
     if not start.is_admissible:
         start = problem.evaluate(np.where(problem.fixed, log_scale, 0.0))
+    flips = len(problem.records)
     better = None if settle is None else settle(problem, start)
+    if better is None and len(problem.records) > flips:
+        # It failed, and has flipped edges, of which the state does not know.
+        start = problem.evaluate(start.place)
     if better is not None:
         found = problem.evaluate(better)
         start = found if found.is_admissible else problem.evaluate(start.place)
