@@ -315,3 +315,16 @@ def test_sample_has_limbs_and_a_handle():
     assert 5_000 <= len(result.faces) <= 20_000
     assert sample_path().stat().st_size < 1_000_000
     assert result.distortion.flipped == result.distortion.degenerate == 0
+
+
+@pytest.mark.parametrize("make", [shapes.hill, lambda: shapes.sphere(3)])
+@pytest.mark.parametrize("first", [False, True])
+def test_vertices_of_no_triangle_stay_where_they_are(make, first):
+    vertices, faces = make()
+    unused = np.random.default_rng(0).random((7, 3))
+    blocks, shift = ([unused, vertices], 7) if first else ([vertices, unused], 0)
+    result = flatten(np.vstack(blocks), faces + shift)
+    plain = flatten(vertices, faces)
+    assert np.array_equal(result.vertices, np.vstack(blocks))
+    assert np.array_equal(result.cones, plain.cones + shift)
+    assert np.array_equal(result.distortion.qc, plain.distortion.qc)

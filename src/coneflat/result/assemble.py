@@ -367,8 +367,8 @@ def _prescribed(one: LaidOut, options: Options) -> FloatArray:
 
 
 def _known_or_new(known: TriangleMesh, positions: FloatArray, faces: IntArray) -> TriangleMesh:
-    """Return a mesh, with the edges of the known one if it is that: they have been found."""
-    if np.array_equal(known.faces, faces):
+    """Return a mesh, with the edges of the known one if it is that, without unused vertices: they have been found."""
+    if len(known.vertices) == len(positions) and np.array_equal(known.faces, faces):
         return known.moved_to(positions)
     return TriangleMesh(positions, faces)
 
