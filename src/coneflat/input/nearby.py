@@ -11,6 +11,7 @@ import numpy as np
 from .._arrays import IntArray
 from ..compiled import compiled
 from ..mesh import TriangleMesh
+from ..threads import HUGE
 
 # Triangles from which on a mesh does not fit into the processor's own memory.
 LARGE = 200_000
@@ -21,10 +22,11 @@ SCATTERED = 1 / 32
 def brought_together(mesh: TriangleMesh) -> tuple[TriangleMesh, IntArray, IntArray] | None:
     """Return a connected mesh whose neighbours have numbers near each other; with its (n,) vertices and (m,) faces.
 
-    These are numbered as in the other one. Copies of a mesh stay alike. None: it is small, or its numbering is good.
+    These are numbered as in the other one. Copies of a mesh stay alike. None: it is small, or huge, where memory is
+    what matters, or its numbering is good.
     """
     faces = mesh.faces
-    if len(faces) < LARGE or mean_span(faces) < SCATTERED * len(mesh.vertices):
+    if not LARGE <= len(faces) <= HUGE or mean_span(faces) < SCATTERED * len(mesh.vertices):
         return None
     face_order = by_distance(mesh.halfedge_edges.reshape(-1, 3), mesh.edge_halfedges)
     vertex_order, found = by_first_use(faces, face_order, len(mesh.vertices))
