@@ -35,13 +35,12 @@ if TYPE_CHECKING:
     from ..input.components import Prepared
     from ..input.mesh_file import MeshFile
 
-
 # Of the longest side in the plane: how far one side of a model is off the other that it lies on, so that readers who
 # join what is within a millionth of a side see two charts, not one that is folded.
 # And at least so much of the texture, far above the rounding of 32-bit numbers, far below a texel.
 APART, LEAST_APART = 4e-6, 1e-6
 POLYGONS_LOST = (
-    "The refinement has triangles of its own: polygons, groups and materials of the file are not kept."
+    "The refinement has triangles of its own: polygons, groups and materials of the file are lost."
 )
 
 
@@ -182,7 +181,7 @@ def assemble(
         notes=(
             *checked.notes,
             *prepared.notes,
-            *_distinct_notes(laid_out),
+            *dict.fromkeys(note for one in laid_out for note in one.notes),
             *[POLYGONS_LOST] * (source is not None and face_corners is None),
         ),
         settings=settings(options),
@@ -367,15 +366,9 @@ def _prescribed(one: LaidOut, options: Options) -> FloatArray:
 
 
 def _known_or_new(known: TriangleMesh, positions: FloatArray, faces: IntArray) -> TriangleMesh:
-    """Return a mesh, with the edges of the known one if it is that, without unused vertices: they have been found."""
-    if len(known.vertices) == len(positions) and np.array_equal(known.faces, faces):
-        return known.moved_to(positions)
-    return TriangleMesh(positions, faces)
-
-
-def _distinct_notes(laid_out: Sequence[LaidOut]) -> tuple[str, ...]:
-    """Return the notes on all components, each once."""
-    return tuple(dict.fromkeys(note for one in laid_out for note in one.notes))
+    """Return a mesh, with the edges of the known one if it is that: they have been found."""
+    is_known = len(known.vertices) == len(positions) and np.array_equal(known.faces, faces)
+    return known.moved_to(positions) if is_known else TriangleMesh(positions, faces)
 
 
 def _all_charts(laid_out: Sequence[LaidOut]) -> tuple[FloatArray, IntArray, IntArray, IntArray, IntArray]:

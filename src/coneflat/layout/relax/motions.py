@@ -251,12 +251,8 @@ class _Builder:
             self._add_unknowns(one, np.full(len(one), direction, dtype=np.complex128), unknown + axis)
             self._add_unknowns(two, direction * turning, unknown + axis)
         moves = self.of_chain[chain] >= 0
-        self._add(
-            right[moves],
-            self.of_chain[chain[moves]],
-            np.ones(int(moves.sum()), dtype=np.complex128),
-            is_complex=True,
-        )
+        ones = np.ones(int(moves.sum()), dtype=np.complex128)
+        self._add(right[moves], self.of_chain[chain[moves]], ones, is_complex=True)
 
     def _add_on_lines(self, left: IntArray, right: IntArray, turn: ComplexArray) -> None:
         """Let left points within seams move along their lines and with these, and the right ones alike."""
