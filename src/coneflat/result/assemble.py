@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 # And at least so much of the texture, far above the rounding of 32-bit numbers, far below a texel.
 APART, LEAST_APART = 4e-6, 1e-6
 POLYGONS_LOST = (
-    "The refinement has triangles of its own: polygons, groups and materials of the file are lost."
+    "The refinement has its own triangles: the file's polygons, groups and materials are not kept."
 )
 
 
