@@ -39,9 +39,7 @@ if TYPE_CHECKING:
 # join what is within a millionth of a side see two charts, not one that is folded.
 # And at least so much of the texture, far above the rounding of 32-bit numbers, far below a texel.
 APART, LEAST_APART = 4e-6, 1e-6
-POLYGONS_LOST = (
-    "The refinement has its own triangles: the file's polygons, groups and materials are not kept."
-)
+POLYGONS_LOST = "The refinement has its own triangles: polygons, groups and materials are not kept."
 
 
 @dataclass(frozen=True, eq=False)
