@@ -106,3 +106,13 @@ def test_copies_are_laid_out_as_each_by_itself(mesh: Mesh, monkeypatch: pytest.M
     for one, other in zip(found.symmetry, alone.symmetry, strict=True):
         assert np.allclose(one.normal, other.normal, atol=1e-9)
         assert np.allclose(one.offset, other.offset, atol=1e-9)
+
+
+def test_groups_that_are_relaxed_together_may_be_copies_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = joined(bump(), *(turned(bump(), seed) for seed in range(6)))
+    whole = coneflat.flatten(*mesh)
+    # Of three components each: one and two copies, three copies, one copy.
+    monkeypatch.setattr(pipeline, "TOGETHER", 2 * len(bump()[1]) + 1)
+    parted = coneflat.flatten(*mesh)
+    assert np.array_equal(parted.cones, whole.cones)
+    np.testing.assert_allclose(parted.distortion.qc, whole.distortion.qc, rtol=1e-9)

@@ -126,7 +126,8 @@ class _Runs:
         """Return the layout of each component that was asked for."""
         found: dict[int, LaidOut] = {}
         for group in self._groups():
-            relaxed = self._relaxed([i for i in group if self._copies[i] is None]) if len(group) > 1 else {}
+            own = [i for i in group if self._copies[i] is None]
+            relaxed = self._relaxed(own) if len(own) > 1 else {}
             for i in group:
                 with self._at(i, HALF if i in relaxed else 1.0):
                     found[i] = self._copy(i, found) or self._last(i, relaxed.get(i))
