@@ -55,6 +55,14 @@ def overlapping(layout):
     )
 
 
+def crumpled(cells, seed):
+    """A square of paper, its points when it is crumpled in the plane, and the triangles that then overlap."""
+    disk = flat_grid(cells, cells)
+    bends = np.random.default_rng(seed).normal(size=(4, 2, 2))
+    points = disk.vertices + 0.5 * np.sin(5 * disk.vertices @ bends).sum(axis=0)
+    return disk, points, find_overlaps(points, disk.faces).pairs
+
+
 class TestSeparate:
     @pytest.mark.parametrize("seed", range(12))
     def test_no_cut_is_cheaper(self, seed):
@@ -207,10 +215,7 @@ class TestSplit:
     @pytest.mark.parametrize("seed", range(4))
     def test_the_largest_layers_are_those_of_all_regions(self, seed):
         """Of crumpled paper, whose overlaps are many, and some of them wound up."""
-        disk = flat_grid(18, 18)
-        bends = np.random.default_rng(seed).normal(size=(4, 2, 2))
-        points = disk.vertices + 0.5 * np.sin(5 * disk.vertices @ bends).sum(axis=0)
-        pairs = find_overlaps(points, disk.faces).pairs
+        disk, _, pairs = crumpled(18, seed)
         areas = np.random.default_rng(seed).uniform(1, 2, len(disk.faces))
         every = overlap_layers(pairs, disk.faces)
         assert len(every) > 2
@@ -223,10 +228,7 @@ class TestSplit:
     @pytest.mark.parametrize("seed", range(4))
     def test_charts_of_crumpled_paper_hang_together_and_do_not_overlap(self, seed):
         """Many cuts, after which pieces touch themselves in points."""
-        disk = flat_grid(24, 24)
-        bends = np.random.default_rng(seed).normal(size=(4, 2, 2))
-        points = disk.vertices + 0.5 * np.sin(5 * disk.vertices @ bends).sum(axis=0)
-        pairs = find_overlaps(points, disk.faces).pairs
+        disk, points, pairs = crumpled(24, seed)
         costs = lengths_of(disk)[disk.halfedge_edges]
         chart = split_overlaps(points, disk.faces, costs, np.ones(len(disk.faces)), pairs)
         assert chart.max() > 10
