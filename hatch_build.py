@@ -49,7 +49,7 @@ class KernelHook(BuildHookInterface):
         environment.pop("NUMBA_CACHE_DIR", None)
         try:
             subprocess.run(
-                [sys.executable, "-m", "coneflat.ahead"],
+                [sys.executable, "-m", "coneflat.apps.ahead"],
                 env=environment,
                 cwd=sources,
                 check=True,

@@ -19,13 +19,15 @@ from typing import Any
 
 from same import BASES, DEFORMATIONS, MODELS, deformed
 
-from coneflat.cones import choose
+from coneflat.base.progress import Stopwatch
+from coneflat.base.threads import using_threads
+from coneflat.cones import only_choice, open_search
 from coneflat.cones.sparse import aggregation, dense_model, exact_model, linear_model
 from coneflat.cones.sparse import search as cone_search
-from coneflat.input.components import prepare
+from coneflat.io.input_mesh import as_input
 from coneflat.options import Options
-from coneflat.progress import Stages
-from coneflat.threads import using_threads
+from coneflat.source import Source
+from coneflat.stages import Surface
 
 DISTORTIONS = (0.1, 0.2, 0.3)
 
@@ -49,25 +51,17 @@ def variants() -> dict[str, list[Patch]]:
     found: dict[str, list[Patch]] = {"as it is": []}
     for module, name, values in (
         (search, "COARSE_DOUBT", (1.15, 1.2, 1.6)),
-        (search, "NEAR", (1.0, 1.05, 1.1, 1.2)),
-        (search, "SHAKES", (6, 12, 16, 24)),
-        (search, "SEEDS", (0, 1, 6, 8)),
-        (search, "MANY", (20, 80)),
-        (dense, "FITTED", (1, 2, 10)),
         (exact, "ROUNDS", (4, 100)),
         (exact, "WORTHWHILE", (1e-2, 1e-4)),
-        (exact, "CAUTIONS", ((2.0,), (1.0,), (1.0, 2.0, 4.0))),
         (linear_model, "VERTICES_PER_UNKNOWN", (8, 15, 30)),
         (linear_model, "LEAST_SIZE", (200, 400, 800)),
         (linear_model, "MOST_SIZE", (600, 2000)),
-        (aggregation, "WEAK", (0.0,)),
         (aggregation, "LARGEST_AGGREGATE", (4.0, 12.0)),
-        (aggregation, "TRIES", (0,)),
+        (aggregation, "CLOSE", (1.0, 2.0)),
     ):
         found |= {f"{name} {value}": [(module, name, value)] for value in values}
     model = dense.DenseModel
     found["no descent"] = [(model, "descend", lambda *_: None)]
-    found["no shaking"] = [(model, "shake", lambda *_: False)]
     found["no shrunk start"] = [(search.ConeSearch, "_on_mesh", on_mesh_from_coarse)]
     found["both starts"] = [(search.ConeSearch, "_on_mesh", on_mesh_both)]
     return found
@@ -128,11 +122,11 @@ def main() -> None:
             continue
         with using_threads():
             mesh, faces = given if len(given) == 2 else (given[0], None)
-            part = max(prepare(mesh, faces, options).components, key=lambda e: len(e.faces))
+            part = max(Source(as_input(mesh, faces)).prepared(options).parts, key=lambda e: len(e.faces))
             if not arguments.smallest <= len(part.mesh.faces) <= arguments.largest:
                 continue
-            surface = choose.Surface.of(part.mesh, part.lengths)
-            if choose.only_choice(surface, part.constraints, options) is not None:
+            surface = Surface.of(part.mesh, part.lengths)
+            if only_choice(surface, part.cones) is not None:
                 continue
             operators: list[Any] = []
             coarse: list[Any] = []
@@ -152,16 +146,16 @@ def main() -> None:
                 (linear_model, "coarse_model", one_model),
             ]
             with patched(shared):
-                choose.search_on(surface, part.constraints, options, Stages(None))
+                open_search(surface, part.cones, Stopwatch(None))
             for name, patches in chosen.items():
                 changes_model = any(name.startswith(word) for word in OPENING)
                 sharing = shared[:1] if changes_model else shared
                 for distortion in DISTORTIONS:
-                    surface.search = surface._linear = None
+                    surface.memo.clear()
                     gc.collect()
                     with patched(patches + sharing):
                         start = time.process_time()
-                        search = choose.search_on(surface, part.constraints, options, Stages(None))
+                        search = open_search(surface, part.cones, Stopwatch(None))
                         opened = time.process_time()
                         found = search.fewest(distortion)
                     done = time.process_time()

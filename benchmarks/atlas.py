@@ -17,10 +17,10 @@ import numpy as np
 from common import MODELS, shapes, with_cones_for
 
 from coneflat import Flattening, check_mesh, flatten, read_mesh
-from coneflat.apps.compare.peers import installed_peers, run_peer
+from coneflat.apps.peers.packages import installed_peers, run_peer
 from coneflat.errors import ConeflatError
-from coneflat.mesh import TriangleMesh
-from coneflat.quality.distortion import Distortion
+from coneflat.measure.distortion import Distortion
+from coneflat.mesh.connectivity import TriangleMesh
 
 # Area distortions allowed, one after the other, and halvings of the interval in which the stretch is sought.
 ALLOWED = (0.2, 0.14, 0.1, 0.07, 0.05, 0.035, 0.025)

@@ -18,7 +18,7 @@ import chromium  # noqa: E402, F401 - for those that open a page
 import shapes  # noqa: E402
 
 from coneflat import Flattening, check_mesh, flatten, read_mesh  # noqa: E402
-from coneflat.mesh import TriangleMesh  # noqa: E402
+from coneflat.mesh.connectivity import TriangleMesh  # noqa: E402
 
 
 def meshes(names: list[str], largest: int) -> Iterator[tuple[str, TriangleMesh]]:

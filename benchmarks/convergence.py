@@ -21,10 +21,9 @@ import common  # noqa: F401 - finds the shapes of the tests
 import numpy as np
 import shapes
 
+from coneflat.apps.peers.circle_patterns import circle_patterns
+from coneflat.apps.peers.ricci import ricci_flow
 from coneflat.cones import cones_with_curvature
-from coneflat.flat import ExactChoices, exact_flattening
-from coneflat.flat.circle_patterns.flatten import circle_patterns
-from coneflat.flat.ricci import ricci_flow
 from coneflat.geometry import (
     angle_defect,
     corner_angles,
@@ -33,7 +32,8 @@ from coneflat.geometry import (
     double_areas,
     edge_lengths,
 )
-from coneflat.mesh import TriangleMesh
+from coneflat.mesh.connectivity import TriangleMesh
+from coneflat.metric import ExactChoices, exact_flat_metric
 
 # Vertices of the icosahedron that the sphere is split from, and curvatures that sum to 4 pi.
 CONES = np.array([0, 2, 3, 5, 7, 8, 10])
@@ -57,9 +57,13 @@ def flat_lengths(mesh: TriangleMesh) -> list[np.ndarray]:
     metrics = (
         circle_patterns(mesh, lengths, solution),
         ricci_flow(mesh, lengths, solution),
-        exact_flattening(mesh, lengths, solution, ExactChoices(scale_at_cones=False)),
+        exact_flat_metric(mesh, lengths, solution, ExactChoices(scale_at_cones=False)),
     )
-    return [np.log(np.abs(metric.straight().sides.reshape(-1, 3)) * metric.shrink) for metric in metrics]
+    found = []
+    for metric in metrics:
+        assert metric.triangles is not None
+        found.append(np.log(np.abs(metric.triangles.sides.reshape(-1, 3)) * metric.scale))
+    return found
 
 
 def differences(rounds: int, bumps: float, away: float) -> tuple[int, float, np.ndarray]:

@@ -1,7 +1,7 @@
 """What becomes of random surfaces asked for integer grids and quads: `python benchmarks/grids.py --cases 200 --jobs 2`.
 
 Surfaces of all topologies, deformed, renumbered and scaled by a million either way, some of them as bad as those of the
-hostile trial; from three squares to thousands, or the coarsest grid; with all stretches, boundaries and cone bounds.
+hostile trial; from three squares to thousands; with all stretches, boundaries and cone bounds.
 Each case must end in a grid whose equations hold exactly and a manifold mesh of quads on the surface, measured anew by
 `trials/grids.py`, or in an error of the package's own, in one line. All else, a case that takes too long among it, is a
 breach; the exit code is 1 if there is any. `--case 17` runs one alone in this process and tells all about it.

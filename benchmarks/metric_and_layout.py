@@ -11,10 +11,13 @@ import argparse
 
 from common import best_time, meshes
 
-from coneflat import cut_open, edge_lengths, find_seams
 from coneflat.cones import greedy_cones
-from coneflat.flat import ExactChoices, LaidOut, exact_flattening, linear_flattening
-from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
+from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths
+from coneflat.layout import lay_out
+from coneflat.mesh import cut_open
+from coneflat.metric import ExactChoices, exact_flat_metric, linear_flat_metric
+from coneflat.seams import find_seams
+from coneflat.stages import Cut, Layout
 
 CONES = 20
 
@@ -36,15 +39,15 @@ def main() -> None:
         surface = laplacian, curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
         solution = greedy_cones(*surface, max_cones=CONES)
         seams = find_seams(mesh, solution.cones, lengths.ravel()[mesh.edge_halfedges[:, 0]])
-        disk = cut_open(mesh, seams).mesh
-        found: list[LaidOut] = []
+        cut = Cut(cut_open(mesh, seams).mesh, seams)
+        found: list[Layout] = []
 
         def exact() -> None:
-            metric = exact_flattening(mesh, lengths, solution, ExactChoices())  # noqa: B023
-            found.append(metric.lay_out(disk, seams))  # noqa: B023
+            metric = exact_flat_metric(mesh, lengths, solution, ExactChoices())  # noqa: B023
+            found.append(lay_out(metric, cut))  # noqa: B023
 
         def linear() -> None:
-            linear_flattening(mesh, lengths, solution).lay_out(disk, seams)  # noqa: B023
+            lay_out(linear_flat_metric(mesh, lengths, solution), cut)  # noqa: B023
 
         if name == "sphere":
             exact()  # compiles, or loads what was compiled

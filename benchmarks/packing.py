@@ -7,11 +7,6 @@ too; it turns charts by swapping u and v, which mirrors them, unless that is for
 texels. With `--up` charts stand upright: all packers are given them so, and none may turn them. Efficiency is the area
 of the charts over that of the square. A chart alone that may not be turned, or one as long as the square, bounds it:
 there all packers come out alike.
-
-Tried in `atlas/place.py` without gain (means over all models): of orders in which charts stand equally high, to
-take only those whose tops are lower, weighted by area or squared (1 to 20 pieces: within a point, up and down); to let
-charts keep to the right where there are more than five (up to 2 points less). Twice the tries give half a point to
-one, four times as many hardly more.
 """
 
 from __future__ import annotations
@@ -31,7 +26,7 @@ import coneflat
 from coneflat.atlas import orient_charts, pack_charts
 from coneflat.errors import ConeflatError
 from coneflat.geometry.planar import signed_double_areas
-from coneflat.mesh import label_components
+from coneflat.mesh.connectivity import label_components
 
 RESOLUTION, PADDING, MARGIN = 1024, 2, 0.5
 Packer = Callable[[np.ndarray, np.ndarray], float]

@@ -29,7 +29,7 @@ from common import MODELS, shapes
 
 from coneflat import check_mesh, quads, read_mesh
 from coneflat.errors import ConeflatError
-from coneflat.mesh import TriangleMesh
+from coneflat.mesh.connectivity import TriangleMesh
 
 TOOL = MODELS.parent / "tools" / "quads.py"
 STRETCHES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0)

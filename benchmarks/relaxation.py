@@ -1,8 +1,8 @@
 """Layouts before and after they are relaxed: `python benchmarks/relaxation.py` prints Markdown tables.
 
 The models of `../shared/meshes`, as they are and decimated to so many triangles (by fast_simplification, where it is
-installed; a decimated mesh that is no manifold is left out), each flattened three times: `polish="off"`, the default
-and `polish="whole"`. QC is the ratio of singular values, by area; std that of the log of the scale. With `--dial` the
+installed; a decimated mesh that is no manifold is left out), each flattened three times: `relax="off"`, the default
+and `relax="whole"`. QC is the ratio of singular values, by area; std that of the log of the scale. With `--dial` the
 models named are flattened at several values of `stretch` instead, and with the number of cones that has the same
 area distortion without it.
 """
@@ -47,7 +47,7 @@ def before_and_after(names: list[str], sizes: list[int]) -> None:
     print("| --- " * 15 + "|")
     for name, vertices, faces in meshes(names, sizes):
         try:
-            results = [flattened(vertices, faces, polish=polish) for polish in ("off", "auto", "whole")]
+            results = [flattened(vertices, faces, relax=relax) for relax in ("off", "auto", "whole")]
         except ConeflatError as error:
             print(f"| {name} | {len(faces):,} | {error} |")
             continue

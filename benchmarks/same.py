@@ -38,20 +38,15 @@ WAYS: dict[str, dict[str, object]] = {
     "disk": {"boundary": "disk", "charts": "one"},
     "straight": {"boundary": "straight", "charts": "one"},
     "lengths": {"boundary": "lengths", "charts": "atlas"},
-    "refined": {"refine": True, "charts": "atlas"},
     "fine": {"distortion": 0.1, "charts": "atlas", "up": (0.0, 1.0, 0.0)},
     "counted": {"cone_count": 12, "charts": "one"},
     "none": {"cones": "none", "charts": "atlas"},
     "greedy": {"cones": "greedy", "charts": "one"},
     "sharp": {"sharp_angle": 0.7, "charts": "atlas", "padding": 4.0},
-    "hidden": {"hide_seams": 1.0, "creases": 1.0, "charts": "atlas"},
+    "hidden": {"hide_seams": 1.0, "charts": "atlas"},
     "positive": {"positive_only": True, "distortion": 0.5, "charts": "one"},
     "tiles": {"tiles": 2, "sharp_angle": 0.9, "charts": "atlas"},
-    "scipy": {"solver": "scipy", "charts": "one"},
-    **{
-        method: {"method": method, "charts": "one"}
-        for method in ("linear", "circle-patterns", "ricci", "linear-abf", "abf++", "lscm", "spectral", "bff")
-    },
+    "linear": {"method": "linear", "charts": "one"},
 }
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from coneflat.files import read_mesh
-from coneflat.input.triangulate import triangulate
-from coneflat.mesh import TriangleMesh
-from coneflat.quality.distortion import measure
-from coneflat.result.flattening import Flattening
+from coneflat.geometry.triangulate import triangulate
+from coneflat.io import read_mesh
+from coneflat.measure.distortion import measure
+from coneflat.mesh.connectivity import TriangleMesh
+from coneflat.result import Flattening
 
 OBJ = b"""\
 # a bar of two cells \xe9

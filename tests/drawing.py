@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 
-from coneflat.view import new_figure
+from coneflat.apps.view import new_figure
 
 SVG = "{http://www.w3.org/2000/svg}"
 RED, BLACK = (214, 34, 34), (0, 0, 0)
@@ -30,14 +30,6 @@ def shown_at(axes, points):
     image = pixels(axes.figure)
     x, y = axes.transData.transform(points).T
     return image[(len(image) - y).astype(int), x.astype(int)]
-
-
-def darkest_at(axes, point):
-    """Return the darkest colour within two pixels of a place: that of a line which is one pixel wide."""
-    image = pixels(axes.figure)
-    x, y = axes.transData.transform(point).astype(int)
-    around = image[len(image) - y - 3 : len(image) - y + 2, x - 2 : x + 3].reshape(-1, 3)
-    return around[around.sum(axis=1).argmin()]
 
 
 def groups(path):

@@ -8,8 +8,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 from shapes import torus
 
-from coneflat import TriangleMesh, check_mesh
-from coneflat.mesh import label_components
+from coneflat import TriangleMesh
 
 QUARTER = np.array([[0, -1], [1, 0]])
 
@@ -136,86 +135,6 @@ def torus_map(along, across, shear, seed=0):
     parameters += rng.integers(-3, 3, (len(faces), 1, 2))
     corner_grid = parameters @ np.array([[along, 0], [shear, across]], dtype=float)
     return with_motions(vertices, faces, corner_grid + 0.37)
-
-
-def random_sheet(seed):
-    """Return a map of a random polygon with a hole, with the squares that lie on it whole, and its area."""
-    rng = np.random.default_rng(seed)
-    angle = np.sort(rng.uniform(0, 2 * np.pi, 14))
-    radius = rng.uniform(4, 9, 14)
-    outline = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
-    hole = 1.6 * np.array([[1, 0.1], [0, 1], [-1, -0.2], [0.1, -1]]) + rng.uniform(-0.5, 0.5, 2)
-    points = rng.uniform(-9, 9, (700, 2))
-    triangles = Delaunay(points).simplices
-    middle = points[triangles].mean(axis=1)
-    kept = triangles[_within(outline, middle) & ~_within(hole, middle)]
-    kept = _largest_manifold(kept, len(points))
-    used, index = np.unique(kept, return_inverse=True)
-    points, kept = points[used], index.reshape(-1, 3)
-    x, y = np.moveaxis(points[kept], -1, 0)
-    area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
-    kept = np.where((area < 0)[:, None], kept[:, ::-1], kept)
-    sheet = flat(points, kept)
-    sheet.area = float(np.abs(area).sum() / 2)
-    sheet.whole_squares = {
-        (i, j) for i in range(-10, 10) for j in range(-10, 10) if _covers(points[kept], i, j)
-    }
-    return sheet
-
-
-def _within(outline, points):
-    """Return which points lie in a polygon, by the number of sides to the right of them."""
-    inside = np.zeros(len(points), dtype=bool)
-    for (ax, ay), (bx, by) in zip(outline, np.roll(outline, -1, axis=0), strict=True):
-        crosses = (ay > points[:, 1]) != (by > points[:, 1])
-        at = ax + (points[:, 1] - ay) / (by - ay) * (bx - ax)
-        inside ^= crosses & (points[:, 0] < at)
-    return inside
-
-
-def _largest_manifold(faces, count):
-    """Return the largest part of triangles that hang together by edges, with a fan at each vertex."""
-    points = np.random.default_rng(0).normal(size=(count, 3))
-    while True:
-        mesh = TriangleMesh(points, faces)
-        pairs = mesh.edge_faces[~mesh.is_boundary_edge]
-        _, part = label_components(len(faces), pairs[:, 0], pairs[:, 1])
-        faces = faces[part == np.argmax(np.bincount(part))]
-        mesh = TriangleMesh(points, faces)
-        ends = mesh.edges[mesh.is_boundary_edge].ravel()
-        pinched = np.flatnonzero(np.bincount(ends, minlength=count) > 2)
-        if not len(pinched):
-            check_mesh(points, faces, repair=False)
-            return faces
-        faces = faces[~np.isin(faces, pinched).any(axis=1)]
-
-
-def _covers(triangles, i, j):
-    """Return whether triangles cover the unit square with the least corner (i, j)."""
-    total = 0.0
-    for triangle in triangles:
-        polygon = triangle
-        for axis, bound, sign in ((0, i, 1), (0, i + 1, -1), (1, j, 1), (1, j + 1, -1)):
-            polygon = _clipped(polygon, sign * (polygon[:, axis] - bound))
-            if len(polygon) == 0:
-                break
-        if len(polygon) > 2:
-            x, y = polygon.T
-            total += (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
-    return total > 1 - 1e-9
-
-
-def _clipped(polygon, height):
-    """Return the part of a convex polygon where the height, given at its corners, is not negative."""
-    kept = []
-    for k in range(len(polygon)):
-        following = (k + 1) % len(polygon)
-        if height[k] >= 0:
-            kept.append(polygon[k])
-        if (height[k] < 0) != (height[following] < 0):
-            share = height[k] / (height[k] - height[following])
-            kept.append(polygon[k] + share * (polygon[following] - polygon[k]))
-    return np.array(kept)
 
 
 def broken(grid, **changes):

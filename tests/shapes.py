@@ -9,7 +9,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from coneflat import check_mesh, cut_open, edge_lengths, find_seams
+from coneflat import check_mesh
+from coneflat.geometry import edge_lengths
+from coneflat.layout import lay_out
+from coneflat.mesh import cut_open
+from coneflat.seams import find_seams
+from coneflat.stages import Cut
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "meshes"
 
@@ -273,6 +278,14 @@ def cut_disk(vertices, faces, cones=()):
     mesh = check_mesh(vertices, faces).mesh
     costs = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
     return cut_open(mesh, find_seams(mesh, np.array(cones, dtype=np.int64), costs)).mesh
+
+
+def laid_out(metric):
+    """Return the layout of a flat metric, whose mesh is cut along short edges."""
+    mesh = metric.mesh
+    costs = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
+    seams = find_seams(mesh, metric.cones, costs)
+    return lay_out(metric, Cut(cut_open(mesh, seams).mesh, seams))
 
 
 def lengths_of(mesh):

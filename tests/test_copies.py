@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 import shapes
 
 import coneflat
-from coneflat import pipeline
-from coneflat._arrays import FloatArray, IntArray
-from coneflat.flat.copies import find_copies
-from coneflat.input.components import Component, prepare
+from coneflat.base.arrays import FloatArray, IntArray
+from coneflat.io import as_input
 from coneflat.options import Options
+from coneflat.source import Part, Source
+from coneflat.source.copies import find_copies
+
+method = import_module("coneflat.flatten")
 
 Mesh = tuple[FloatArray, IntArray]
 
@@ -35,8 +39,8 @@ def bump() -> Mesh:
     return vertices * (1.0, 1.3, 0.8), faces
 
 
-def parts_of(mesh: Mesh, options: Options) -> tuple[Component, ...]:
-    return prepare(*mesh, options).components
+def parts_of(mesh: Mesh, options: Options) -> tuple[Part, ...]:
+    return Source(as_input(*mesh)).prepared(options).parts
 
 
 def sides_of(found: coneflat.Flattening) -> FloatArray:
@@ -51,7 +55,7 @@ def test_turned_scaled_copies_are_found_and_others_are_not() -> None:
     dented = mesh[0].copy(), mesh[1]
     dented[0][7] *= 1 + 1e-6
     whole = joined(mesh, turned(mesh, 1), dented, turned(mesh, 2, 3.0), mirrored, turned(dented, 4))
-    copies = find_copies(parts_of(whole, Options()), Options())
+    copies = find_copies(parts_of(whole, Options()))
     assert [None if copy is None else copy.first for copy in copies] == [None, 0, None, 0, None, 2]
     assert [copy.scale for copy in copies if copy is not None] == pytest.approx([1.0, 3.0, 1.0], rel=1e-12)
 
@@ -62,7 +66,7 @@ def test_turned_scaled_copies_are_found_and_others_are_not() -> None:
 def test_a_component_of_which_something_is_said_is_no_copy(options: dict[str, object]) -> None:
     asked = coneflat.options.read_options(options)
     mesh = bump()
-    assert find_copies(parts_of(joined(mesh, turned(mesh, 1)), asked), asked) == [None, None]
+    assert find_copies(parts_of(joined(mesh, turned(mesh, 1)), asked)) == [None, None]
 
 
 def test_creases_of_the_same_lengths_are_no_copies() -> None:
@@ -75,44 +79,24 @@ def test_creases_of_the_same_lengths_are_no_copies() -> None:
     )
     faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     up, zigzag = (np.stack([0.8 * x.ravel(), y.ravel(), 0.6 * z.ravel()], axis=1) for z in (bend, x % 2))
-    sides = [np.sort(coneflat.edge_lengths(points, faces), axis=None) for points in (up, zigzag)]
+    sides = [np.sort(coneflat.geometry.edge_lengths(points, faces), axis=None) for points in (up, zigzag)]
     assert np.allclose(*sides, rtol=1e-12)
-    assert find_copies(parts_of(joined((up, faces), (zigzag, faces)), Options()), Options()) == [None, None]
+    assert find_copies(parts_of(joined((up, faces), (zigzag, faces)), Options())) == [None, None]
 
 
-@pytest.mark.parametrize("mesh", [bump(), shapes.hill(9, 8), shapes.torus(12, 8)])
+@pytest.mark.parametrize("mesh", [bump(), shapes.hill(9, 8)])
 def test_copies_are_laid_out_as_each_by_itself(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = joined(mesh, turned(mesh, 1), turned(mesh, 2, 2.5), turned(mesh, 3, 0.3))
     calls = []
-    flatten_component = pipeline.flatten_component
-
-    def counted(*arguments: object) -> object:
-        for layout in flatten_component(*arguments):  # type: ignore[arg-type]
-            calls.append(layout)
-            yield layout
-
-    monkeypatch.setattr(pipeline, "flatten_component", counted)
+    lay_out_part = method.lay_out_part
+    monkeypatch.setattr(method, "lay_out_part", lambda *some: calls.append(some) or lay_out_part(*some))
     found = coneflat.flatten(*whole)
-    assert len(calls) == 2  # the first layout and the last, of the first component
-    monkeypatch.setattr(pipeline, "find_copies", lambda parts, options: [None] * len(parts))
+    assert len(calls) == 1
+    monkeypatch.setattr(method, "find_copies", lambda parts: [None] * len(parts))
     alone = coneflat.flatten(*whole)
-    assert len(calls) == 2 + 8
+    assert len(calls) == 1 + 4
     assert np.array_equal(found.cones, alone.cones)
     assert np.array_equal(found.seams, alone.seams)
     assert np.allclose(found.log_scale, alone.log_scale, rtol=0, atol=1e-7)
     assert np.allclose(sides_of(found), sides_of(alone), rtol=1e-7)
     assert found.distortion.flipped == 0
-    assert len(found.symmetry) == len(alone.symmetry)
-    for one, other in zip(found.symmetry, alone.symmetry, strict=True):
-        assert np.allclose(one.normal, other.normal, atol=1e-9)
-        assert np.allclose(one.offset, other.offset, atol=1e-9)
-
-
-def test_groups_that_are_relaxed_together_may_be_copies_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh = joined(bump(), *(turned(bump(), seed) for seed in range(6)))
-    whole = coneflat.flatten(*mesh)
-    # Of three components each: one and two copies, three copies, one copy.
-    monkeypatch.setattr(pipeline, "TOGETHER", 2 * len(bump()[1]) + 1)
-    parted = coneflat.flatten(*mesh)
-    assert np.array_equal(parted.cones, whole.cones)
-    np.testing.assert_allclose(parted.distortion.qc, whole.distortion.qc, rtol=1e-9)

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import re
-import sys
-from pathlib import Path
 
 import click
 import pytest
+from markers import ROOT
+from structure import PACKAGE
 
 import coneflat
 from coneflat.apps.cli.main import cli
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
-from house import PACKAGE
-from markers import ROOT
 
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("**/*.md"))]
 #: A flag, not a part of a word or of a line.

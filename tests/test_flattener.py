@@ -10,19 +10,17 @@ import shapes
 
 import coneflat
 from coneflat import errors
+from coneflat.base.progress import asking
 from coneflat.cones.sparse import green
-from coneflat.cones.sparse.green import SIDE_BY_SIDE, GreenOperator
-from coneflat.geometry import cotangent_laplacian, cotangents, edge_lengths
-from coneflat.mesh import label_faces
-from coneflat.progress import asking
-from coneflat.solver import factorize
+from coneflat.linalg import factorize
+from coneflat.mesh.connectivity import label_faces
 
 
 def assert_same(one, other):
     for name in ("uv", "uv_faces", "cones", "curvatures", "log_scale", "seams"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), name)
     assert one.distortion.qc_mean == other.distortion.qc_mean
-    assert (one.notes, one.solvers) == (other.notes, other.solvers)
+    assert one.notes == other.notes
 
 
 def wavy(resolution=3):
@@ -38,21 +36,16 @@ def two_parts():
 
 #: One after the other: places alone, some angles, all, a search, weights, seams, other borders, none of it.
 ASKED = (
-    {"required_cones": [5, 60, 140, 300], "allowed_cones": [5, 60, 140, 300]},
-    {"required_cones": [5, 61, 140, 300], "allowed_cones": [5, 61, 140, 300]},
+    {"cone_count": 4, "required_cones": [5, 60, 140, 300]},
     {"cones": {5: 3.0, 61: None, 140: None, 300: None}},
-    {"cones": {5: 3.1, 61: None, 141: None, 300: None}},
     {"cones": {5: np.pi, 61: np.pi, 141: np.pi, 300: np.pi}},
-    {"cones": [5, 61, 141, 300]},
     {"cone_count": 5},
     {"weights": np.linspace(1, 4, 642)},
     {"weights": np.linspace(2, 1, 642), "required_cones": [5, 61]},
-    {"seams": [[0, 12]], "forbidden_seams": [[0, 44]]},
+    {"seams": [[0, 12]], "no_seams": [[0, 44]]},
     {"hide_seams": 1.0, "charts": "one"},
-    {"solver": "scipy", "cones": {5: 3.0, 61: None, 140: None, 300: None}},
     {"method": "linear", "cones": {5: 3.0, 61: None, 140: None, 300: None}},
     {"distortion": 0.1},
-    {"distortion": 0.2},
 )
 
 
@@ -62,7 +55,7 @@ def test_the_same_as_each_time_anew():
     flattener = coneflat.Flattener(*mesh)
     for asked in ASKED:
         asked = dict(asked)
-        for name, at in (("seams", 3), ("forbidden_seams", 400)):
+        for name, at in (("seams", 3), ("no_seams", 400)):
             if name in asked:
                 asked[name] = edges[at : at + 1]
         assert_same(flattener.flatten(**asked), coneflat.flatten(*mesh, **asked))
@@ -73,7 +66,7 @@ def test_the_same_as_each_time_anew():
     [
         (shapes.hill(14, 14), [{"cones": {100: 0.5}}, {"boundary": "disk"}, {"cones": {101: 0.5, 40: None}}]),
         (two_parts(), [{"cone_count": 4}, {"cones": {5: None, 60: 3.0, 140: None}}, {"sharp_angle": 1.0}]),
-        (shapes.torus(), [{}, {"quantise": np.pi / 2}, {"cones": {3: 0.5, 90: None}}, {"refine": True}]),
+        (shapes.torus(20, 10), [{}, {"quantise": np.pi / 2}, {"cones": {3: 0.5, 90: None}}]),
     ],
 )
 def test_borders_parts_and_handles(mesh, asked):
@@ -96,7 +89,7 @@ def test_many_moves_factorize_the_mesh_once(monkeypatch):
     for step in range(6):
         cones = {5: 3.0, 60 + step: None, 140: None, 300 - step: None}
         flattener.flatten(cones=cones)
-        flattener.flatten(required_cones=list(cones), allowed_cones=list(cones))
+        flattener.flatten(cone_count=len(cones), required_cones=list(cones))
     assert len(made) == 1
 
 
@@ -112,27 +105,27 @@ def test_another_mesh_of_it_drops_what_was_kept():
         flattener.flatten(seams=edges[10 * k : 10 * k + 2])
         assert first not in flattener._surfaces.values()
         assert len(flattener._surfaces) == 1
-    assert all(surface.search is None for surface in flattener._surfaces.values())
+    assert all("search" not in surface.memo for surface in flattener._surfaces.values())
 
 
 class Enough(Exception):
     pass
 
 
-@pytest.mark.parametrize("how", ["told", "asked"])
-def test_what_is_given_up_leaves_nothing_behind(how):
+@pytest.mark.parametrize(("how", "step"), [("told", 12), ("asked", 2)])
+def test_what_is_given_up_leaves_nothing_behind(how, step):
     mesh, asked = wavy(), {"cones": {5: 3.0, 60: None, 140: None, 300: None}}
     expected = coneflat.flatten(*mesh, **asked)
     flattener = coneflat.Flattener(*mesh)
     interrupted = 0
-    for stop in range(1, 200):
+    for stop in range(1, 200, step):
         calls = count(1)
 
         def interrupt(*_, calls=calls, stop=stop):
             if next(calls) == stop:
                 raise Enough
 
-        options = {"required_cones": [5, 60 + stop, 300], "allowed_cones": [5, 60 + stop, 300]}
+        options = {"cone_count": 3, "required_cones": [5, 60 + stop, 300]}
         try:
             if how == "told":
                 flattener.flatten(**options, progress=interrupt)
@@ -141,39 +134,14 @@ def test_what_is_given_up_leaves_nothing_behind(how):
                     flattener.flatten(**options)
         except Enough:
             interrupted += 1
-            if stop % 4 == 1:
-                assert_same(flattener.flatten(**asked), expected)
+            assert_same(flattener.flatten(**asked), expected)
         else:
             break
-    assert interrupted > 4
+    assert interrupted > 1
 
 
-@pytest.mark.parametrize("bound", ["KEPT", "MOST_KEPT"])
-def test_green_functions_kept_are_those_found_anew(monkeypatch, bound):
-    vertices, faces = wavy()
-    laplacian = cotangent_laplacian(faces, cotangents(edge_lengths(vertices, faces)), len(vertices))
-    areas = np.full(len(vertices), 1 / len(vertices))
-
-    def operator():
-        return GreenOperator(laplacian, areas, np.zeros(len(vertices), dtype=bool), np.arange(len(vertices)))
-
-    monkeypatch.setattr(green, bound, 10 * len(vertices) if bound == "KEPT" else 10)
-    kept, rng = operator(), np.random.default_rng(1)
-    for size in (1, 7, SIDE_BY_SIDE, 12, 3, 2, 9):
-        unknowns = rng.choice(30, size, replace=False)
-        found = kept.known_responses(unknowns)
-        np.testing.assert_array_equal(found, operator().known_responses(unknowns))
-        np.testing.assert_allclose(found, operator().responses(unknowns), atol=1e-12)
-        assert len(kept._known) <= 10
-    assert set(kept._known) >= set(unknowns.tolist())
-    heavier = kept.weighing(np.linspace(1, 2, len(vertices)) / (1.5 * len(vertices)))
-    assert heavier._factorized is kept._factorized
-    assert not heavier._known
-
-
-@pytest.mark.parametrize("mesh", [wavy(), two_parts()])
-def test_a_first_layout_comes_early(mesh):
-    told, early = [], []
+def test_a_first_layout_comes_early():
+    mesh, told, early = two_parts(), [], []
 
     def show(first):
         early.append(first)

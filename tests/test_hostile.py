@@ -1,32 +1,25 @@
-"""Nothing brings the package down, and what it reports is what comes out: a slice of benchmarks/hostile.py.
-
-The checks themselves are put to the test, too: on results with planted faults, and on cases that crash or hang.
-"""
+"""The hostile trial and the trial of grids: a slice of their cases, and planted faults that their checks find."""
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import shapes
+from trials.cases import cases, run_case
+from trials.grids import check_grid, check_quads
+from trials.outcome import Outcome
+from trials.promises import check
+from trials.workers import MEMORY, run_all
+from trials.written import check_file
 
 import coneflat
+from coneflat import integer_grid
+from coneflat import quads as find_quads
 
-BENCHMARKS = str(Path(__file__).resolve().parents[1] / "benchmarks")
-if BENCHMARKS not in sys.path:
-    sys.path.append(BENCHMARKS)
-
-from trials.cases import cases, run_case  # noqa: E402
-from trials.outcome import Outcome  # noqa: E402
-from trials.promises import check  # noqa: E402
-from trials.workers import MEMORY, run_all  # noqa: E402
-from trials.written import check_file  # noqa: E402
-
-#: Cases of the slice, about half a minute.
-SLICE = 200
+#: Cases of the slice.
+SLICE = 100
 
 
 def outcomes_of(chosen, **limits):
@@ -134,12 +127,18 @@ def test_a_planted_fault_is_found(ball, fault, cause):
     assert cause in breaches_of(planted(result, fault), options, *mesh)
 
 
-def test_a_fault_that_a_note_names_is_no_breach(ball):
+def test_a_fault_that_its_own_note_names_is_no_breach(ball):
     result, options, mesh = ball
-    moved = planted(result, "other cone")
-    assert "cones: sum of curvatures" in breaches_of(moved, options, *mesh)
-    noted = replace(moved, notes=("The sum of curvatures is off at 1 cone.",))
-    assert "cones: sum of curvatures" not in breaches_of(noted, options, *mesh)
+    turned, cause = planted(result, "upside down"), "triangles upside down, exact"
+    for notes, is_breach in (
+        ((), True),
+        (("2 cones too wide for the triangles around: that at vertex 3 has an angle of 3 pi.",), True),
+        (("5 pairs of triangles overlap in the atlas, 0.1 of the area that it covers.",), True),
+        (("There is 1 triangle upside down in the plane: refine the mesh there.",), False),
+    ):
+        assert (cause in breaches_of(replace(turned, notes=notes), options, *mesh)) == is_breach
+    other = replace(planted(result, "other cone"), notes=("The sum of curvatures is off at 1 cone.",))
+    assert "cones: sum of curvatures" in breaches_of(other, options, *mesh)
 
 
 @pytest.mark.parametrize("ending", [".obj", ".ply", ".glb", ".npz"])
@@ -151,3 +150,55 @@ def test_a_file_of_another_layout_is_found(ball, tmp_path, ending):
     assert not sound.breaches
     check_file(other, replace(result, uv=0.99 * result.uv), path)
     assert any("another layout" in cause or "differently" in cause for cause, _ in other.breaches)
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("seed", range(1, 8))
+def test_no_case_is_a_breach(seed):
+    outcome = run_case("grid", seed)
+    assert not outcome.breaches
+
+
+@pytest.fixture(scope="module")
+def gridded():
+    grid = integer_grid(*shapes.sphere(3), quads=60)
+    return grid, find_quads(grid)
+
+
+def causes(check, *arguments):
+    outcome = Outcome("grid", 0)
+    check(outcome, *arguments)
+    return " ".join(cause for cause, _ in outcome.breaches)
+
+
+def test_grids_that_break_promises_are_found(gridded):
+    grid, _ = gridded
+    assert causes(check_grid, grid, {}) == ""
+    moved = grid.corner_grid.copy()
+    moved[5, 1] += 1e-9
+    assert "do not fit exactly" in causes(check_grid, replace(grid, corner_grid=moved), {})
+    assert "cones beyond bounds" in causes(check_grid, grid, {"min_cone_angle": 2 * np.pi})
+    turned = grid.corner_grid[:, ::-1]
+    assert "turned over" in causes(check_grid, replace(grid, corner_grid=turned), {})
+    assert "angles" in causes(check_grid, replace(grid, quarters=grid.quarters + 1), {})
+
+
+def test_quads_that_break_promises_are_found(gridded):
+    grid, mesh = gridded
+    assert causes(check_quads, mesh, grid) == ""
+    without = causes(check_quads, replace(mesh, quads=mesh.quads[1:]), grid)
+    assert "Euler" in without
+    assert "squares" in without
+    turned = mesh.quads.copy()
+    turned[3] = turned[3, ::-1]
+    assert "same side" in causes(check_quads, replace(mesh, quads=turned), grid)
+    off = mesh.vertices.copy()
+    off[0] *= 1.001
+    assert "off the surface" in causes(check_quads, replace(mesh, vertices=off), grid)
+    folded = mesh.quads.copy()
+    folded[2, 1] = folded[2, 0]
+    assert "twice" in causes(check_quads, replace(mesh, quads=folded), grid)

@@ -10,9 +10,10 @@ import pytest
 import shapes
 
 import coneflat
-from coneflat import errors, find_seams
-from coneflat.input.arrays import as_input
-from coneflat.options import LEAST_QUANTUM
+from coneflat import errors
+from coneflat.base.defaults import LEAST_QUANTUM
+from coneflat.io.input_mesh import as_input
+from coneflat.seams import find_seams
 
 # What no option is.
 ODD = (
@@ -91,7 +92,7 @@ def test_weights_over_six_hundred_orders_of_magnitude_do_no_harm():
     for seed in range(3):
         spread = 10.0 ** np.random.default_rng(seed).uniform(-300, 300, len(vertices))
         result = coneflat.flatten(
-            vertices, faces, weights=spread, seam_weights=spread, hide_seams=10, creases=10
+            vertices, faces, weights=spread, seam_weights=spread, hide_seams=10, sharp_angle=3.0
         )
         assert np.isfinite(result.uv).all()
     alone = np.zeros(len(vertices))
@@ -111,10 +112,15 @@ def test_costs_of_seams_that_overflow_when_summed():
             find_seams(mesh, cones, bad)
 
 
-@pytest.mark.parametrize("quantum", [1e-20, 1e-300, LEAST_QUANTUM / 2, math.nan, math.inf, -1.0, 7.0])
+@pytest.mark.parametrize("quantum", [1e-20, 1e-300, LEAST_QUANTUM / 2, math.inf, -1.0, 7.0])
 def test_a_quantum_outside_its_bounds_is_refused_with_them(quantum):
     with pytest.raises(errors.OptionError, match="quantum must be from 0.0001 radians"):
         coneflat.flatten(*shapes.sphere(1), quantise=quantum)
+
+
+def test_a_quantum_that_is_not_a_number_is_refused():
+    with pytest.raises(errors.OptionError, match="quantise must be a number, not nan"):
+        coneflat.flatten(*shapes.sphere(1), quantise=math.nan)
 
 
 def test_the_least_quantum_gives_its_multiples():

@@ -11,7 +11,7 @@ import coneflat
 
 
 def test_every_public_name_is_there():
-    assert set(coneflat.__all__) == {*coneflat._HOMES, "errors", "__version__"}
+    assert set(coneflat.__all__) == {*coneflat._HOMES, *coneflat._MODULES, "__version__"}
     for name in coneflat.__all__:
         assert getattr(coneflat, name) is not None
     assert set(coneflat.__all__) <= set(dir(coneflat))
@@ -34,7 +34,7 @@ def test_errors_have_one_root():
 
 
 def test_kernels_compiled_ahead_are_all_that_flattening_needs(tmp_path):
-    """What compiles after `coneflat.ahead` in a new process was missed: other kernels or other types."""
+    """What compiles after `coneflat.apps.ahead` in a new process was missed: other kernels or other types."""
     vertices, faces = sphere(5)
     np.savez(tmp_path / "mesh.npz", vertices=vertices, faces=faces)
     script = """
@@ -53,13 +53,12 @@ class Listener(event.Listener):
 event.register("numba:compile", Listener())
 with numpy.load(sys.argv[1]) as mesh:
     vertices, faces = mesh["vertices"], mesh["faces"]
-flat = one = coneflat.flatten(vertices, faces, charts="atlas")
-coneflat.pack_together([one, one])
+flat = coneflat.flatten(vertices, faces, charts="atlas")
 coneflat.flatten(coneflat.read_mesh(flat.save(sys.argv[1] + ".obj"), weld=True))
 coneflat.flatten(vertices, faces[5:], min_cone_angle=0.3, max_cones=6)
 coneflat.flatten(coneflat.sample_path(), method="linear")
 """
-    subprocess.run([sys.executable, "-m", "coneflat.ahead"], check=True)
+    subprocess.run([sys.executable, "-m", "coneflat.apps.ahead"], check=True)
     compiled = subprocess.run(
         [sys.executable, "-c", script, tmp_path / "mesh.npz"], capture_output=True, text=True, check=True
     )
@@ -67,7 +66,7 @@ coneflat.flatten(coneflat.sample_path(), method="linear")
 
 
 def test_flattening_a_file_loads_no_more_than_it_uses(tmp_path):
-    """Outside a terminal there are no tables of rich; and no search for symmetry asks for near points."""
+    """Outside a terminal there are no tables of rich, and nothing searches for near points."""
     script = """
 import sys
 from coneflat.apps.cli.main import cli
@@ -77,15 +76,15 @@ print(*sys.modules)
     command = [sys.executable, "-c", script, coneflat.sample_path(), tmp_path / "flat.obj"]
     printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split("\n")
     unused = {"trimesh", "matplotlib", "PIL", "rich", "scipy.spatial", "scipy.optimize", "pypardiso"}
-    assert "coneflat.pipeline" in printed[-2].split()
+    assert "coneflat.flatten" in printed[-2].split()
     assert not unused & set(printed[-2].split())
 
 
 def test_a_kernel_that_was_loaded_is_compiled_into_others(tmp_path):
     """To load one leaves out what only compiling needs; what is compiled with it has all of it."""
     (tmp_path / "counting.py").write_text("""
-from coneflat.compiled import compiled
-from coneflat.mesh import label_nodes
+from coneflat.base.compiled import compiled
+from coneflat.mesh.connectivity import label_nodes
 
 @compiled
 def count(nodes, tails, heads):

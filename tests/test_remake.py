@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import re
-import sys
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
-from house import draw_house, rooms_drawn, rooms_of
 from markers import NUMBER, PAGES, ROOT, blocks, fill, fill_numbers
 from measured import Measured
 from remake import remake_options
+from structure import draw_structure, packages_by_level, packages_drawn
 from tables import TABLES, fill_page
 
 SAYS = "python tools/remake.py remakes it"
@@ -23,10 +19,10 @@ def test_tables_of_options_are_those_declared():
         assert page.read_text(encoding="utf-8") == text, f"{page.name} is out of date: {SAYS}"
 
 
-def test_the_drawing_shows_the_house():
-    drawing = (ROOT / "docs" / "images" / "house.svg").read_text(encoding="utf-8")
-    assert rooms_drawn(drawing) == [[room.name for room in floor] for floor in rooms_of()], (
-        f"house.svg: {SAYS}"
+def test_the_drawing_shows_the_structure():
+    drawing = (ROOT / "docs" / "images" / "structure.svg").read_text(encoding="utf-8")
+    assert packages_drawn(drawing) == [[one.name for one in level] for level in packages_by_level()], (
+        f"structure.svg: {SAYS}"
     )
 
 
@@ -79,13 +75,13 @@ def test_names_of_tables_and_numbers_are_known():
             assert re.search(r"\d", match["value"]), match["what"]
 
 
-def test_a_house_is_drawn_from_imports(tmp_path):
-    (tmp_path / "errors.py").write_text('"""All that goes wrong."""\n')
-    (tmp_path / "mesh.py").write_text('"""Meshes."""\n\nfrom . import errors\n')
-    floors = [floor for floor in rooms_of(tmp_path) if floor]
-    assert [[room.name for room in floor] for floor in floors] == [["errors"], ["mesh"]]
-    (mesh,) = floors[1]
-    assert (mesh.files, mesh.lines, mesh.below) == (1, 3, {"errors"})
-    drawing = draw_house(tmp_path)
-    assert rooms_drawn(drawing) == [["errors"], ["mesh"]]
+def test_the_structure_is_drawn_from_imports(tmp_path):
+    (tmp_path / "base.py").write_text('"""What every package uses."""\n')
+    (tmp_path / "mesh.py").write_text('"""Meshes."""\n\nfrom . import base\n')
+    found = packages_by_level(tmp_path)
+    assert [[one.name for one in level] for level in found] == [["base"], ["mesh"]]
+    (mesh,) = found[1]
+    assert (mesh.size.files, mesh.size.lines, mesh.below) == (1, 1, {"base"})
+    drawing = draw_structure(tmp_path)
+    assert packages_drawn(drawing) == [["base"], ["mesh"]]
     assert drawing.count("marker-end") == 1

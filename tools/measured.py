@@ -1,7 +1,7 @@
 """Measures of models, for the numbers and pictures of the documentation.
 
 A number in a sentence names itself: `<!-- n bunny charts=one qc_mean .3f -->` is a model, options of
-`coneflat.flatten` if there are any, a key of the report, and how it is written.
+`coneflat.flatten` if there are any, or `by=` another method, a key of the report, and how it is written.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from markers import ROOT
 
 import coneflat
 from coneflat.apps.cli.values import parse_angle
-from coneflat.apps.compare import Comparison, compare_methods
+from coneflat.apps.peers import Comparison, compare_methods, flatten_by
 from coneflat.options import Options, declarations
 
 sys.path.insert(0, str(ROOT / "tests"))
@@ -63,6 +63,10 @@ class Measured:
                 result = coneflat.flatten(*shapes.sphere(5), **options)
             elif self.path(model) is None:
                 return None
+            elif "by" in options:
+                print(f"  {model} {options}", flush=True)
+                chosen = dict(options)
+                result = flatten_by(chosen.pop("by"), self.path(model), **chosen)
             elif not options:
                 result = self.flattening(model)
             else:
@@ -92,7 +96,9 @@ def number_text(measured: Measured, what: str, was: str) -> str:
 
 def _value(name: str, text: str) -> Any:
     """Return what the text of an option means."""
-    kind = declarations(Options)[name][1].kind
+    if name == "by":
+        return text
+    kind = declarations(Options)[name].kind
     if getattr(kind, "is_angle", False):
         return parse_angle(text)
     try:

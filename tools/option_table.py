@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import MISSING, Field
-from typing import Any
+from collections.abc import Callable
 
 from coneflat.apps.cli.main import cli
-from coneflat.apps.cli.options import flag_of, own_first, shown_default
-from coneflat.options import QuadOptions
+from coneflat.apps.cli.options import flag_of, shown_default
+from coneflat.apps.quads.options import QuadOptions
+from coneflat.options import declarations
 from coneflat.options.declared import (
     AtlasOptions,
     ConeOptions,
@@ -17,24 +16,22 @@ from coneflat.options.declared import (
     MetricOptions,
     RunOptions,
     SeamOptions,
-    SymmetryOptions,
 )
 from coneflat.options.kinds import (
     Choice,
-    Count,
     Direction,
     Edges,
     Flag,
     Kind,
     Number,
-    Strength,
     Vertices,
+    VerticesOrEdges,
     Weights,
     WordOrVertices,
 )
 
 #: As people think of them; each group's docstring is its title.
-GROUPS = (ConeOptions, MetricOptions, SeamOptions, SymmetryOptions, AtlasOptions, RunOptions)
+GROUPS = (ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
 
 
 def flag_tables() -> str:
@@ -59,39 +56,34 @@ def quad_keyword_table() -> str:
 
 def _flag_table(group: type, command: str = "flatten") -> str:
     rows = [
-        (_flags(name, command), _values(declaration.kind), _flag_default(field, declaration), declaration.doc)
-        for name, field, declaration in _options(group)
-        if declaration.flag
+        (_flags(each.name, command), _values(each.kind), _flag_default(each), each.doc)
+        for each in declarations(group).values()
+        if each.flag
     ]
-    return _table(group, "option", rows, lambda name: f"`{flag_of(name)}`")
+    return _table(
+        group, "option", rows, lambda name: f"`{flag_of(name)}`" if declarations(group)[name].flag else ""
+    )
 
 
 def _keyword_table(group: type) -> str:
     rows = [
-        (f"`{name}`", _python_values(declaration.kind), _python_default(field), declaration.doc)
-        for name, field, declaration in _options(group)
+        (f"`{each.name}`", _python_values(each.kind), _python_default(each), each.doc)
+        for each in declarations(group).values()
     ]
     return _table(group, "keyword", rows, "`{}`".format)
 
 
 def _table(group: type, noun: str, rows: list[tuple[str, ...]], spelled: Callable[[str], str]) -> str:
-    """Return a group's title, its table, and what only one search for cones has of it."""
+    """Return a group's title, its table, and what only the sparse search has of it."""
     title = (group.__doc__ or "").split("\n")[0].rstrip(".")
     lines = [f"### {title}", "", f"| {noun} | values | default | meaning |", "| --- " * 4 + "|"]
     for row in rows:
         assert not any("|" in cell for cell in row), row
         lines.append(f"| {' | '.join(row)} |".replace("  ", " "))
-    for search in ("pursuit", "greedy") if group in GROUPS else ():
-        names = [name for name, _, declaration in _options(group) if declaration.only == search]
-        if names:
-            lines += ["", f"Only `{search}` cones take {', '.join(map(spelled, names))}."]
+    names = [name for name, each in declarations(group).items() if each.only == "sparse"]
+    if names and group in GROUPS:
+        lines += ["", f"Only `sparse` cones take {', '.join(filter(None, map(spelled, names)))}."]
     return "\n".join(lines)
-
-
-def _options(group: type) -> Iterator[tuple[str, Field[Any], Declaration]]:
-    """Yield a group's options, its own before those of what it is made of."""
-    for name, (field, declaration) in own_first(group):
-        yield name, field, declaration
 
 
 def _flags(name: str, command: str) -> str:
@@ -113,29 +105,31 @@ def _values(kind: Kind) -> str:
     match kind:
         case Flag():
             return ""
+        case Choice():
+            return ", ".join(_words(kind))
         case Number(is_angle=True):
             return "`1.57`, `pi/2`, `90deg`"
-        case Strength():
-            return f"{kind.bounds}; alone it is 1"
+        case Number():
+            return f"{kind.text}; alone it is 1" if kind.is_strength else kind.text
         case Direction():
             return "`z`, `-y`, `0,0.5,1`"
         case Vertices():
             return "`3,17,8` or a file"
+        case VerticesOrEdges():
+            return "`3,17,8`, or a file of such or of pairs"
         case WordOrVertices():
             return ", ".join([*_words(kind), "`3,17`, `3:pi/2,17:-1.5`", "or a file"])
         case Edges():
             return " or ".join([*_words(kind), "a file of pairs"])
         case Weights():
             return "a name or a file"
-        case Count():
-            return f"a number {kind.bounds}"
-    return kind.bounds or "a number"
+    return ""
 
 
-def _flag_default(field: Field[Any], declaration: Declaration) -> str:
-    if isinstance(declaration.kind, Flag) and (declaration.command_default or field.default is True):
+def _flag_default(declaration: Declaration) -> str:
+    if isinstance(declaration.kind, Flag) and (declaration.command_default or declaration.default is True):
         return "yes"
-    shown = shown_default(field)
+    shown = shown_default(declaration)
     return f"`{shown}`" if shown else ""
 
 
@@ -153,24 +147,24 @@ def _python_values(kind: Kind) -> str:
             return ", ".join(each for each in (words, more.get(type(kind), "")) if each)
         case Vertices():
             return "a list of vertices"
+        case VerticesOrEdges():
+            return "(k,) vertices, or (k, 2) pairs of them"
         case Direction():
             return "three numbers"
         case Number(is_angle=True):
             return "radians"
-        case Count():
-            return f"a whole number {kind.bounds}"
-        case Kind() if type(kind) is Kind:
-            return "a function"
-    return kind.bounds or "a number"
+        case Number():
+            return kind.text
+        case Weights():
+            return "(n,) numbers from 0, some vertices with theirs, or the name of a property"
+    return "a function"
 
 
-def _python_default(field: Field[Any]) -> str:
-    value = field.default
-    assert value is not MISSING
-    if isinstance(value, float) and isinstance(field.metadata["declaration"].kind, Number):
+def _python_default(declaration: Declaration) -> str:
+    value, kind = declaration.default, declaration.kind
+    if isinstance(value, float) and isinstance(kind, Number) and kind.is_angle:
         turns = value / math.pi
-        if field.metadata["declaration"].kind.is_angle:
-            return f"{turns:g} π" if turns >= 1 else f"π/{1 / turns:g}"
+        return f"{turns:g} π" if turns >= 1 else f"π/{1 / turns:g}"
     return (
         f"`{value:g}`"
         if isinstance(value, float)

@@ -21,16 +21,16 @@ from scipy.sparse import csr_matrix, identity
 from tables import ALLOWED, GALLERY, TRADED, TRADEOFF, tradeoff
 
 import coneflat
-from coneflat.apps.compare.pictures import draw_layouts
+from coneflat.apps.peers.pictures import draw_layouts
+from coneflat.apps.peers.run import COMPARED
+from coneflat.apps.view import demo_figure, draw_checker, draw_cones, draw_curvature, draw_layout, new_figure
+from coneflat.apps.view.figures.camera import view_aspect
+from coneflat.apps.view.figures.compose import Panel, Row, compose
+from coneflat.apps.view.figures.cone_marks import mark_handles
+from coneflat.apps.view.figures.model import draw_quantity
+from coneflat.apps.view.figures.uv_layout import layout_aspect
+from coneflat.apps.view.quantity import ColorScale, Quantity, curvature
 from coneflat.geometry.operators import vertex_areas
-from coneflat.options import METHODS
-from coneflat.view import demo_figure, new_figure
-from coneflat.view.figures.camera import view_aspect
-from coneflat.view.figures.compose import Panel, Row, compose
-from coneflat.view.figures.cone_marks import mark_handles
-from coneflat.view.figures.model import draw_quantity
-from coneflat.view.figures.uv_layout import layout_aspect
-from coneflat.view.quantity import ColorScale, Quantity, curvature
 
 sys.path.insert(0, str(ROOT / "tests"))
 import shapes
@@ -131,9 +131,7 @@ def curvature_figure(measured: Measured) -> Any:
     exact = measured.flattening("bunny")
     labels = ("On the model", "After the linear metric", "After the exact metric")
     panels = [
-        Panel(
-            view_aspect(result.vertices), partial(coneflat.draw_curvature, result, flat=flat, dpi=DPI), label
-        )
+        Panel(view_aspect(result.vertices), partial(draw_curvature, result, flat=flat, dpi=DPI), label)
         for result, flat, label in zip((exact, linear, exact), (False, True, True), labels, strict=True)
     ]
     left = [
@@ -154,9 +152,7 @@ def quarters_figure(measured: Measured) -> Any:
         f"Multiples of a quarter turn, to {off} rad: {len(quarters.cones)} cones",
     )
     panels = [
-        Panel(
-            view_aspect(result.vertices), partial(coneflat.draw_checker, result, cones=True, dpi=DPI), label
-        )
+        Panel(view_aspect(result.vertices), partial(draw_checker, result, cones=True, dpi=DPI), label)
         for result, label in zip((free, quarters), labels, strict=True)
     ]
     return compose([Row(panels)], marks=mark_handles(free), dpi=DPI)
@@ -172,9 +168,11 @@ def on_vertices(result: coneflat.Flattening, values: Any, colors: str, percent: 
 def even_curvature(result: coneflat.Flattening, rounds: int = 4) -> Any:
     """Return the curvature per area at the vertices, each the mean of what is around."""
     faces, count = result.faces, len(result.vertices)
-    lengths = coneflat.edge_lengths(result.vertices, faces)
+    lengths = coneflat.geometry.edge_lengths(result.vertices, faces)
     mesh = coneflat.TriangleMesh(result.vertices, faces)
-    curvature = coneflat.angle_defect(faces, coneflat.corner_angles(lengths), mesh.is_boundary_vertex)
+    curvature = coneflat.geometry.angle_defect(
+        faces, coneflat.geometry.corner_angles(lengths), mesh.is_boundary_vertex
+    )
     area = vertex_areas(faces, lengths, count)
     ends = faces[:, [0, 1, 2, 1, 2, 0]].ravel(), faces[:, [1, 2, 0, 0, 1, 2]].ravel()
     around = identity(count) + csr_matrix((np.ones(len(ends[0])), ends), shape=(count, count))
@@ -196,25 +194,23 @@ def steps_figure(measured: Measured) -> Any:
 
     def draw_dots(axes: Any) -> None:
         bare = replace(result, seams=np.empty((0, 2), dtype=np.int64))
-        coneflat.draw_cones(bare, axes, eye=eye, **look)
+        draw_cones(bare, axes, eye=eye, **look)
 
     aspect = view_aspect(result.vertices, eye)
     model = [
         (partial(draw, curved), "1  Curvature of the model"),
         (draw_dots, f"2  Cones that are to carry it: {len(result.cones)}"),
         (partial(draw, scaled), "3  Metric: scaled to be flat"),
-        (partial(coneflat.draw_cones, result, eye=eye, **look), "4  Cut through the cones"),
+        (partial(draw_cones, result, eye=eye, **look), "4  Cut through the cones"),
     ]
     panels = [Panel(aspect, drawn, label) for drawn, label in model]
     panels += [
         Panel(
             aspect,
-            partial(coneflat.draw_layout, result, edges=False, crop=True),
+            partial(draw_layout, result, edges=False, crop=True),
             "5  Layout of the flat metric",
         ),
-        Panel(
-            aspect, partial(coneflat.draw_checker, result, eye=eye, **look), "6  What it puts on the model"
-        ),
+        Panel(aspect, partial(draw_checker, result, eye=eye, **look), "6  What it puts on the model"),
     ]
     return compose([Row(panels[:3]), Row(panels[3:])], dpi=DPI, marks=mark_handles(result))
 
@@ -225,31 +221,13 @@ def gallery_figure(model: str, measured: Measured) -> Any:
     panels = [
         Panel(
             view_aspect(result.vertices, eye, up),
-            partial(coneflat.draw_checker, result, eye=eye, up=up, cones=True, dpi=GALLERY_DPI),
+            partial(draw_checker, result, eye=eye, up=up, cones=True, dpi=GALLERY_DPI),
         )
         for eye in eyes
     ]
-    layout = partial(coneflat.draw_layout, result, edges=False, color_charts=True, crop=True)
+    layout = partial(draw_layout, result, edges=False, color_charts=True, crop=True)
     panels.append(Panel(layout_aspect(result, crop=True), layout))
     return compose([Row(panels)], dpi=GALLERY_DPI, width=8.0)
-
-
-def symmetric_figure(measured: Measured) -> Any:
-    """Return a figure of a head and a body with symmetric cones and seams, and of their layouts."""
-    rows = []
-    for model in ("camelhead", "human"):
-        result = coneflat.flatten(measured.path(model), symmetric="auto")
-        panels = [
-            Panel(
-                view_aspect(result.vertices, eye, "y"),
-                partial(coneflat.draw_cones, result, eye=eye, up="y", dpi=GALLERY_DPI),
-            )
-            for eye in ("front", "back")
-        ]
-        layout = partial(coneflat.draw_layout, result, edges=False, color_charts=True, crop=True)
-        panels.append(Panel(layout_aspect(result, crop=True), layout))
-        rows.append(Row(panels))
-    return compose(rows, dpi=GALLERY_DPI, width=8.0, marks=mark_handles(result))
 
 
 def kind_figure(model: str, kind: str, measured: Measured) -> Any:
@@ -270,7 +248,7 @@ def shapes_figure(_: Measured) -> Any:
     for index, (title, (mesh, options)) in enumerate(SHAPES.items()):
         row, column = divmod(index, 4)
         axes = figure.add_axes((column / 4 + 0.01, 0.5 * (1 - row) + 0.01, 0.23, 0.42))
-        coneflat.draw_layout(coneflat.flatten(*mesh, **options), axes)
+        draw_layout(coneflat.flatten(*mesh, **options), axes)
         axes.set_title(title, size=9)
     return figure
 
@@ -282,8 +260,8 @@ def atlases_figure(measured: Measured) -> Any:
         result = measured.flattening(model)
         left, width = index / len(ATLAS_MODELS), 1 / len(ATLAS_MODELS)
         axes = figure.add_axes((left, 0.5, width, 0.46))
-        coneflat.draw_checker(result, axes, up=up, cones=True, dpi=GALLERY_DPI)
-        coneflat.draw_layout(result, figure.add_axes((left + 0.01, 0.02, width - 0.02, 0.46)))
+        draw_checker(result, axes, up=up, cones=True, dpi=GALLERY_DPI)
+        draw_layout(result, figure.add_axes((left + 0.01, 0.02, width - 0.02, 0.46)))
         charts = result.distortion.charts
         what = f"{model}: {len(result.cones)} cones, {charts} chart{'s'[: charts > 1]}"
         figure.text(left + width / 2, 0.975, what, size=9, ha="center", va="center")
@@ -292,7 +270,7 @@ def atlases_figure(measured: Measured) -> Any:
 
 def methods_figure(measured: Measured) -> Any:
     """Return a figure of the layouts of one model by all methods."""
-    return draw_layouts(measured.comparison("rocker-arm", METHODS))
+    return draw_layouts(measured.comparison("rocker-arm", COMPARED))
 
 
 #: What is drawn of the trade: the largest number shown for each.
@@ -326,7 +304,7 @@ def tradeoff_figure(measured: Measured) -> Any:
 
 def relaxed_figure(measured: Measured) -> Any:
     """Return a figure of the triangles around the most bent one, before and after they are relaxed."""
-    before, after = (coneflat.flatten(measured.path("3holes"), polish=polish) for polish in ("off", "auto"))
+    before, after = (coneflat.flatten(measured.path("3holes"), relax=relax) for relax in ("off", "auto"))
     worst = int(np.nanargmax(before.distortion.qc))
     figure = new_figure(8.0, 4.15, dpi=DPI)
     for index, (result, label) in enumerate(((before, "before"), (after, "after"))):
@@ -363,10 +341,8 @@ def dial_figure(measured: Measured) -> Any:
         result = coneflat.flatten(measured.path("bunny"), stretch=stretch)
         d = result.distortion
         label = f"stretch {stretch:g}: angles {d.qc_mean:.3f}, areas {d.area_std:.3f}"
-        panels.append(
-            Panel(view_aspect(result.vertices), partial(coneflat.draw_checker, result, dpi=DPI), label)
-        )
-        layout = partial(coneflat.draw_layout, result, edges=False, crop=True)
+        panels.append(Panel(view_aspect(result.vertices), partial(draw_checker, result, dpi=DPI), label))
+        layout = partial(draw_layout, result, edges=False, crop=True)
         layouts.append(Panel(layout_aspect(result, crop=True), layout))
     return compose([Row(panels), Row(layouts)], dpi=DPI)
 
@@ -384,7 +360,6 @@ PICTURES: dict[str, tuple[tuple[str, ...], Callable[[Measured], Any]]] = {
     **{f"{model}-{kind}": ((model,), partial(kind_figure, model, kind)) for model in LOOKS for kind in KINDS},
     **{f"{model}-curve": ((model,), partial(curve_figure, model)) for model in LOOKS},
     "atlas-models": (tuple(ATLAS_MODELS), atlases_figure),
-    "symmetric": (("camelhead", "human"), symmetric_figure),
     "methods": (("rocker-arm",), methods_figure),
     "tradeoff": (TRADED, tradeoff_figure),
     "quads": (("bunny",), quads_figure),

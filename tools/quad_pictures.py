@@ -11,11 +11,11 @@ from markers import ROOT
 from measured import Measured
 
 import coneflat
-from coneflat.view.figures.camera import view_aspect
-from coneflat.view.figures.compose import Panel, Row, compose
-from coneflat.view.figures.cone_marks import pixels_of
-from coneflat.view.figures.projection import render_mesh
-from coneflat.view.figures.quads import draw_quads
+from coneflat.apps.quads.figure import draw_quads
+from coneflat.apps.view.figures.camera import view_aspect
+from coneflat.apps.view.figures.compose import Panel, Row, compose
+from coneflat.apps.view.figures.cone_marks import pixels_of
+from coneflat.apps.view.figures.projection import render_mesh
 
 sys.path.insert(0, str(ROOT / "examples"))
 from catmull_clark import catmull_clark

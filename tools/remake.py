@@ -1,8 +1,8 @@
 """Remake what the documentation shows of the program: `python tools/remake.py`.
 
-Its parts are the tables of options, the drawing of the house, the numbers and the pictures. `--only options,house`
-takes some of them. `--check` changes nothing, and fails where something is out of date. Times are those of a machine,
-and are measured by `benchmarks/`.
+Its parts are the tables of options, the drawing of the structure, the numbers and the pictures;
+`--only options,structure` takes some of them. `--check` changes nothing, and fails where something is out of date.
+Times are those of a machine, and are measured by `benchmarks/`.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ def remake_options(_: argparse.Namespace | None = None) -> Iterator[tuple[Path, 
         yield DOCS / page, text
 
 
-def remake_house(_: argparse.Namespace) -> Iterator[tuple[Path, str]]:
-    """Yield the drawing of the house."""
-    from house import draw_house
+def remake_structure(_: argparse.Namespace) -> Iterator[tuple[Path, str]]:
+    """Yield the drawing of the structure."""
+    from structure import draw_structure
 
-    yield DOCS / "images" / "house.svg", draw_house()
+    yield DOCS / "images" / "structure.svg", draw_structure()
 
 
 def remake_numbers(arguments: argparse.Namespace) -> Iterator[tuple[Path, str]]:
@@ -65,7 +65,7 @@ def remake_pictures(arguments: argparse.Namespace) -> Iterator[tuple[Path, str]]
 
 PARTS: dict[str, Callable[[argparse.Namespace], Iterator[tuple[Path, str]]]] = {
     "options": remake_options,
-    "house": remake_house,
+    "structure": remake_structure,
     "numbers": remake_numbers,
     "pictures": remake_pictures,
 }

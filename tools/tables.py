@@ -15,9 +15,9 @@ from markers import ROOT, blocks, fill, fill_numbers
 from measured import Measured, number_text
 
 import coneflat
-from coneflat.apps.compare import Comparison
-from coneflat.apps.compare.published import MODELS as PUBLISHED
-from coneflat.options import METHODS, PAPER, VARIANTS
+from coneflat.apps.peers import METHODS, Comparison
+from coneflat.apps.peers.paper import MODELS as PUBLISHED
+from coneflat.options import PAPER
 
 README = (
     "sample", "fandisk", "rocker-arm", "hand", "bunny", "3holes", "face", "camelhead", "kitten", "horse",
@@ -216,13 +216,12 @@ def methods_table(measured: Measured, body: str) -> str:
     """Return what all methods make of ten models with the same cones and cut."""
     if not measured.has(*COMPARED):
         return body
-    names = sorted(METHODS + VARIANTS, key=lambda name: (METHODS.index(name.partition("/")[0]), name))
     comparisons = []
     for model in COMPARED:
-        comparisons.append(measured.comparison(model, tuple(names)))
+        comparisons.append(measured.comparison(model, METHODS))
     was = _rows_of(body)
     rows = []
-    for name in names:
+    for name in METHODS:
         found = np.array([_compared(comparison, name) for comparison in comparisons])
         error, _, _, flipped, _, mismatch = found.T
         qc, std, overlap = found[:, [1, 2, 4]].mean(axis=0)

@@ -44,7 +44,6 @@ DOORS = (
     "check_mesh",
     "cone_curve",
     "find_cones",
-    "pack_together",
     "save",
     "view",
     "make_figure",
@@ -60,12 +59,14 @@ class Calls:
         self.folder = folder
         vertices, faces = shapes.hill(5, 4)
         mesh = cf.check_mesh(vertices, faces).mesh
-        lengths = cf.edge_lengths(vertices, faces)
+        lengths = cf.geometry.edge_lengths(vertices, faces)
         result = cf.flatten(vertices, faces, max_cones=3)
-        angles = cf.corner_angles(lengths)
-        curvature = cf.angle_defect(faces, angles, mesh.is_boundary_vertex)
+        angles = cf.geometry.corner_angles(lengths)
+        curvature = cf.geometry.angle_defect(faces, angles, mesh.is_boundary_vertex)
         surface = {
-            "laplacian": cf.cotangent_laplacian(faces, cf.cotangents(lengths), len(vertices)),
+            "laplacian": cf.geometry.cotangent_laplacian(
+                faces, cf.geometry.cotangents(lengths), len(vertices)
+            ),
             "curvature": curvature,
             "is_boundary": mesh.is_boundary_vertex,
             "euler_characteristic": mesh.euler_characteristic,
@@ -73,9 +74,9 @@ class Calls:
         model = folder / "hill.obj"
         result.save(model)
         result.save(folder / "hill.npz")
-        costs = cf.edge_costs(mesh, lengths.ravel()[mesh.edge_halfedges[:, 0]])
+        costs = cf.seams.edge_costs(mesh, lengths.ravel()[mesh.edge_halfedges[:, 0]])
         inner = np.flatnonzero(~mesh.is_boundary_vertex)
-        seams = cf.find_seams(mesh, inner[:1], costs)
+        seams = cf.seams.find_seams(mesh, inner[:1], costs)
         self.result = result
         self.good: dict[str, dict[str, Any]] = {
             "flatten": {"mesh": vertices, "faces": faces},
@@ -84,7 +85,6 @@ class Calls:
             "check_mesh": {"vertices": vertices, "faces": faces, "repair": False},
             "cone_curve": {"mesh": vertices, "faces": faces, "most": 3},
             "find_cones": {"mesh": vertices, "faces": faces},
-            "pack_together": {"results": [result, result]},
             "save": {"path": folder / "out.obj"},
             "view": {"path": folder / "page.html"},
             "make_figure": {"shown": result, "kind": "layout"},
@@ -97,7 +97,7 @@ class Calls:
             "angle_defect": {"faces": faces, "angles": angles, "is_boundary_vertex": mesh.is_boundary_vertex},
             "cotangent_laplacian": {
                 "faces": faces,
-                "cots": cf.cotangents(lengths),
+                "cots": cf.geometry.cotangents(lengths),
                 "vertex_count": len(vertices),
             },
             "greedy_cones": dict(surface),
@@ -108,13 +108,16 @@ class Calls:
             "edge_costs": {"mesh": mesh, "lengths": lengths.ravel()[mesh.edge_halfedges[:, 0]]},
             "visible_share": {"vertices": vertices, "faces": faces},
             "cut_open": {"mesh": mesh, "seams": seams},
-            "least_squares_layout": {"disk": cf.cut_open(mesh, seams).mesh, "lengths": lengths},
+            "least_squares_layout": {"disk": cf.mesh.cut_open(mesh, seams).mesh, "lengths": lengths},
         }
 
     def function(self, name: str) -> Callable[..., Any]:
         import coneflat as cf
 
-        return getattr(self.result if name in ("save", "view") else cf, name)
+        if name in ("save", "view"):
+            return getattr(self.result, name)
+        homes = (cf, cf.geometry, cf.cones, cf.metric, cf.seams, cf.mesh, cf.layout)
+        return getattr(next(home for home in homes if hasattr(home, name)), name)
 
     def make(self, rng: Random) -> tuple[str, dict[str, Any], str]:
         """Return a function's name, arguments, and how they are odd."""
@@ -124,7 +127,7 @@ class Calls:
         arguments = dict(self.good[name])
         signature = inspect.signature(self.function(name)).parameters.values()
         every = [one.name for one in signature if one.kind in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY)]
-        every = [one for one in every if one not in ("progress", "solver")] or list(arguments)
+        every = [one for one in every if one != "progress"] or list(arguments)
         odd = []
         for _ in range(1 + (rng.random() < 0.2)):
             which = every[int(rng.integers(len(every)))]

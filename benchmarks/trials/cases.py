@@ -141,7 +141,7 @@ def _file(rng: Random, outcome: Outcome) -> None:
     outcome.recipe += f"; weld={weld}; {in_short(options)}"
     faces = None
     with outcome.guarded(expects_nan=True):
-        faces = coneflat.input.triangulate.triangulate(mesh.vertices, mesh.corners, mesh.offsets)[0]
+        faces = coneflat.geometry.triangulate.triangulate(mesh.vertices, mesh.corners, mesh.offsets)[0]
     if faces is not None:
         _flatten(rng, outcome, lambda: coneflat.flatten(mesh, **options), options, (mesh.vertices, faces))
 
@@ -196,7 +196,7 @@ def _plain(options: dict[str, Any]) -> dict[str, Any]:
         for name, value in options.items()
         if isinstance(value, (bool, int, float, str, list, dict))
     }
-    lists = ("cones", "boundary", "required_cones", "forbidden_cones", "allowed_cones")
+    lists = ("cones", "boundary", "required_cones", "forbidden_cones")
     return {
         name: value for name, value in plain.items() if name not in lists or isinstance(value, (list, dict))
     }

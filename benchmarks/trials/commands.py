@@ -92,7 +92,7 @@ def _value(rng: Random, option: click.Option) -> str:
         return str(rng.choice(["report.json", "numbers.txt", "pairs.txt", "missing.txt", "bad.obj", "."]))
     if kind.name == "float":
         return str(rng.choice([0.05, 0.2, 0.5, 1.0, 3.0]))
-    return str(rng.choice(["7", "12:0.5", "3", "exact", "linear", "lscm", "7,8", "flipped=0", "color"]))
+    return str(rng.choice(["7", "12:0.5", "3", "exact", "linear", "7,8", "flipped=0", "color"]))
 
 
 def _write_inputs(rng: Random, folder: Path) -> None:

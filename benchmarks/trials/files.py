@@ -211,7 +211,7 @@ def write_npz(rng: Random, vertices: np.ndarray, polygons: list[list[int]], dama
 
     result = coneflat.flatten(vertices, _triangles(polygons), charts="atlas", max_cones=8, repair=True)
     stream = io.BytesIO()
-    from coneflat.files.npz import write_npz as write
+    from coneflat.io.npz import write_npz as write
 
     write(result, stream)
     if not damage:

@@ -165,7 +165,7 @@ def one_sided(rng: Random) -> Mesh:
 def _model(path: Path) -> tuple[np.ndarray, np.ndarray, list[list[int]]]:
     """Return a model and the faces at each vertex."""
     from coneflat import check_mesh, read_mesh
-    from coneflat.input.triangulate import triangulate
+    from coneflat.geometry.triangulate import triangulate
 
     file = read_mesh(path)
     mesh = check_mesh(

@@ -77,9 +77,3 @@ def overlap_depths(corners: np.ndarray) -> np.ndarray:
 def off_multiple(angle: np.ndarray, quantum: float) -> np.ndarray:
     """Return how far angles are from the nearest multiples of a quantum."""
     return np.abs(angle - quantum * np.round(angle / quantum))
-
-
-def areas_in_space(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return (m,) the areas of triangles in space."""
-    one, two, three = np.moveaxis(vertices[faces], 1, 0)
-    return np.linalg.norm(np.cross(two - one, three - one), axis=1) / 2

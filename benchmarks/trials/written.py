@@ -106,7 +106,7 @@ READERS: dict[str, Callable[[Path], Read]] = {
 
 
 def check_file(outcome: Outcome, result: Any, path: Path) -> None:
-    """Read a file that was written for a result, and hold its geometry and its layout against it."""
+    """Read a file that was written, and hold its geometry and its layout against the result, as written in it."""
     ending = path.suffix.lower()
     readers: list[Callable[[Path], Read]] = [READERS[ending]]
     if ending in (".obj", ".glb"):
@@ -158,7 +158,7 @@ def check_report(outcome: Outcome, report: dict[str, Any], path: Path) -> None:
     if upside_down > report["flipped"] and not report["mirrored_charts"]:
         outcome.breach(f"{name}: triangles upside down", f"{upside_down}, {report['flipped']} reported")
     if report["overlapping_pairs"] == 0:
-        _check_overlap(outcome, name, flat, "")
+        _check_overlap(outcome, name, flat)
 
 
 def _upside_down(flat: np.ndarray) -> int:
@@ -171,7 +171,7 @@ def _compare(
     outcome: Outcome, name: str, result: Any, space: np.ndarray, flat: np.ndarray, stored: bool
 ) -> None:
     """Hold triangles that were read against the result; `stored` for v as glTF has it, downwards."""
-    ending, notes = name.split()[1], " ".join(result.notes)
+    ending = name.split()[1]
     if len(space) != len(result.faces):
         outcome.breach(
             f"{name}: number of triangles", f"{len(space)} read, {len(result.faces)} in the result"
@@ -204,23 +204,17 @@ def _compare(
         outcome.breach(f"{name}: another layout", f"area {areas.sum():.9g}, in the result {total.sum():.9g}")
     upside_down = _upside_down(flat)
     if upside_down > max(result.distortion.flipped, result.distortion.mirrored_charts * len(areas)):
-        cause = f"{name}: triangles upside down"
-        if "upside down" in notes or "as fans" in notes:
-            outcome.excuse(cause)
-        else:
-            outcome.breach(cause, f"{upside_down}, {result.distortion.flipped} reported")
+        outcome.breach(
+            f"{name}: triangles upside down", f"{upside_down}, {result.distortion.flipped} reported"
+        )
     if result.distortion.overlapping_pairs == 0:
-        _check_overlap(outcome, name, flat, notes)
+        _check_overlap(outcome, name, flat)
 
 
-def _check_overlap(outcome: Outcome, name: str, flat: np.ndarray, notes: str) -> None:
+def _check_overlap(outcome: Outcome, name: str, flat: np.ndarray) -> None:
     """Nothing overlaps in the numbers of the file, without any tolerance, where the report says so."""
     from coneflat.geometry.overlap import find_overlaps
 
     pairs = find_overlaps(flat.astype(np.float64)).pairs
     if len(pairs):
-        cause = f"{name}: overlap"
-        if "overlap" in notes:
-            outcome.excuse(cause)
-        else:
-            outcome.breach(cause, f"{len(pairs)} pairs, none in the report")
+        outcome.breach(f"{name}: overlap", f"{len(pairs)} pairs, none in the report")

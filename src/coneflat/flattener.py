@@ -6,18 +6,15 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ._arrays import FloatArray
-from .cones.choose import Surface
-from .input.arrays import as_input
-from .input.components import Source
-from .input.symmetry import check_symmetry
-from .kept import Last
-from .mesh import TriangleMesh
+from .base.arrays import FloatArray
+from .cones import close_search
+from .flatten import Early, flatten_source
+from .io.input_mesh import as_input
+from .mesh.connectivity import TriangleMesh
 from .options import Options, read_options
-from .pipeline import Early, flatten_prepared
-from .progress import Stages
-from .result.flattening import Flattening
-from .solver import fitting_solver
+from .result import Flattening
+from .source.parts import Source
+from .stages import Surface
 
 
 class Flattener:
@@ -41,43 +38,34 @@ class Flattener:
     def __init__(self, mesh: Any, faces: ArrayLike | None = None) -> None:
         self._source = Source(as_input(mesh, faces))
         self._surfaces: dict[tuple[int, bool], Surface] = {}
-        self._solver: Last[str] = Last()
-        self._solved_by: tuple[str, int] | None = None
+        self._threads: int | None = None
 
     def flatten(self, *, early: Early | None = None, **options: Any) -> Flattening:
         """Return the flattening by the options, and with the errors, of `coneflat.flatten`.
 
         Args:
-            early: called with the first layout that there is: one chart for each component, as the metric unfolds,
-                before triangles are relaxed and overlaps parted; its own overlaps are not measured.
+            early: called with the first layout: one chart for each part, before triangles are relaxed and overlaps are
+                separated; its own overlaps are not measured.
             options: those of `coneflat.flatten`.
         """
         return self.flatten_as(read_options(options), early)
 
     def flatten_as(self, options: Options, early: Early | None = None) -> Flattening:
-        """Return the flattening by options that have been read; see `flatten`."""
-        stages = Stages(options.progress)
-        with stages("check"):
-            prepared = self._source.prepared(options)
-            check_symmetry(prepared.components, options)
-        # Asked once, as what is kept is no longer free.
-        count = len(prepared.checked.mesh.faces)
-        solver = self._solver.of((count, options.solver), lambda: fitting_solver(count, options.solver))
-        # Where anything else factorizes, the last digits are others.
-        solved_by = solver, options.threads
-        if solved_by != self._solved_by:
-            self._surfaces, self._solved_by = {}, solved_by
-        meshes = {id(part.mesh) for part in prepared.components}
+        """Return the flattening by options that have been parsed; see `flatten`."""
+        # The last digits depend on the number of threads.
+        if options.threads != self._threads:
+            self._surfaces, self._threads = {}, options.threads
+        meshes = {id(part.mesh) for part in self._source.prepared(options).parts}
         self._surfaces = {key: surface for key, surface in self._surfaces.items() if key[0] in meshes}
         try:
-            return flatten_prepared(prepared, solver, self._surface, options, stages, early)
+            return flatten_source(self._source, options, self._surface, early=early)
         finally:
             for surface in self._surfaces.values():
-                surface.search = None
+                close_search(surface)
 
     def _surface(self, mesh: TriangleMesh, lengths: FloatArray, flips: bool) -> Surface:
         key = id(mesh), flips
         if key not in self._surfaces:
             self._surfaces[key] = Surface.of(mesh, lengths, flips)
-            self._surfaces[key].is_kept = True
+            self._surfaces[key].is_reused = True
         return self._surfaces[key]

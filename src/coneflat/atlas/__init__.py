@@ -1,20 +1,23 @@
 """Charts in the plane: how they are split and glued, how they lie, and their places in a texture."""
 
-from .chart_seams import Layout, Seams
-from .injective import injective_charts
+from .arrange import arrange_charts
+from .chart_seams import ChartLayout, Seams
+from .injective import injective_charts, separate_overlaps
 from .orient import orient_charts
 from .pack import Packed, pack_charts
 from .split import overlap_layers, overlap_regions
 from .touch import part_touching
 
 __all__ = [
-    "Layout",
+    "ChartLayout",
     "Seams",
     "Packed",
+    "arrange_charts",
     "injective_charts",
     "orient_charts",
     "overlap_layers",
     "overlap_regions",
     "pack_charts",
     "part_touching",
+    "separate_overlaps",
 ]

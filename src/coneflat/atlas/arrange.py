@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..geometry.planar import signed_double_areas
 from .charts import Charts, read_charts
-from .mirrored import ChartMirrors, upright_angles
 from .orient import border_directions, mean_rise, orient_charts, straight_angles
 from .pack import MOST_TURNS, QUARTERS, Packed, pack_known
-from .straight import along_axes
-
-# Of a turn: by how much a multiple of a quantum may miss it.
-WHOLE = 1e-9
+from .straight import SAME, along_axes
 
 
 def arrange_charts(
@@ -31,8 +26,7 @@ def arrange_charts(
     tiles: int,
     up: tuple[float, float, float] | None = None,
     quantum: float | None = None,
-    mirrors: Sequence[ChartMirrors] = (),
-    edge_halfedges: IntArray | None = None,
+    edge_halfedges: IntArray,
 ) -> Packed:
     """Return charts packed into a texture.
 
@@ -45,9 +39,7 @@ def arrange_charts(
         up: direction in space that is to be v; None to fill the texture best.
         quantum: the charts of a component are turned against each other by multiples of this angle only, so that the
             rotations between the sides of seams stay such multiples; None for any angle.
-        mirrors: of all components, one after the other, which charts are mirror images of each other; axes of symmetry
-            stand upright then, and none is turned to fill the texture.
-        edge_halfedges: (e, 2) of the triangles' mesh, see `TriangleMesh`; None where they are not all of it.
+        edge_halfedges: (e, 2) of the triangles' mesh, see `TriangleMesh`.
     """
 
     def read(corner_uv: FloatArray) -> Charts:
@@ -59,33 +51,15 @@ def arrange_charts(
         turns = whole_turns(quantum)
         flat = _turned_together(read(flat), component, turns, space, up)
         rotate = turns if up is None else "none"
-    elif any((each.partner >= 0).any() for each in mirrors):
-        flat = _turned_upright(read(flat), mirrors, space, up)
-        rotate = "none"
     elif up is not None:
         flat = orient_charts(flat, chart, corners=space, up=up)
     return pack_known(read(flat), None, resolution, padding, padding, rotate, tiles)
 
 
-def _turned_upright(
-    charts: Charts,
-    mirrors: Sequence[ChartMirrors],
-    space: FloatArray | None,
-    up: tuple[float, float, float] | None,
-) -> FloatArray:
-    """Return (m, 3, 2) charts whose axes of symmetry stand upright, pairs mirrored; the others straight."""
-    outlines = charts.outlines()
-    angles, rise = straight_angles(charts, outlines, border_directions(outlines)), None
-    if up is not None:
-        rise = mean_rise(charts, space, up)
-        angles += _best_turn(rise * np.exp(1j * angles), np.ones((charts.count, QUARTERS), dtype=bool))
-    return charts.moved(np.exp(1j * upright_angles(mirrors, angles, rise)))
-
-
 def whole_turns(quantum: float) -> int:
     """Return into how many equal parts a full turn can be divided, few enough to be tried, by multiples of an angle."""
     parts = 2 * np.pi / quantum
-    if abs(parts - round(parts)) > WHOLE * parts:
+    if abs(parts - round(parts)) > SAME * parts:
         return 1
     return max(turns for turns in range(1, MOST_TURNS + 1) if round(parts) % turns == 0)
 

@@ -7,16 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import FloatArray, IntArray
-from ..geometry.charts import both_sides, point_seams
-from ..mesh import TriangleMesh, label_components
-
-# Values are numbered by a table of all that there might be, if these are at most so many times as many.
-SPARSE = 10
+from ..base.arrays import FloatArray, IntArray
+from ..mesh.charts import both_sides, point_seams
+from ..mesh.connectivity import TriangleMesh, label_components
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class ChartLayout:
     """A layout in charts, which have no points in common and may lie over each other.
 
     Attributes:
@@ -36,34 +33,29 @@ class Layout:
         """(u,) the points as complex numbers."""
         return np.ascontiguousarray(self.points).view(np.complex128)[:, 0]
 
-    def split(self, chart: IntArray) -> Layout:
+    def split(self, chart: IntArray) -> ChartLayout:
         """Return the layout in other charts, parts of these, with points of their own."""
         keys = chart[:, None] * len(self.points) + self.corners
-        used, corners = numbered(keys, (int(chart.max()) + 1) * len(self.points))
-        return Layout(self.points[used % len(self.points)], corners, chart)
+        used, corners = numbered(keys)
+        return ChartLayout(self.points[used % len(self.points)], corners, chart)
 
-    def joined(self, pairs: IntArray) -> Layout:
+    def joined(self, pairs: IntArray) -> ChartLayout:
         """Return the layout with pairs of points (k, 2) made one, whichever has the smallest index."""
-        return Layout(self.points, same_points(len(self.points), pairs)[self.corners], self.chart, self.seams)
+        return ChartLayout(
+            self.points, same_points(len(self.points), pairs)[self.corners], self.chart, self.seams
+        )
 
-    def numbered_anew(self) -> Layout:
+    def numbered_anew(self) -> ChartLayout:
         """Return the layout without unused points, charts counted from 0."""
-        used, corners = numbered(self.corners, len(self.points))
-        chart = numbered(self.chart, int(self.chart.max()) + 1)[1]
-        return Layout(self.points[used], corners, chart, self.seams)
+        used, corners = numbered(self.corners)
+        chart = numbered(self.chart)[1]
+        return ChartLayout(self.points[used], corners, chart, self.seams)
 
 
-def numbered(values: IntArray, bound: int) -> tuple[IntArray, IntArray]:
-    """Return the different values, upwards, and for each value its place among them.
-
-    By marking them, unless the bound that they are below is far above their number.
-    """
-    if bound > SPARSE * values.size:
-        used, places = np.unique(values, return_inverse=True)
-        return used, places.reshape(values.shape)
-    is_used = np.zeros(bound, dtype=bool)
-    is_used[values] = True
-    return np.flatnonzero(is_used), (np.cumsum(is_used) - 1)[values]
+def numbered(values: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the different values, upwards, and for each value its place among them."""
+    used, places = np.unique(values, return_inverse=True)
+    return used, places.reshape(values.shape)
 
 
 def same_points(count: int, pairs: IntArray) -> IntArray:
@@ -85,7 +77,7 @@ class Seams:
         charts: (k, 2) of these faces.
     """
 
-    def __init__(self, mesh: TriangleMesh, layout: Layout) -> None:
+    def __init__(self, mesh: TriangleMesh, layout: ChartLayout) -> None:
         self.edges = point_seams(mesh, layout.corners, layout.seams)
         self.here, self.there = both_sides(mesh, self.edges, layout.corners)
         self.charts = layout.chart[mesh.edge_halfedges[self.edges] // 3]

@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import BoolArray, FloatArray, IntArray, as_floats
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
+from ..geometry.coverage import cancel_sides
 from ..geometry.layers import open_sides
-from ..geometry.outline import cancel_sides
-from ..mesh import NEXT, PREVIOUS
+from ..mesh.connectivity import NEXT, PREVIOUS
 
 # Of the area, relative to the square of the extent: less is a line, but for rounding.
 NO_AREA = 1e-6

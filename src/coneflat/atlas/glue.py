@@ -11,30 +11,25 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import BoolArray, FloatArray, IntArray
-from ..compiled import compiled
+from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.compiled import compiled
+from ..base.progress import go_on
 from ..geometry.overlap import find_overlaps
 from ..geometry.planar import bounds, fill_bounds, signed_double_areas
-from ..mesh import TriangleMesh
-from ..progress import go_on
-from ..threads import in_halves
-from .chart_seams import Layout, Seams, same_points
+from ..mesh.connectivity import TriangleMesh
+from .chart_seams import ChartLayout, Seams, same_points
 
 # Relative to the length of a seam edge: how far its two sides may be apart, moved together, to be glued.
 CONGRUENT = 1e-7
 
 
-def glue_charts(
-    mesh: TriangleMesh, layout: Layout, lengths: FloatArray, image: IntArray | None = None
-) -> Layout:
+def glue_charts(mesh: TriangleMesh, layout: ChartLayout, lengths: FloatArray) -> ChartLayout:
     """Return a layout with fewer charts and shorter seams, of which none overlaps itself if none did before.
 
     Args:
         mesh: the mesh, whose faces are laid out.
         layout: its charts.
         lengths: (e,) of the edges on the model: the longest seams are glued first.
-        image: (e,) the mirror image of each edge of a symmetric mesh, -1 where there is none: what is glued on one side
-            is on the other, too, or not at all. None if there is no symmetry to keep.
     """
     seams = Seams(mesh, layout)
     layout = replace(layout, seams=seams.edges)
@@ -43,21 +38,18 @@ def glue_charts(
     if len(inner) == len(seams.edges):  # one chart
         return layout
     refused: set[tuple[int, ...]] = set()
-    gluing = _Gluing(mesh, layout, image)
+    gluing = _Gluing(mesh, layout)
     # What is glued changes which seams are stretches of one.
     while gluing.glue_longest(lengths, refused):
-        gluing = _Gluing(mesh, gluing.layout, image, gluing)
+        gluing = _Gluing(mesh, gluing.layout, gluing)
     return gluing.layout
 
 
 class _Gluing:
     """Charts of a layout that are glued one by one, at the expense of what is near only."""
 
-    def __init__(
-        self, mesh: TriangleMesh, layout: Layout, image: IntArray | None, before: _Gluing | None = None
-    ) -> None:
+    def __init__(self, mesh: TriangleMesh, layout: ChartLayout, before: _Gluing | None = None) -> None:
         """Start from a layout; `before` has led to it, and is done with."""
-        self.image = image
         self.seams, self.places = Seams(mesh, layout), layout.places
         between = np.flatnonzero(self.seams.charts[:, 0] != self.seams.charts[:, 1])
         stretches = _members(self.seams.stretches(mesh)[between], between)
@@ -66,18 +58,16 @@ class _Gluing:
         if before is None:
             self.corners, self.chart = layout.corners.copy(), layout.chart.copy()
             self.low, self.high = np.empty((2, len(self.corners), 2))
-            in_halves(self._fill_bounds, len(self.corners))
+            every = np.arange(len(self.corners))
+            fill_bounds(_pairs(self.places), self.corners, every, self.low, self.high)
         else:
             self.corners, self.chart = before.corners, before.chart
             self.low, self.high = before.low, before.high
 
-    def _fill_bounds(self, start: int, stop: int) -> None:
-        fill_bounds(_pairs(self.places), self.corners, np.arange(start, stop), self.low, self.high)
-
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> ChartLayout:
         """What they are now."""
-        return Layout(_pairs(self.places), self.corners, self.chart, self.seams.edges)
+        return ChartLayout(_pairs(self.places), self.corners, self.chart, self.seams.edges)
 
     def glue_longest(self, lengths: FloatArray, refused: set[tuple[int, ...]]) -> bool:
         """Glue charts at their stretches of seam, the longest first, where they fit; return whether any did.
@@ -98,34 +88,11 @@ class _Gluing:
             )
             if one == other or key in refused:
                 continue
-            if self._glue_alike(members):
+            if self._glue_at(members):
                 glued = True
             else:
                 refused.add(key)
         return glued
-
-    def _glue_alike(self, members: IntArray) -> bool:
-        """Glue two charts at a stretch of seam, and their mirror images at its own; return whether both fit."""
-        if self.image is None:
-            return self._glue_at(members)
-        wanted = self.image[self.seams.edges[members]]
-        mirrored = np.flatnonzero(np.isin(self.seams.edges, wanted))
-        if len(mirrored) < len(members):
-            return False
-        seams = self.seams
-        before = self.places, self.corners, seams.here, seams.there
-        changed = seams.charts.copy(), self.chart.copy(), self.low.copy(), self.high.copy()
-        faces = list(self.faces)
-        if not self._glue_at(members):
-            return False
-        one, other = seams.charts[mirrored[0]]
-        # A stretch in the plane of symmetry is its own image.
-        if one == other or self._glue_at(mirrored):
-            return True
-        self.places, self.corners, seams.here, seams.there = before
-        seams.charts, self.chart, self.low, self.high = changed
-        self.faces = faces
-        return False
 
     def _glue_at(self, members: IntArray) -> bool:
         """Move the smaller of two charts to continue the other, if it fits there; return whether it does."""
@@ -154,8 +121,6 @@ class _Gluing:
         is_joined = np.zeros(len(before), dtype=bool)
         is_joined[pairs] = True
         changed = np.concatenate([with_points(self.corners, self.faces[kept], is_joined), self.faces[moved]])
-        if self.image is not None:  # what may be taken back
-            self.corners = self.corners.copy()
         self.corners[changed] = joined[self.corners[changed]]
         seams.here, seams.there = joined[seams.here], joined[seams.there]
         seams.charts[seams.charts == moved] = self.chart[self.faces[moved]] = kept

@@ -8,18 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import FloatArray, IntArray
-from ..compiled import compiled
+from ..base.arrays import FloatArray, IntArray
+from ..base.compiled import compiled
 from ..errors import OptionError
 from .charts import Charts, Outlines, read_charts
-from .straight import QUARTER, straight_directions
+from .straight import QUARTER, SAME, straight_directions
 
 if TYPE_CHECKING:
     ComplexArray = NDArray[np.complex128]
-
-
-# Areas that differ by so little, relatively, are the same but for rounding.
-SAME = 1e-9
 
 
 def orient_charts(

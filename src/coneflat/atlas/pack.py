@@ -8,20 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import FloatArray, IntArray, as_floats
+from ..base.arrays import FloatArray, IntArray, as_floats
+from ..base.defaults import PADDING, RESOLUTION
+from ..base.text import shown
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
-from ..text import shown
 from .charts import Charts, Outlines, read_charts
 from .orient import border_directions, square_angle, straight_angles
 from .place import Packing, pack
 from .straight import QUARTER, along_axes
 
 ROTATIONS = ("any", "quarter", "none")
-# Angles that a chart is tried at, for so many charts at most; more than that fill each other's gaps in quarter turns.
-TURNS = ((20, 16), (100, 8))
-QUARTERS = 4
-# Shapes are made of every chart in every turn.
-MOST_TURNS = 16
+# Angles that charts are tried at, times their number; many fill each other's gaps in quarter turns. And into how many
+# equal parts a turn may be divided.
+TURNS, QUARTERS, MOST_TURNS = 480, 4, 16
 TILES_IN_A_ROW = 10
 
 
@@ -51,8 +50,8 @@ def pack_charts(
     chart_of_triangle: ArrayLike | None = None,
     areas: ArrayLike | None = None,
     *,
-    resolution: int = 1024,
-    padding: float = 2.0,
+    resolution: int = RESOLUTION,
+    padding: float = PADDING,
     margin: float | None = None,
     rotate: str | int = "any",
     tiles: int = 1,
@@ -84,7 +83,7 @@ def pack_charts(
 
     Notes:
         The shapes of charts, not boxes around them, are placed on a grid, each where its top is lowest; orders and
-        angles are changed at random, always the same way, and kept where that helps. Finer grids then close the gaps.
+        angles are changed at random, always the same way, and kept where that helps.
     """
     charts = read_charts(corner_uv, chart_of_triangle)
     margin = padding if margin is None else margin
@@ -115,12 +114,12 @@ def pack_known(
         packing = _alone(outlines, directions[0], rotate)
     else:
         area = float(np.abs(charts.sums(charts.areas) * density**2).sum())
-        turns = _turns(charts.count, rotate)
+        finest = QUARTERS * min(max(TURNS // (QUARTERS * charts.count), 1), 6)
+        turns = rotate if isinstance(rotate, int) else {"any": finest, "quarter": QUARTERS, "none": 1}[rotate]
         angles = np.tile(np.arange(turns) * (2 * np.pi / turns), (charts.count, 1))
         allowed = along_axes(directions, straight, angles)
         gap = padding / resolution / room
-        refine = np.full(charts.count, rotate == "any" and turns > QUARTERS) & allowed.all(axis=1)
-        packing = pack(outlines, area, angles, allowed, gap, min(tiles, charts.count), refine)
+        packing = pack(outlines, area, angles, allowed, gap, min(tiles, charts.count))
 
     scale = room / (packing.side or 1.0)
     factors = scale * frame * np.exp(1j * packing.angle)
@@ -161,15 +160,6 @@ def _densities(charts: Charts, areas: ArrayLike) -> FloatArray:
         np.divide(on_surface, in_plane, out=np.full(charts.count, together), where=scalable)
     )
     return densities
-
-
-def _turns(count: int, rotate: str | int) -> int:
-    """Return how many angles charts are tried at."""
-    if isinstance(rotate, int):
-        return rotate
-    if rotate == "any":
-        return next((turns for most, turns in TURNS if count <= most), QUARTERS)
-    return QUARTERS if rotate == "quarter" else 1
 
 
 def _alone(outlines: Outlines, directions: FloatArray, rotate: str | int) -> Packing:

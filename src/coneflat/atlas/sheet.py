@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray
-from .._sets import find_root, unite
-from ..compiled import compiled
-from ..geometry.graph import MultiGraph, drop_first, edges_beside, push, trace_back
-from ..mesh import TriangleMesh
+from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.compiled import compiled
+from ..base.sets import find_root, unite
+from ..linalg.shortest_paths import MultiGraph, Paths
+from ..mesh.connectivity import TriangleMesh
 
 
 class Sheet:
@@ -31,9 +31,9 @@ class Sheet:
         self._sides = disk.halfedge_edges, disk.edge_halfedges
         # Of each piece its first triangle, or one before it, and a half-edge on its border.
         self._first, self._start = [0], [int(disk.edge_halfedges[np.argmax(disk.is_boundary_edge), 0])]
-        self._distance = np.full(len(disk.vertices), np.inf)
         self._owner = np.full(len(disk.faces), -1, dtype=np.int64)
         self._is_cut = np.zeros(len(disk.edges), dtype=bool)
+        self._edge_costs = costs[disk.edge_halfedges[:, 0]]
 
     def border(self, own: int) -> IntArray:
         """Return (b,) the half-edges on the border of a piece in order, with the piece to the left."""
@@ -61,19 +61,7 @@ class Sheet:
         one, other = both
         mark = np.where(one[border // 3], 1, np.where(other[border // 3], 2, 0))
         starts, ends = (self.disk.ends_of(sides)[0] for sides in _between(border, mark))
-        cut = find_cut(
-            self.disk.edges,
-            self.disk.edge_halfedges,
-            *edges_beside(self.disk),
-            self.piece,
-            own,
-            self.costs,
-            one,
-            other,
-            starts,
-            ends,
-            self._distance,
-        )
+        cut = self._path(own, one, other, starts, ends)
         ids, first, start = part_piece(
             *self._sides, self.piece, own, cut, self._owner, self._is_cut, len(self._first), self._first[own]
         )
@@ -85,6 +73,20 @@ class Sheet:
             self._first[piece], self._start[piece] = low, side
         found: list[int] = ids[np.argsort(first)].tolist()
         return found
+
+    def _path(self, own: int, one: BoolArray, other: BoolArray, starts: IntArray, ends: IntArray) -> IntArray:
+        """Return the edges of the cheapest path inside a piece, from starts to ends, through neither of two sets."""
+        # What lies beyond a boundary comes last, and is in no piece.
+        kind = np.zeros(len(self.piece) + 1, dtype=np.uint8)
+        kind[:-1] = np.where(one, 2, np.where(other, 3, self.piece == own))
+        left, right = kind[self.disk.edge_faces.T]
+        is_open = (left > 0) & (right > 0) & ((left != right) | (left == 1))
+        costs = np.where(is_open, self._edge_costs, np.inf)
+        paths = MultiGraph(
+            len(self.disk.vertices), self.disk.edges, costs, self.disk.edges_beside
+        ).shortest_paths(starts, ends)
+        nearest = ends[np.argsort(paths.distance[ends], kind="stable")[:1]]
+        return paths.edge[paths.nodes_to(nearest)]
 
     def widened(
         self, own: int, one: BoolArray, other: BoolArray, areas: FloatArray, least: float
@@ -102,9 +104,8 @@ class Sheet:
         middles = a + b + c
         steps = (middles[inside[:, 0]] - middles[inside[:, 1]]) / 3
         lengths = np.hypot(steps[:, 0], steps[:, 1])
-        dual = MultiGraph(len(disk.faces), inside[:, 0], inside[:, 1], lengths)
-        wide = dual.widened(np.where(one, 0, np.where(other, 1, -1)), areas, least)
-        return wide == 0, wide == 1
+        paths = MultiGraph(len(disk.faces), inside, lengths).shortest_paths(np.flatnonzero(one | other))
+        return grown(paths, one, areas, least), grown(paths, other, areas, least)
 
     def _inside(self, own: int) -> IntArray:
         """Return (k, 2) the pairs of triangles of a piece that share an edge, by edges."""
@@ -143,15 +144,25 @@ class Sheet:
             return chosen
         inside = self._inside(own)
         inside = inside[~barred[inside].any(axis=1)]
-        dual = MultiGraph(len(chosen), inside[:, 0], inside[:, 1], np.ones(len(inside)))
+        dual = MultiGraph(len(chosen), inside, np.ones(len(inside)))
         free = beside[~barred[beside]]
-        distance, before, _ = dual.shortest_paths(np.flatnonzero(chosen), free)
-        if not np.isfinite(distance[free]).any():
+        paths = dual.shortest_paths(np.flatnonzero(chosen), free)
+        nearest = free[np.argsort(paths.distance[free], kind="stable")[:1]]
+        if not np.isfinite(paths.distance[nearest]).any():
             return None
-        nodes, _ = trace_back(free[[np.argmin(distance[free])]], before)
         widened = chosen.copy()
-        widened[nodes] = True
+        widened[paths.nodes_to(nearest)] = True
         return widened
+
+
+def grown(paths: Paths, chosen: BoolArray, areas: FloatArray, least: float) -> BoolArray:
+    """Return chosen triangles with those nearest to them, and nearer than to others, up to an area."""
+    near = np.flatnonzero((paths.source >= 0) & chosen[paths.source])
+    near = near[np.argsort(paths.distance[near], kind="stable")]
+    before = np.cumsum(areas[near]) - areas[near]
+    grown = chosen.copy()
+    grown[near[before < least]] = True
+    return grown
 
 
 def _single(chosen: BoolArray) -> BoolArray:
@@ -200,86 +211,6 @@ def walk_border(halfedge_edges: IntArray, edge_halfedges: IntArray, piece: IntAr
         if not is_known:
             around = np.empty(count, np.int64)
     return around
-
-
-@compiled
-def find_cut(
-    edges: IntArray,
-    edge_halfedges: IntArray,
-    begin: IntArray,
-    beside: IntArray,
-    piece: IntArray,
-    own: int,
-    costs: FloatArray,
-    one: BoolArray,
-    other: BoolArray,
-    starts: IntArray,
-    ends: IntArray,
-    distance: FloatArray,
-) -> IntArray:
-    """Return the edges of the cheapest path inside a piece that runs through neither of two sets of triangles.
-
-    Args:
-        edges, edge_halfedges: of the mesh.
-        begin, beside: the edges at each vertex, see `list_sides`.
-        piece, own: (m,) the piece of each triangle, and which it is.
-        costs: (3m,) of sides.
-        one, other: (m,) the sets.
-        starts, ends: vertices; the path leads from one of the first to one of the second.
-        distance: (n,) infinite, on return again.
-    """
-    is_end = np.zeros(len(distance), np.bool_)
-    for v in ends:
-        is_end[v] = True
-    # Of vertices that are reached, the edge that led there, from its head on if odd.
-    over, reached, count = np.empty(len(distance), np.int64), np.empty(len(distance), np.int64), 0
-    room = len(beside) + len(starts)
-    keys, items, size = np.empty(room), np.empty(room, np.int64), 0
-    for v in starts:
-        if distance[v] > 0.0:
-            distance[v], over[v] = 0.0, -1
-            reached[count] = v
-            count += 1
-            size = push(keys, items, size, 0.0, v)
-    while size > 0:
-        key, v = keys[0], items[0]
-        if is_end[v]:
-            break
-        size = drop_first(keys, items, size)
-        if key > distance[v]:
-            continue
-        for at in range(begin[v], begin[v + 1]):
-            side = beside[at]
-            e = side >> 1
-            w = edges[e, 1 - (side & 1)]
-            h, t = edge_halfedges[e]
-            if t < 0 or not key + costs[h] < distance[w]:
-                continue
-            left, right = h // 3, t // 3
-            if (
-                piece[left] != own
-                or piece[right] != own
-                or (one[left] and one[right])
-                or (other[left] and other[right])
-            ):
-                continue
-            if distance[w] == np.inf:
-                reached[count] = w
-                count += 1
-            distance[w], over[w] = key + costs[h], side
-            size = push(keys, items, size, distance[w], w)
-    v, least = -1, np.inf
-    for w in ends:
-        if distance[w] < least:
-            v, least = w, distance[w]
-    path, length = np.empty(count, np.int64), 0
-    while v >= 0 and over[v] >= 0:
-        path[length] = over[v] >> 1
-        v = edges[path[length], over[v] & 1]
-        length += 1
-    for i in range(count):
-        distance[reached[i]] = np.inf
-    return path[:length]
 
 
 @compiled

@@ -5,12 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import FloatArray, IntArray, as_faces, as_floats
+from ..base.arrays import FloatArray, IntArray, as_faces, as_floats
+from ..base.progress import go_on
+from ..base.text import list_some, plural
 from ..errors import ArrayShapeError, FaceIndexError, OptionError
-from ..geometry.parts import part_of
-from ..mesh import NEXT, TriangleMesh, corner_fans, label_components, sort_by_counting, sort_pairs
-from ..progress import go_on
-from ..text import list_some, plural
+from ..mesh.connectivity import (
+    NEXT,
+    TriangleMesh,
+    corner_fans,
+    label_components,
+    sort_by_counting,
+    sort_pairs,
+)
 from .sheet import Sheet
 
 
@@ -98,7 +104,7 @@ class _Sheet(Sheet):
     def opened(self, own: int, pairs: IntArray) -> tuple[_Sheet, int, IntArray]:
         """Return a piece that touches itself in a point as a sheet, opened there, with its pairs of triangles."""
         members = np.flatnonzero(self.piece == own)
-        disk = unpinched(part_of(self.disk, members))
+        disk = as_disk(self.disk.vertices, self.disk.faces[members])
         costs = self.costs.reshape(-1, 3)[members].ravel()
         sheet = _Sheet(disk, costs, self.areas[members], self.faces[members], self.chart[own])
         return sheet, 0, np.searchsorted(members, pairs)

@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from ..compiled import compiled
+from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ..base.compiled import compiled
 
 QUARTER = np.pi / 2
 # A run is straight if it strays from the line between its ends by less than this part of its length: an arc of less
@@ -20,7 +20,8 @@ ALIKE = np.radians(1.5)
 # The part of a border that must lie in one direction, but for quarter turns: of an equilateral triangle and a hexagon
 # a third does, of a rim of 24 sides a sixth, of free forms up to 28 % and mostly 10 %.
 SHARE = 0.4
-# Lengths that differ by less, relatively, and angles that do, in radians, are the same but for rounding.
+# Lengths, areas and parts of a turn that differ by less, relatively, and angles that do, in radians, are the same but
+# for rounding.
 SAME = 1e-6
 
 

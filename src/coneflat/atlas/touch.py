@@ -11,16 +11,17 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..geometry.overlap import Overlaps, find_overlaps
 from ..geometry.planar import signed_double_areas
-from ..mesh import NEXT
+from ..mesh.connectivity import NEXT
 
 # Of the extent of the layout: what overlaps by less touches, and is then moved by so much more than it overlaps.
 TOUCHING, APART = 1e-11, 2.0**-49
-# The same for points that are stored as 32-bit numbers, which are 2^-24 apart below 1.
-TOUCHING_SINGLE, APART_SINGLE = 2.0**-20, 2.0**-23
-# What is moved may touch something else then.
+# Of 32-bit numbers below 1: how far apart they are. Of points that are stored as such, what overlaps by less than
+# sixteen times that touches, and is moved by twice that more than it overlaps.
+SPACING = 2.0**-24
+# What is moved may touch something else then, and triangles that are turned back may turn others over.
 ROUNDS = 10
 
 
@@ -36,7 +37,7 @@ def part_touching(
     """
     low, high = points.min(axis=0), points.max(axis=0)
     extent = float((high - low).max())
-    touching, apart = (TOUCHING, APART) if stored is None else (TOUCHING_SINGLE, APART_SINGLE)
+    touching, apart = (TOUCHING, APART) if stored is None else (16 * SPACING, 2 * SPACING)
     if stored is not None:
         points = stored(points)
     best, found = points, find_overlaps(points, corners)
@@ -99,12 +100,10 @@ def _least_depth(corners: NDArray[np.complex128]) -> tuple[NDArray[np.complex128
     return across[chosen], np.maximum(depths[chosen], 0.0)
 
 
-# Of 32-bit numbers below 1: how far apart they are.
-SPACING = 2.0**-24
 # Places that are tried for a point: so many spacings away at most, along each axis.
 REACH = 3
-# Times all triangles that are upside down are looked at. More than MOST of them are too many to be cured one by one.
-LOOKS, MOST = 4, 5000
+# Triangles that are upside down: more are too many to be turned back one by one.
+MAX_TURNED_BACK = 5000
 
 
 def snap_apart(
@@ -141,9 +140,9 @@ def _turned_back(
     points = points.copy()
     steps = SPACING * np.mgrid[-REACH : REACH + 1, -REACH : REACH + 1].reshape(2, -1).T
     steps = steps[np.argsort((steps**2).sum(axis=1), kind="stable")]
-    for _ in range(LOOKS):
+    for _ in range(ROUNDS):
         bad = np.flatnonzero((signed_double_areas(points[corners]) <= 0) & upright)
-        if not 0 < len(bad) <= MOST:
+        if not 0 < len(bad) <= MAX_TURNED_BACK:
             break
         near = np.flatnonzero(np.isin(corners, corners[bad]).any(axis=1) & upright)
         for point in np.unique(corners[bad]).tolist():

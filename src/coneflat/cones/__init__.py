@@ -1,14 +1,26 @@
 """Where the curvature goes: cone placement and target curvatures, a file per strategy."""
 
+from ..stages import ConeSolution
+from .find import ROOM, close_search, find_cones, only_choice, open_search
 from .given import cones_at, cones_with_curvature
 from .greedy import greedy_cones
-from .solution import ConeSolution, check_enough, check_feasible
+from .integer.search import quantise_cones
+from .solution import GroundedLaplacian
+from .sparse import SparseCones
+from .sparse.search import ConeSearch
 
 __all__ = [
+    "ConeSearch",
     "ConeSolution",
-    "check_enough",
-    "check_feasible",
+    "GroundedLaplacian",
+    "ROOM",
+    "SparseCones",
+    "close_search",
     "cones_at",
     "cones_with_curvature",
+    "find_cones",
     "greedy_cones",
+    "only_choice",
+    "open_search",
+    "quantise_cones",
 ]

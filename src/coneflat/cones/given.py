@@ -1,15 +1,19 @@
-"""Cones that the user gives: positions, or positions and curvatures."""
+"""Cones that the user gives: positions, positions and curvatures, or positions and some curvatures."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..errors import CurvatureError
-from .solution import ConeSolution, GroundedLaplacian, target_from_log_scale
+from ..stages import ConeSolution
+from .solution import TYPED, GroundedLaplacian, target_from_log_scale
 
-SUM_TOLERANCE = 1e-6  # radians: what a curvature typed with seven digits is off by
+if TYPE_CHECKING:
+    from .sparse.linear_model import LinearModel
 
 
 def cones_at(
@@ -80,9 +84,67 @@ def checked_sum(curvatures: FloatArray, euler_characteristic: int | None) -> Flo
         return curvatures
     needed = 2 * np.pi * euler_characteristic
     found = float(np.sum(curvatures))
-    if abs(found - needed) > SUM_TOLERANCE:
+    if abs(found - needed) > TYPED:
         raise CurvatureError(
             f"cone curvatures must sum to 2 pi chi = {needed:.7g} ({2 * euler_characteristic} pi) on this "
             f"closed surface, but sum to {found:.7g} ({found / np.pi:.6g} pi): off by {found - needed:.3g}"
         )
     return curvatures + (needed - found) / len(curvatures) if len(curvatures) else curvatures
+
+
+def fitted_cones(
+    linear: LinearModel,
+    euler_characteristic: int,
+    cones: IntArray,
+    curvatures: FloatArray,
+    *,
+    min_cone_angle: float,
+    max_cone_angle: float | None,
+) -> ConeSolution:
+    """Return cones with the curvatures given, the others with those that make E the least.
+
+    With Green's functions g, the linear log scale is phi_0 + sum k_i g_i, and E its standard deviation by area: a
+    convex quadratic program in the curvatures that are not given.
+
+    Args:
+        linear: of the connected mesh.
+        euler_characteristic: of it.
+        cones, curvatures: (s,) vertices off the boundary and radians, NaN where it is to be computed.
+        min_cone_angle, max_cone_angle: bounds of what is computed, radians; left out where the sum that the surface
+            needs cannot be had within them.
+
+    Raises:
+        CurvatureError: all are given, and on a closed mesh do not sum to 2 pi chi.
+    """
+    from .sparse.fit_curvatures import fit_curvatures
+    from .sparse.limits import Limits
+
+    operator, is_free = linear.operator, np.isnan(curvatures)
+    euler = euler_characteristic if operator.is_closed else None
+    if not is_free.any():
+        return linear.solution_of(cones, checked_sum(curvatures, euler))
+    limits = Limits.of_angles(None, min_cone_angle, max_cone_angle, positive_only=False)
+    unknown = np.full(len(linear.curvature), -1, dtype=np.int64)
+    unknown[operator.vertices] = np.arange(len(operator.vertices))
+    responses = operator.responses(unknown[cones])
+    gram = _covariances(responses, responses, operator.areas)
+    slope = _covariances(responses, linear.log_scale[None], operator.areas)[:, 0]
+    held = curvatures[~is_free]
+    total = np.nan if euler is None else 2 * np.pi * euler - held.sum()
+    count = int(is_free.sum())
+    found, _, _ = fit_curvatures(
+        np.ascontiguousarray(gram[np.ix_(is_free, is_free)]),
+        slope[is_free] + gram[np.ix_(is_free, ~is_free)] @ held,
+        np.full(count, limits.least),
+        np.full(count, limits.most),
+        float(total),
+    )
+    filled = curvatures.copy()
+    filled[is_free] = found
+    return linear.solution_of(cones, checked_sum(filled, euler))
+
+
+def _covariances(one: FloatArray, other: FloatArray, areas: FloatArray) -> FloatArray:
+    """Return (k, l) the covariances by area of functions (k, f) and (l, f)."""
+    products: FloatArray = (one * areas) @ other.T - np.outer(one @ areas, other @ areas)
+    return products

@@ -8,10 +8,14 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.sparse import csc_matrix
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..errors import CurvatureError, OptionError
-from ..geometry.ties import argmax_tied
-from .solution import FULL_TURN, ConeSolution, GroundedLaplacian, target_from_log_scale
+from ..mesh.ties import argmax_tied
+from ..stages import ConeSolution
+from .solution import FULL_TURN, GroundedLaplacian, target_from_log_scale
+
+# Variation of the log of the scale that the published search ends at.
+EPSILON = 1.0
 
 
 def greedy_cones(
@@ -20,7 +24,7 @@ def greedy_cones(
     is_boundary: BoolArray,
     euler_characteristic: int,
     *,
-    epsilon: float = 1.0,
+    epsilon: float = EPSILON,
     max_cones: int | None = None,
     tie_key: FloatArray | None = None,
     progress: Callable[[str], None] | None = None,

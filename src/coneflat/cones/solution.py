@@ -1,68 +1,22 @@
-"""Cones with the linear conformal factor that belongs to them."""
+"""Linear systems for the log scale of cones, and bounds of what curvature cones may have."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from .._arrays import BoolArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.text import plural
 from ..errors import CurvatureError
-from ..mesh import TriangleMesh
-from ..solver import Factor, factorize
-from ..text import plural
+from ..linalg import Factor, factorize
+from ..mesh.connectivity import TriangleMesh
 
 FULL_TURN = 2 * np.pi
-
-
-@dataclass(frozen=True, eq=False)
-class LaplacianInverse:
-    """A factorized Laplacian, as a function of (n,) sources, up to a constant where nothing is held at zero.
-
-    Attributes:
-        apply: the function.
-        laplacian: (n, n), of all vertices.
-        is_zero: (n,) the vertices where its solutions are zero.
-        break_even: how many solutions take as long as another factorization.
-    """
-
-    apply: Callable[[FloatArray], FloatArray]
-    laplacian: csc_matrix
-    is_zero: BoolArray
-    break_even: int
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Return (n,) the solution for a source (n,)."""
-        return self.apply(right)
-
-
-@dataclass(frozen=True, eq=False)
-class ConeSolution:
-    """Cones, target curvatures and the log scale that produces them to first order.
-
-    Attributes:
-        cones: (s,) cone vertices, in the order in which they were chosen.
-        target: (n,) target curvature, radians: 0 but at cones and on the boundary.
-        log_scale: (n,) phi with L phi = target - curvature; constant on cones and boundary where their
-            curvature was not prescribed.
-        inverse: what solved for the log scale, if it was kept: zero on the boundary, mean-free without one.
-    """
-
-    cones: IntArray
-    target: FloatArray
-    log_scale: FloatArray
-    inverse: LaplacianInverse | None = None
-
-    @property
-    def curvatures(self) -> FloatArray:
-        """(s,) target curvature of each cone, radians."""
-        return self.target[self.cones]
-
-    def shifted(self, constant: float) -> ConeSolution:
-        """Return the same solution with a constant added to the log scale."""
-        return replace(self, log_scale=self.log_scale + constant)
+# Values that differ by this share or less, and radians, are equal: symmetric surfaces have many that differ by rounding
+# only, and the first in the order of vertices is taken.
+TIE = 1e-9
+# Radians, or shares, by which a number typed with seven digits is off.
+TYPED = 1e-6
 
 
 class GroundedLaplacian:

@@ -1,15 +1,66 @@
 """Pure functions of edge lengths: angles, areas, curvature, Laplacian."""
 
-from .operators import angle_defect, cotangent_laplacian
-from .triangles import corner_angles, cotangents, double_areas, edge_lengths, is_broken, mollify
+from .delaunay import euclidean_diagonal, intrinsic_delaunay, make_delaunay, relink
+from .handles import handle_loops
+from .intrinsic import IntrinsicTriangulation, halfedge_twins, intrinsic_triangulation
+from .nearest import Stars, slide_near, surface_distances
+from .normals import (
+    CREASE_COSINE,
+    corner_normals,
+    dihedral_angles,
+    face_normals,
+    unit_vectors,
+    vertex_normals,
+)
+from .operators import angle_defect, cotangent_laplacian, vertex_areas
+from .orientation import fill_orientations, orientation
+from .overlap import Overlaps, find_overlaps
+from .planar import as_complex, as_pairs, map_factors, sides_between, signed_angles, signed_double_areas
+from .straight import FlatTriangles, flat_triangles, straight_triangles
+from .triangles import corner_angles, cotangents, double_areas, edge_lengths, is_broken, mollify, slacks
+from .visibility import fill_nearest, visible_share
 
 __all__ = [
+    "CREASE_COSINE",
+    "FlatTriangles",
+    "IntrinsicTriangulation",
+    "Overlaps",
+    "Stars",
     "angle_defect",
+    "as_complex",
+    "as_pairs",
     "corner_angles",
+    "corner_normals",
     "cotangent_laplacian",
     "cotangents",
+    "dihedral_angles",
     "double_areas",
     "edge_lengths",
+    "euclidean_diagonal",
+    "face_normals",
+    "fill_nearest",
+    "fill_orientations",
+    "find_overlaps",
+    "flat_triangles",
+    "halfedge_twins",
+    "handle_loops",
+    "intrinsic_delaunay",
+    "intrinsic_triangulation",
     "is_broken",
+    "make_delaunay",
+    "map_factors",
     "mollify",
+    "orientation",
+    "relink",
+    "sides_between",
+    "signed_angles",
+    "signed_double_areas",
+    "slacks",
+    "slide_near",
+    "straight_triangles",
+    "surface_distances",
+    "unit_vectors",
+    "vertex_areas",
+    "vertex_normals",
+    "visible_share",
 ]

@@ -7,16 +7,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray
-from ..mesh import NEXT
-from .outline import cancel_sides, triangle_sides
+from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ..mesh.connectivity import NEXT
+from .layers import MOST_CELLS, trace_sides
+from .orientation import counterclockwise
 
-# Crossings of horizontal lines with sides that are sorted at a time, to bound the memory.
-AT_A_TIME = 2_000_000
-# Of these crossings, about a minute: with more the areas are not computed.
+# Crossings of horizontal lines with sides, about a minute: with more the areas are not computed. A hundredth of them is
+# sorted at a time, to bound the memory.
 MOST_CROSSINGS = 200_000_000
-# Pixels along a side of the box around all, where areas are counted in pixels.
-RASTER = 2048
+# How many of them are held in memory at a time.
+AT_A_TIME = MOST_CROSSINGS // 100
 
 
 def covered_twice(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
@@ -53,16 +53,17 @@ def layers_of_raster(corners: FloatArray) -> tuple[float, float]:
 
     corners: (m, 3, 2) of the triangles, in either order.
     """
-    from .raster import count_steps
-
     low = corners.min(axis=(0, 1))
     size = corners.max(axis=(0, 1)) - low
     if not size.min() > 0:
         return 0.0, 0.0
-    steps = np.zeros((RASTER, RASTER + 1), dtype=np.int64)
-    count_steps(np.ascontiguousarray((corners - low) * (RASTER / size)), steps)
+    # Half a pixel less, so that the last of the points is in the last pixel.
+    pixels = counterclockwise((corners - low) * ((MOST_CELLS - 0.5) / size))[0]
+    marks, steps = np.zeros((2, MOST_CELLS + 1, MOST_CELLS + 1), dtype=np.int32)
+    sides = np.stack([pixels, pixels[:, NEXT]], axis=2)
+    trace_sides(sides.reshape(-1, 4), 0.0, 0.0, 1.0, marks, steps)
     layers = np.cumsum(steps, axis=1)
-    pixel = float(np.prod(size / RASTER))
+    pixel = float(np.prod(size / (MOST_CELLS - 0.5)))
     return int(np.count_nonzero(layers > 1)) * pixel, int(np.count_nonzero(layers)) * pixel
 
 
@@ -77,8 +78,31 @@ def _outline(corners: FloatArray) -> IntArray:
     The first of equal ones stands for all: positive as it runs, negative if it runs against it.
     """
     places = corners @ np.array([1, 1j])
-    same, balance = cancel_sides(triangle_sides(places), np.zeros(places.size, dtype=np.int64))
-    return np.where(same == np.arange(len(same)), balance, 0).astype(np.int64).reshape(-1, 3)
+    sides = np.stack([places, places[:, NEXT]], axis=2).reshape(-1, 2)
+    same, balance = cancel_sides(sides, np.zeros(places.size, dtype=np.int64))
+    return np.where(same == np.arange(len(same)), balance, 0).reshape(-1, 3)
+
+
+def cancel_sides(sides: ComplexArray, chart: IntArray) -> tuple[IntArray, IntArray]:
+    """Return which sides of triangles have the same ends, and how often they run one direction more than the other.
+
+    Args:
+        sides: (s, 2) start and end of each.
+        chart: (s,) sides of different charts are different.
+
+    Returns:
+        (s,) the first side with the same ends, in either order; and (s,) of each such side how often it is there as
+        it runs less how often against it, 0 where they cancel.
+    """
+    number = np.unique(sides + 0.0, return_inverse=True)[1].reshape(sides.shape)
+    keys = np.stack([chart, number.min(axis=1), number.max(axis=1)])
+    order = np.lexsort(keys)
+    begins = np.append(True, np.diff(keys[:, order], axis=1).any(axis=0))[: len(order)]
+    same = np.empty(len(order), dtype=np.int64)
+    same[order] = order[begins][np.cumsum(begins) - 1]
+    runs_up = number[:, 0] <= number[:, 1]
+    balance = np.bincount(same, np.where(runs_up == runs_up[same], 1, -1), len(same))
+    return same, balance.astype(np.int64)
 
 
 def _crossings(corners: FloatArray, on_outline: BoolArray, pairs: IntArray) -> FloatArray:
@@ -133,6 +157,6 @@ def _sweep(corners: FloatArray, steps: IntArray, crossings: FloatArray) -> tuple
 def _blocks(first: IntArray, last: IntArray, count: int) -> Iterator[tuple[int, int]]:
     """Yield ranges of strips between `count` heights that sides from `first` to `last` cross only so many times."""
     begun = np.bincount(first, minlength=count) - np.bincount(last, minlength=count)
-    crossed = np.cumsum(np.cumsum(begun))
-    cuts = np.searchsorted(crossed, np.arange(AT_A_TIME, crossed[-1], AT_A_TIME))
+    crossed, block = np.cumsum(np.cumsum(begun)), AT_A_TIME
+    cuts = np.searchsorted(crossed, np.arange(block, crossed[-1], block))
     yield from pairwise(np.unique(np.concatenate([[0], cuts, [count - 1]])).tolist())

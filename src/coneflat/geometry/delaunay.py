@@ -14,10 +14,10 @@ import math
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
-from ..compiled import compiled
-from ..mesh import TriangleMesh
-from .graph import drop_first, push
+from ..base.arrays import FloatArray, IntArray
+from ..base.compiled import compiled
+from ..linalg.shortest_paths import drop_first, push
+from ..mesh.connectivity import TriangleMesh
 from .intrinsic import IntrinsicTriangulation, intrinsic_triangulation
 
 # Flips per edge after which flipping stops. Finite by theory; in floating point this catches what the
@@ -28,8 +28,6 @@ FLIPS_PER_EDGE = 50
 def make_delaunay(
     triangulation: IntrinsicTriangulation,
     log_scale: FloatArray | None = None,
-    radii: FloatArray | None = None,
-    has_lengths: bool = True,
     suspects: IntArray | None = None,
 ) -> IntArray:
     """Flip a triangulation, in place, until it is Delaunay; return the half-edges flipped, in order.
@@ -39,43 +37,27 @@ def make_delaunay(
         log_scale: None for the triangulation's own metric and Euclidean flips. With (n,) log scale factors
             phi, the metric l_ij exp((phi_i + phi_j) / 2) is made Delaunay by Ptolemy flips of the lengths l,
             which keep the discrete conformal class (Springborn 2019; Gillespie, Springborn, Crane 2021).
-        radii: (n,) of circles at the vertices, to make the triangulation weighted Delaunay for.
-        has_lengths: False if the triangulation has the circles' inversive distances for lengths: flips then keep these
-            (Bobenko, Lutz 2023).
         suspects: half-edges of the edges that may fail the condition at first; None: all.
 
     Notes:
         Where nothing fails the condition the cost is one pass over the edges. The condition is meaningful
         also where scaled lengths break the triangle inequality.
     """
-    if radii is not None:
-        kind, scale = WEIGHTED if has_lengths else PACKED, radii
-    elif log_scale is None:
-        kind, scale = EUCLIDEAN, np.ones(triangulation.vertex_count)
+    if log_scale is None:
+        scale = np.ones(triangulation.vertex_count)
     else:
-        kind = SCALED
         # Only ratios within a triangle matter, so the middle may go to 1, which keeps off overflow.
         scale = np.exp((log_scale - (log_scale.max() + log_scale.min()) / 2) / 2)
-    arrays = triangulation.twin, triangulation.tail, triangulation.length
     sides = len(triangulation.twin)
-    suspects = np.arange(sides) if suspects is None else suspects
-    left = FLIPS_PER_EDGE * sides // 2 + 1000
-    records = [np.empty(0, dtype=np.int64)]
-    while left > 0:
-        bad = np.empty(len(suspects), dtype=np.int64)
-        bad = bad[: find_violations(*arrays, scale, kind, suspects, bad)]
-        if not len(bad):
-            break
-        room = SPARE * len(bad) + 1000
-        heap, record = (
-            (np.empty(room), np.empty(room, dtype=np.int64)),
-            np.empty(min(left, room), dtype=np.int64),
-        )
-        size, count = flip_until_delaunay(*arrays, scale, kind, bad, *heap, record)
-        records.append(record[:count])
-        left -= count
-        suspects = np.unique(heap[1][:size])
-    return np.concatenate(records)
+    return flip_until_delaunay(
+        triangulation.twin,
+        triangulation.tail,
+        triangulation.length,
+        scale,
+        log_scale is None,
+        np.arange(sides) if suspects is None else suspects,
+        FLIPS_PER_EDGE * sides // 2 + 1000,
+    )
 
 
 def intrinsic_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> tuple[IntrinsicTriangulation, IntArray]:
@@ -89,12 +71,6 @@ def intrinsic_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> tuple[Intrins
     return triangulation, make_delaunay(triangulation)
 
 
-# What the lengths are: those of the metric that is to be Delaunay; those before scaling; those of the metric that is
-# to be weighted Delaunay; inversive distances of circles.
-EUCLIDEAN, SCALED, WEIGHTED, PACKED = 0, 1, 2, 3
-# Room for edges that wait to be flipped, and for flips, relative to the number at first. What was put there and has
-# changed since takes room, too; once there is none, the edges that still fail the condition are looked for anew.
-SPARE = 8
 # Rounding of a slack relative to the perimeter: a few ulps of lengths that are products of three factors,
 # with a wide margin, since an edge flipped for the sake of rounding could be flipped back and forth forever.
 NOISE = 1e-14
@@ -128,21 +104,14 @@ def incircle_terms(
 
 
 @compiled
-def violation(
-    twin: IntArray, tail: IntArray, length: FloatArray, scale: FloatArray, kind: int, h: int
-) -> float:
+def violation(twin: IntArray, tail: IntArray, length: FloatArray, scale: FloatArray, h: int) -> float:
     """Return by how much an edge between two triangles fails the Delaunay condition; 0 if it does not.
 
-    That is minus the sum of the cosines opposite, which measures alike on all edges, or of the slopes.
+    That is minus the sum of the cosines opposite, which measures alike on all edges.
     """
     t = twin[h]
     if t < 0 or t // 3 == h // 3:
         return 0.0
-    if kind >= WEIGHTED:
-        tilt, size = tilts(tail, length, scale, kind == WEIGHTED, h)
-        tilt2, size2 = tilts(tail, length, scale, kind == WEIGHTED, t)
-        fails = tilt + tilt2 < -NOISE * (size + size2)
-        return -(tilt + tilt2) / (size + size2) if fails else 0.0
     x, y, dx, dy = incircle_terms(tail, length, scale, h)
     x2, y2, dx2, dy2 = incircle_terms(tail, length, scale, t)
     noise = dx * abs(x2) + dx2 * abs(x) + dx * dx2 + dy * abs(y2) + dy2 * abs(y) + dy * dy2
@@ -201,125 +170,60 @@ def relink(
 
 
 @compiled
-def find_violations(
-    twin: IntArray,
-    tail: IntArray,
-    length: FloatArray,
-    scale: FloatArray,
-    kind: int,
-    suspects: IntArray,
-    found: IntArray,
-) -> int:
-    """Write those of some half-edges whose edges fail the Delaunay condition to `found`; return their number."""
-    count = 0
-    for h in suspects:
-        if violation(twin, tail, length, scale, kind, h) > 0.0:
-            found[count] = h
-            count += 1
-    return count
-
-
-@compiled
 def flip_until_delaunay(
     twin: IntArray,
     tail: IntArray,
     length: FloatArray,
     scale: FloatArray,
-    kind: int,
-    bad: IntArray,
-    keys: FloatArray,
-    items: IntArray,
-    record: IntArray,
-) -> tuple[int, int]:
+    is_euclidean: bool,
+    suspects: IntArray,
+    most: int,
+) -> IntArray:
     """Flip edges that fail the condition, and those whose quads that changes if they do then, the worst first.
 
     In another order the edges around a hub are flipped one after the other to the same far vertex, which becomes a
     hub in its place: ten times as many flips for thousands of edges.
 
     Args:
-        twin, tail, length, scale, kind: the triangulation, see `make_delaunay`.
-        bad: half-edges of the edges that fail the condition, by one or both.
-        keys, items: room for a heap. An edge is there again whenever its quad has changed.
-        record: filled with the half-edges flipped.
+        twin, tail, length, scale: the triangulation, see `make_delaunay`.
+        is_euclidean: whether flips keep the metric of the lengths, or the conformal class.
+        suspects: half-edges of the edges that may fail the condition, by one or both.
+        most: flips at most.
 
     Returns:
-        How many half-edges wait in `items` still, as there is no room, and the number of flips recorded.
+        The half-edges flipped, in order.
     """
-    size, count = 0, 0
-    for h in bad:
-        size = push(keys, items, size, -violation(twin, tail, length, scale, kind, h), h)
-    while size > 0 and count < len(record) and size + 4 <= len(items):
+    # A heap of edges; one is there again whenever its quad has changed.
+    keys, items, size = np.empty(64), np.empty(64, np.int64), 0
+    for h in suspects:
+        amount = violation(twin, tail, length, scale, h)
+        if amount > 0.0:
+            if size == len(items):
+                keys, items = np.concatenate((keys, keys)), np.concatenate((items, items))
+            size = push(keys, items, size, -amount, h)
+    record, count = np.empty(64, np.int64), 0
+    while size > 0 and count < most:
         key, h = keys[0], items[0]
         size = drop_first(keys, items, size)
-        if key == 0.0 or -violation(twin, tail, length, scale, kind, h) != key:  # of a quad that has changed
+        if key == 0.0 or -violation(twin, tail, length, scale, h) != key:  # of a quad that has changed
             continue
         t = twin[h]
         h1 = h - h % 3 + (h + 1) % 3
         h2 = h - h % 3 + (h + 2) % 3
         t1 = t - t % 3 + (t + 1) % 3
         t2 = t - t % 3 + (t + 2) % 3
-        if kind in (EUCLIDEAN, WEIGHTED):
+        if is_euclidean:
             diagonal = euclidean_diagonal(length[h], length[h2], length[h1], length[t1], length[t2])
-        elif kind == PACKED:
-            diagonal = other_inversive_distance(length[h], length[h2], length[h1], length[t1], length[t2])
         else:  # Ptolemy's relation, which keeps the conformal class
             diagonal = (length[h1] * length[t1] + length[h2] * length[t2]) / length[h]
+        if count == len(record):
+            record = np.concatenate((record, record))
         record[count] = h
         count += 1
+        if size + 4 > len(items):
+            keys, items = np.concatenate((keys, keys)), np.concatenate((items, items))
         for side in relink(twin, tail, length, h, diagonal):
-            amount = violation(twin, tail, length, scale, kind, side)
+            amount = violation(twin, tail, length, scale, side)
             if amount > 0.0:
                 size = push(keys, items, size, -amount, side)
-    return size, count
-
-
-@compiled
-def spread(edge: float, one: float, two: float) -> float:
-    """Return minus the Gram determinant of three circles with these inversive distances; symmetric in them."""
-    return edge * edge + one * one + two * two + 2 * edge * one * two - 1
-
-
-@compiled
-def inversive_distance(length: float, one: float, two: float) -> float:
-    """Return the inversive distance of two circles with radii one and two, their centres so far from each other."""
-    # 1 and a term with the gap between the circles, which keeps its digits.
-    return 1 + (length - (one + two)) * (length + (one + two)) / (2 * (one * two))
-
-
-@compiled
-def tilts(
-    tail: IntArray, sides: FloatArray, radius: FloatArray, are_lengths: bool, h: int
-) -> tuple[float, float]:
-    """Return the slope of the triangle of h along its side h, and a bound of the terms that it is made of.
-
-    An edge is weighted Delaunay if the slopes from both sides do not sum to a negative number. Where the triangle
-    exists, its radical centre is at a height over the side with the sign of the slope.
-
-    sides: (3m,) inversive distances, or lengths.
-    """
-    base = h - h % 3
-    h1 = base + (h + 1) % 3
-    h2 = base + (h + 2) % 3
-    gi, gj, gk = radius[tail[h]], radius[tail[h1]], radius[tail[h2]]
-    c, jk, ik = sides[h], sides[h1], sides[h2]
-    if are_lengths:
-        c, jk, ik = (
-            inversive_distance(c, gi, gj),
-            inversive_distance(jk, gj, gk),
-            inversive_distance(ik, gi, gk),
-        )
-    up = gk * ((gj + c * gi) * ik + (gi + c * gj) * jk)
-    down = gi * gj * (c * c - 1)
-    length = math.sqrt(gi * gi + gj * gj + 2 * c * gi * gj)
-    size = length * gk * math.sqrt(spread(c, ik, jk))
-    return (up - down) / size, (up + abs(down)) / size
-
-
-@compiled
-def other_inversive_distance(e: float, b: float, c: float, b2: float, c2: float) -> float:
-    """Return the inversive distance along the other diagonal of the quad of two triangles on the edge e from u to v.
-
-    b, b2 are those of the apices from u; c, c2 from v. e is more than 1: tangent circles need no flip.
-    """
-    across = b * b2 + c * c2 + e * (b * c2 + b2 * c)
-    return (across + math.sqrt(spread(e, b, c) * spread(e, b2, c2))) / (e * e - 1)
+    return record[:count].copy()

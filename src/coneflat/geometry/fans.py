@@ -5,22 +5,18 @@ The boxes of all in a quarter of the plane meet, and so tell nothing.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .._arrays import FloatArray, IntArray
-from ..compiled import compiled
-from ..mesh import NEXT, PREVIOUS
+from ..base.arrays import FloatArray, IntArray
+from ..base.compiled import compiled
+from ..mesh.connectivity import NEXT, PREVIOUS
 
-TAU = 2 * np.pi
 # Corners at one point from which on it is worth it; fewer triangles meet in few enough pairs.
 MANY = 500
-# Points are counted by numbers that depend on all of their bits, one for so many points: few enough that the counts
-# stay near the processor.
-TOGETHER = 32
-# By how much angles computed of coordinates up to 1 may be off, radians, and more.
+# By how much angles (radians) and turned coordinates may be off, computed of coordinates up to 1, and more.
 ROUNDED = 2.0**-46
 
 
@@ -70,10 +66,13 @@ def find_fans(corners: FloatArray) -> Fans | None:
     if len(corners) < MANY:
         return None
     places = corners.reshape(-1, 2) + 0.0  # a zero has one sign
-    bits = (len(places) // TOGETHER).bit_length()
-    hashed = np.empty(len(places), dtype=np.int32)
-    counts = np.zeros(1 << bits, dtype=np.int32)
-    count_hashed(places.view(np.uint64), np.uint64(64 - bits), hashed, counts)
+    # Points are counted by numbers that depend on all of their bits: they are the same for the same points, and seldom
+    # for others.
+    x, y = places.view(np.uint64).T
+    mixed = x * np.uint64(0x9E3779B97F4A7C15) + y * np.uint64(0xC2B2AE3D27D4EB4F)
+    mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
+    hashed = (mixed >> np.uint64(64 - len(places).bit_length())).astype(np.int64)
+    counts = np.bincount(hashed)
     if counts.max() < MANY:
         return None
     points = places.view(np.complex128)[:, 0]
@@ -96,29 +95,12 @@ def find_fans(corners: FloatArray) -> Fans | None:
 
 
 @compiled
-def count_hashed(
-    points: NDArray[np.uint64], shift: np.uint64, hashed: NDArray[np.int32], counts: NDArray[np.int32]
-) -> None:
-    """Fill numbers that are the same for the same points, and seldom for others, and how often there is each.
-
-    points: (p, 2) bits of coordinates. shift: how many bits of 64 the numbers do not have. counts: zeros on entry.
-    """
-    for p in range(len(points)):
-        mixed = points[p, 0] * np.uint64(0x9E3779B97F4A7C15) + points[p, 1] * np.uint64(0xC2B2AE3D27D4EB4F)
-        mixed ^= mixed >> np.uint64(29)
-        mixed *= np.uint64(0xBF58476D1CE4E5B9)
-        number = np.int32(mixed >> shift)
-        hashed[p] = number
-        counts[number] += 1
-
-
-@compiled
 def lie_apart(numbers: IntArray, angles: FloatArray, i: int, j: int) -> bool:
     """Return whether the triangles of two nodes are of one fan and of other angles: so no inner points are in both."""
     if numbers[i] < 0 or numbers[i] != numbers[j]:
         return False
     for turn in range(-1, 2):
-        begin, end = angles[j, 0] + turn * TAU, angles[j, 1] + turn * TAU
+        begin, end = angles[j, 0] + turn * math.tau, angles[j, 1] + turn * math.tau
         if begin < angles[i, 1] + ROUNDED and end > angles[i, 0] - ROUNDED:
             return False
     return True

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
-from .._arrays import FloatArray, IntArray
-from ..mesh import TriangleMesh
-from . import cotangents
-from .graph import MultiGraph
+from ..base.arrays import FloatArray, IntArray
+from ..linalg.shortest_paths import MultiGraph, Paths
+from ..mesh.connectivity import TriangleMesh
+from ..mesh.ties import tie_key
 from .intrinsic import halfedge_twins
 from .straight import FlatTriangles
-from .ties import tie_key
+from .triangles import cotangents
 
 
 def handle_loops(mesh: TriangleMesh, holes: bool = False) -> list[IntArray]:
@@ -33,21 +33,20 @@ def handle_loops(mesh: TriangleMesh, holes: bool = False) -> list[IntArray]:
     inside = np.flatnonzero(~mesh.is_boundary_edge)
     across = mesh.edge_halfedges[inside]
     middles = mesh.vertices[mesh.faces].mean(axis=1)
-    one, two = across.T // 3
-    dual = MultiGraph(len(mesh.faces), one, two, np.linalg.norm(middles[one] - middles[two], axis=1))
+    pairs = across // 3
+    steps = middles[pairs[:, 0]] - middles[pairs[:, 1]]
+    dual = MultiGraph(len(mesh.faces), pairs, np.linalg.norm(steps, axis=1))
     root = int(np.argmax(tie_key(mesh.vertices)[mesh.faces].sum(axis=1)))
-    _, before, _ = dual.shortest_paths(np.array([root]))
-    reached = np.flatnonzero(before >= 0)
+    paths = dual.shortest_paths(np.array([root]))
     in_tree = np.zeros(len(inside), dtype=bool)
-    in_tree[dual.edges_between(reached, before[reached])] = True
+    in_tree[paths.edge[paths.edge >= 0]] = True
 
     node_of = _contract_loops(mesh, holes)
     left = np.flatnonzero(~in_tree)
-    ends = node_of[mesh.edges[inside[left]]]
-    primal = MultiGraph(len(node_of), ends[:, 0], ends[:, 1], np.ones(len(left)))
+    primal = MultiGraph(len(node_of), node_of[mesh.edges[inside[left]]], np.ones(len(left)))
     closes = np.ones(len(left), dtype=bool)
     closes[primal.minimum_spanning_tree()] = False
-    return [_loop(dual, across, before, edge) for edge in left[closes]]
+    return [_loop(paths, across, edge) for edge in left[closes]]
 
 
 def _contract_loops(mesh: TriangleMesh, together: bool) -> IntArray:
@@ -63,16 +62,15 @@ def _contract_loops(mesh: TriangleMesh, together: bool) -> IntArray:
     return node_of
 
 
-def _loop(dual: MultiGraph, across: IntArray, before: IntArray, edge: int) -> IntArray:
+def _loop(paths: Paths, across: IntArray, edge: int) -> IntArray:
     """Return the half-edges that the loop over an edge and back through the tree crosses."""
     start, end = across[edge] // 3
-    there, back = _path_to_root(start, before), _path_to_root(end, before)
+    there, back = _path_to_root(start, paths.before), _path_to_root(end, paths.before)
     # What both paths to the root share is not walked to and fro.
     while len(there) > 1 and len(back) > 1 and there[-2] == back[-2]:
         there.pop(), back.pop()
     out, home = np.array(there[::-1]), np.array(back)
-    edges = dual.edges_between(out[:-1], out[1:]), np.array([edge]), dual.edges_between(home[:-1], home[1:])
-    pairs = across[np.concatenate(edges)]
+    pairs = across[np.concatenate([paths.edge[out[1:]], [edge], paths.edge[home[:-1]]])]
     faces = np.concatenate([out, home[:-1]])
     return np.where(pairs[:, 0] // 3 == faces, pairs[:, 0], pairs[:, 1])
 
@@ -96,9 +94,6 @@ def corner_signs(loop: IntArray, twin: IntArray) -> tuple[IntArray, FloatArray]:
     """
     entry, leave = twin[np.roll(loop, 1)] % 3, loop % 3
     return loop - leave + (3 - entry - leave), np.where(entry == (leave + 1) % 3, 1.0, -1.0)
-
-
-FULL_TURN = 2 * np.pi
 
 
 def off_multiple(angles: FloatArray, quantum: float) -> FloatArray:

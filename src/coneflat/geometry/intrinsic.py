@@ -2,7 +2,7 @@
 
 After flips two vertices can share several edges, an edge can end where it starts, and a triangle can be glued
 to itself, so a triangle is known by its half-edges and not by its vertices. Slots are numbered as in
-`coneflat.mesh`: half-edge h = 3 f + i is the side of triangle f opposite corner i.
+`coneflat.mesh.connectivity`: half-edge h = 3 f + i is the side of triangle f opposite corner i.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
-from ..mesh import TriangleMesh
+from ..base.arrays import FloatArray, IntArray
+from ..mesh.connectivity import TriangleMesh
 
 
 @dataclass(eq=False)

@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, Int32Array, IntArray
-from ..compiled import compiled
-from ..threads import in_halves
+from ..base.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from ..base.compiled import compiled
 
 # Cells along a side of the grid for the root of the number of triangles, and at most.
 FINENESS, MOST_CELLS = 1.5, 2048
@@ -30,11 +29,7 @@ def open_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray) -
         group: (m,) only sides of the same group, from 0 on, cancel; below, all are open.
     """
     is_open = np.ones(3 * len(corners), dtype=bool)
-    places = np.ascontiguousarray(corners)
-    in_halves(
-        lambda start, stop: close_sides(edge_halfedges[start:stop], places, group, is_open),
-        len(edge_halfedges),
-    )
+    close_sides(edge_halfedges, np.ascontiguousarray(corners), group, is_open)
     return is_open
 
 

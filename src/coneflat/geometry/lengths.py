@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, FloatArray, IntArray, as_floats
-from ..compiled import compiled
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats
+from ..base.text import list_some, plural
 from ..errors import ArrayShapeError, LengthError, NonFiniteError
-from ..mesh import TriangleMesh
-from ..text import list_some, plural
+from ..mesh.connectivity import TriangleMesh
 from .triangles import double_areas, slacks
 
 # Relative: by how much the two sides of an edge may differ, and a side be longer than the two others together. Rounding
@@ -48,11 +47,10 @@ def check_lengths(
     values = as_lengths(lengths, len(mesh.faces))
     with np.errstate(all="ignore"):
         areas = double_areas(values)  # 0 or not finite where anything is wrong with a triangle
-    is_alike = have_equal_sides(mesh.edge_halfedges, np.ascontiguousarray(values).reshape(-1))
-    if not flat and is_alike and (areas > 0).all() and np.isfinite(areas).all():
-        return values
     pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
     one, two = values.ravel()[pairs].T
+    if not flat and np.array_equal(one, two) and (areas > 0).all() and np.isfinite(areas).all():
+        return values
     faces = np.arange(len(values)) if face_names is None else face_names
     _refuse_numbers(values, faces, flat)
     differ = np.flatnonzero(np.abs(one - two) > ROUNDING * np.maximum(one, two))
@@ -75,7 +73,7 @@ def check_lengths(
     _refuse_faces(is_broken, "that break the triangle inequality", values, faces)
     if not flat:
         is_flat = double_areas(unit) <= 0
-        _refuse_faces(is_flat, "without area, which `coneflat.mollify` opens", values, faces)
+        _refuse_faces(is_flat, "without area, which `coneflat.geometry.mollify` opens", values, faces)
     return values
 
 
@@ -113,13 +111,3 @@ def _refuse_faces(is_bad: BoolArray, what: str, values: FloatArray, faces: IntAr
             f"{plural(len(bad), 'face')} of {len(values):,} {what}: {list_some(faces[bad])}; face {faces[bad[0]]} has "
             f"sides of {a:.9g}, {b:.9g} and {c:.9g}"
         )
-
-
-@compiled
-def have_equal_sides(edge_halfedges: IntArray, lengths: FloatArray) -> bool:
-    """Return whether the half-edges (e, 2) of every edge, -1 on the boundary, have one length of the (3m,) given."""
-    for e in range(len(edge_halfedges)):
-        h, t = edge_halfedges[e]
-        if t >= 0 and lengths[h] != lengths[t]:
-            return False
-    return True

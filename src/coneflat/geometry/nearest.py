@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray
-from ..compiled import compiled
+from ..base.arrays import FloatArray, IntArray
+from ..base.compiled import compiled
 
 # Triangles in a box of the lowest level.
 LEAF = 4

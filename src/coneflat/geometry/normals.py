@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import FloatArray, IntArray, dots
-from ..mesh import TriangleMesh, corner_fans
+from ..base.arrays import FloatArray, IntArray, dots
+from ..mesh.connectivity import TriangleMesh, corner_fans
 from .triangles import corner_angles, edge_lengths
 
 #: Cosine of the angle, about 53 degrees, by which faces bend at an edge that is drawn sharp: between the 42 degrees

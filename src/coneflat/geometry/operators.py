@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from .._arrays import BoolArray, FloatArray, Int32Array, IntArray, as_faces, as_floats, unit_exponent
-from ..compiled import compiled
+from ..base.arrays import BoolArray, FloatArray, Int32Array, IntArray, as_faces, as_floats, unit_exponent
+from ..base.compiled import compiled
 from ..errors import ArrayShapeError, OptionError
 from .triangles import double_areas
 

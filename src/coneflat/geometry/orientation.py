@@ -7,8 +7,10 @@ for this, so that nothing over- or underflows.
 
 from __future__ import annotations
 
-from .._arrays import FloatArray, IntArray
-from ..compiled import compiled
+import numpy as np
+
+from ..base.arrays import FloatArray, IntArray
+from ..base.compiled import compiled
 
 # Rounding of the determinant, relative to the sum of the magnitudes of its two products (Shewchuk, Section 4.3).
 FILTER = (3 + 16 * 2.0**-53) * 2.0**-53
@@ -51,19 +53,14 @@ def _add_product(parts: FloatArray, count: int, x: float, y: float) -> None:
     y_low = y - y_high
     product = x * y
     error = x_low * y_low - (((product - x_high * y_high) - x_low * y_high) - x_high * y_low)
-    _add_term(parts, count, error)
-    _add_term(parts, count + 1, product)
-
-
-@compiled
-def _add_term(parts: FloatArray, count: int, term: float) -> None:
-    """Add a number to a sum, without rounding (Shewchuk, GROW-EXPANSION)."""
-    for i in range(count):
-        total = parts[i] + term
-        moved = total - parts[i]
-        parts[i] = (parts[i] - (total - moved)) + (term - moved)
-        term = total
-    parts[count] = term
+    for term in (error, product):
+        for i in range(count):  # Shewchuk, GROW-EXPANSION
+            total = parts[i] + term
+            moved = total - parts[i]
+            parts[i] = (parts[i] - (total - moved)) + (term - moved)
+            term = total
+        parts[count] = term
+        count += 1
 
 
 @compiled
@@ -73,3 +70,10 @@ def fill_orientations(corners: FloatArray, parts: FloatArray, signs: IntArray) -
         c = corners[t]
         turn = orientation(c[0], c[1], c[2], c[3], c[4], c[5], parts)
         signs[t] = int(turn > 0) - int(turn < 0)
+
+
+def counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return triangles (m, 3, 2), turned over where they are clockwise, and their orientations 1, -1 and 0."""
+    signs = np.empty(len(corners), dtype=np.int64)
+    fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
+    return np.where((signs < 0)[:, None, None], corners[:, ::-1], corners), signs

@@ -8,18 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import (
-    FloatArray,
-    IntArray,
-    as_faces,
-    as_floats,
-    require_finite,
-    rows_of,
-    unit_exponent,
-)
-from ..compiled import compiled
+from ..base.arrays import FloatArray, IntArray, as_faces, as_floats, require_finite, rows_of, unit_exponent
+from ..base.compiled import compiled
 from ..errors import ArrayShapeError, OptionError
-from ..threads import in_halves
 from .coverage import covered_twice
 from .fans import find_fans, lie_apart
 from .layers import may_overlap, open_sides
@@ -135,21 +126,15 @@ def _at_unit_size(corners: FloatArray) -> tuple[FloatArray, int]:
         corners, factor = np.ldexp(corners, -exponent), 1.0
     else:
         factor = 2.0**-exponent
-    numbers, scaled = np.ascontiguousarray(corners).reshape(-1), np.empty(corners.shape)
-    flat = scaled.reshape(-1)
-    in_halves(
-        lambda start, stop: scale_numbers(numbers[start:stop], factor, TINY, flat[start:stop]), len(flat)
-    )
+    scaled = np.empty(corners.shape)
+    scale_numbers(np.ascontiguousarray(corners).reshape(-1), factor, TINY, scaled.reshape(-1))
     return scaled, exponent
 
 
 def _counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return the triangles, turned over where they are clockwise, and their orientations 1, -1 and 0."""
     signs = np.empty(len(corners), dtype=np.int64)
-    flat = corners.reshape(-1, 6)
-    in_halves(
-        lambda start, stop: fill_orientations(flat[start:stop], np.empty(12), signs[start:stop]), len(flat)
-    )
+    fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
     clockwise = np.flatnonzero(signs < 0)
     if not len(clockwise):
         return corners, signs

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._arrays import ComplexArray, FloatArray, IntArray
-from ..compiled import compiled
-from ..mesh import NEXT, PREVIOUS
+from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
+from ..base.compiled import compiled
+from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
+
+# Height over longest side below which a triangle counts as flat, neither upright nor upside down: coordinates are
+# good to about 1e-12 of an edge.
+FLAT_HEIGHT = 1e-10
+# Areas below so much of the mean are taken as so much, where a logarithm is wanted.
+LEAST_AREA = 1e-12
 
 
 def as_complex(places: FloatArray) -> ComplexArray:
@@ -22,8 +28,9 @@ def as_pairs(points: ComplexArray) -> FloatArray:
 
 def signed_double_areas(corners: FloatArray) -> FloatArray:
     """Return (m,) twice the area of triangles with corners (m, 3, 2), negative where these run clockwise."""
-    areas = np.empty(len(corners))
-    fill_double_areas(np.ascontiguousarray(corners, dtype=np.float64), areas)
+    with np.errstate(over="ignore", invalid="ignore"):
+        one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        areas: FloatArray = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
     return areas
 
 
@@ -77,14 +84,31 @@ def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     return found[0], found[1]
 
 
-@compiled
-def fill_double_areas(corners: FloatArray, areas: FloatArray) -> None:
-    """Fill in (m,) twice the area of triangles with corners (m, 3, 2), negative where these run clockwise."""
-    for f in range(len(corners)):
-        x, y = corners[f, 0, 0], corners[f, 0, 1]
-        areas[f] = (corners[f, 1, 0] - x) * (corners[f, 2, 1] - y) - (corners[f, 1, 1] - y) * (
-            corners[f, 2, 0] - x
-        )
+def laid_out_curvature(mesh: TriangleMesh, corners: FloatArray, at: BoolArray | None = None) -> FloatArray:
+    """Return (n,) the curvature of triangles with given corners (m, 3, 2): a full or half turn less their angles.
+
+    Those of triangles that are upside down count as negative. Where triangles wind around a vertex twice, the
+    curvature is a full turn less than it seems.
+
+    at: (n,) the vertices of interest, as it takes less time at few; None for all. Elsewhere it is undefined.
+    """
+    chosen = np.arange(len(mesh.faces)) if at is None else np.flatnonzero(has_any(at, mesh.faces))
+    sides = sides_between(corners[chosen])
+    angles = signed_angles(sides)
+    angles = np.where((np.abs(heights(sides)) < FLAT_HEIGHT)[:, None], np.abs(angles), angles)
+    sums = np.bincount(mesh.faces[chosen].ravel(), angles.ravel(), len(mesh.vertices))
+    curvature: FloatArray = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - sums
+    return curvature
+
+
+def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) -> FloatArray:
+    """Return (n,) half the log of the ratio of areas around each vertex, after to before, (m,) each."""
+    ratio = []
+    for areas in (before, after):
+        around = np.bincount(mesh.faces.ravel(), np.repeat(areas, 3), minlength=len(mesh.vertices))
+        ratio.append(np.maximum(around, LEAST_AREA * around.mean()))
+    log_scale: FloatArray = np.log(ratio[1] / ratio[0]) / 2
+    return log_scale
 
 
 @compiled

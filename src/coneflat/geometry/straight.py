@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from ..compiled import compiled
-from ..mesh import TriangleMesh
+from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ..base.compiled import compiled
+from ..mesh.connectivity import TriangleMesh
 from .intrinsic import IntrinsicTriangulation, intrinsic_triangulation
 from .lengths import check_lengths
 
@@ -73,7 +73,6 @@ def straight_triangles(
     sides = np.empty(len(twin), dtype=np.complex128)
     turns = np.empty(len(twin), dtype=np.complex128)
     place_triangles(triangulation.length, sides)
-    find_turns(twin, sides, turns)
     undo_flips(twin, tail, sides, turns, np.asarray(flips, dtype=np.int64))
     if face_count is not None and 3 * face_count < len(twin):
         count = 3 * face_count
@@ -106,8 +105,14 @@ def place_triangles(length: FloatArray, sides: ComplexArray) -> None:
 
 
 @compiled
-def find_turns(twin: IntArray, sides: ComplexArray, turns: ComplexArray) -> None:
-    """Fill the unit number that takes the frame of the twin's triangle to that of each half-edge's own."""
+def undo_flips(
+    twin: IntArray, tail: IntArray, sides: ComplexArray, turns: ComplexArray, flips: IntArray
+) -> None:
+    """Fill the turns between triangles, and undo flips, the last one first, each by unfolding its two triangles.
+
+    The frames of triangles are carried along: vectors are added and turned, never divided by a side, which
+    may have length zero on the way.
+    """
     for h in range(len(twin)):
         t = twin[h]
         if t > h:
@@ -117,17 +122,6 @@ def find_turns(twin: IntArray, sides: ComplexArray, turns: ComplexArray) -> None
             turns[t] = turns[h].conjugate()
         elif t < 0:
             turns[h] = 1.0
-
-
-@compiled
-def undo_flips(
-    twin: IntArray, tail: IntArray, sides: ComplexArray, turns: ComplexArray, flips: IntArray
-) -> None:
-    """Undo flips, the last one first, each by unfolding its two triangles into the plane.
-
-    The frames of triangles are carried along: vectors are added and turned, never divided by a side, which
-    may have length zero on the way.
-    """
     for k in range(len(flips) - 1, -1, -1):
         h = flips[k]
         t = twin[h]

@@ -11,11 +11,11 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, FloatArray, IntArray, as_floats
-from ..compiled import compiled
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats
+from ..base.compiled import compiled
+from ..base.text import list_some, plural
 from ..errors import ArrayShapeError, DegenerateFaceError, FaceIndexError
-from ..mesh import NEXT, PREVIOUS
-from ..text import list_some, plural
+from ..mesh.connectivity import NEXT, PREVIOUS
 
 
 def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -25,7 +25,7 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
         ArrayShapeError: vertices are not (n, 3), or (n, 2), or faces not (m, 3).
         FaceIndexError: a face names a vertex that does not exist.
     """
-    from ..mesh import measure_sides
+    from ..mesh.connectivity import measure_sides
 
     points, triangles = as_floats("vertices", vertices), np.asarray(faces, dtype=np.int64)
     if points.ndim != 2:

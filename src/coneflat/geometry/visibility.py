@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from .._arrays import BoolArray, FloatArray, IntArray, dots
+from ..base.arrays import BoolArray, FloatArray, IntArray, dots
+from ..base.compiled import compiled
 from ..errors import OptionError
+from ..mesh.ties import own_axes
 from .normals import vertex_normals
-from .ties import own_axes
 
 # Directions to look from, evenly spread, and pixels along the side of each picture.
 DIRECTIONS, PIXELS = 64, 256
-# Pixels by which a vertex may lie behind what a picture shows there, where it faces the eye, and still be seen. Where
-# the surface is steep it is so much farther away within a pixel; from STEEPEST on there is not much to be seen.
-BIAS, STEEPEST = 1.0, 20.0
 
 
 def visible_share(vertices: FloatArray, faces: IntArray, up: FloatArray | None = None) -> FloatArray:
@@ -54,8 +54,6 @@ def _is_seen(
     points: FloatArray, faces: IntArray, facing: FloatArray, direction: FloatArray, axes: FloatArray
 ) -> BoolArray:
     """Return (n,) whether points, in pixels from the centre, are seen from a direction."""
-    from .raster import fill_nearest
-
     right = np.cross(direction, axes[np.argmin(np.abs(axes @ direction))])
     right /= np.linalg.norm(right)
     seen_from = points @ np.stack([right, np.cross(direction, right), -direction], axis=1)
@@ -63,9 +61,11 @@ def _is_seen(
     depth, face = np.full((PIXELS, PIXELS), np.inf), np.empty((PIXELS, PIXELS), dtype=np.int64)
     fill_nearest(seen_from, faces, depth, face)
     column, row = seen_from[:, :2].astype(np.int64).T
-    steep = np.sqrt(np.maximum(1 - facing**2, 0.0)) / np.maximum(facing, 1 / STEEPEST)
-    visible: BoolArray = seen_from[:, 2] <= depth[row, column] + BIAS * (1 + steep)
-    return visible
+    # A vertex may lie a pixel behind what the picture shows, and as much more as the surface falls within a pixel.
+    # Where the picture shows nothing, the depth is infinite: all is before it.
+    gap = np.maximum(seen_from[:, 2] - depth[row, column] - 1, -np.finfo(float).max)
+    behind = facing * gap
+    return np.asarray(behind <= np.sqrt(np.maximum(1 - facing**2, 0.0)))
 
 
 def _directions() -> FloatArray:
@@ -87,3 +87,59 @@ def _upright(axes: FloatArray, up: FloatArray) -> FloatArray:
     first = flat[np.argmax(np.linalg.norm(flat, axis=1) > 0.5)]
     first = first / np.linalg.norm(first)
     return np.stack([first, np.cross(up, first), up])
+
+
+@compiled
+def first_centre(position: float, size: int) -> int:
+    """Return the first pixel whose centre is at a position or beyond, from 0 up to the size."""
+    return int(min(max(math.ceil(position - 0.5), 0.0), float(size)))
+
+
+@compiled
+def crossing(points: FloatArray, p: int, q: int, y: float) -> float:
+    """Return the x at which the side between two points crosses a scan line; NaN if it does not."""
+    # From the upper end to the lower in every triangle: both faces of an edge then round alike.
+    if points[p, 1] > points[q, 1]:
+        p, q = q, p
+    if not points[p, 1] <= y < points[q, 1]:
+        return math.nan
+    drop = points[q, 1] - points[p, 1]
+    return points[p, 0] + (y - points[p, 1]) / drop * (points[q, 0] - points[p, 0])
+
+
+@compiled
+def fill_nearest(points: FloatArray, faces: IntArray, depth: FloatArray, face: IntArray) -> None:
+    """Write the nearest face, and its depth, to every pixel whose centre a face covers.
+
+    points: (n, 3) pixel x to the right, pixel y downwards, and depth away from the eye. depth, face: (h, w) what there
+    is already; of faces at the same depth the first stays.
+    """
+    height, width = depth.shape
+    for f in range(len(faces)):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        xa, ya, za = points[a, 0], points[a, 1], points[a, 2]
+        xb, yb, zb = points[b, 0] - xa, points[b, 1] - ya, points[b, 2] - za
+        xc, yc, zc = points[c, 0] - xa, points[c, 1] - ya, points[c, 2] - za
+        total = xb * yc - yb * xc
+        right = (zb * yc - zc * yb) / total if total != 0 else 0.0
+        down = (zc * xb - zb * xc) / total if total != 0 else 0.0
+        # In a triangle seen nearly edge on the gradient is mostly rounding error.
+        nearest = min(za, points[b, 2], points[c, 2])
+        farthest = max(za, points[b, 2], points[c, 2])
+        first = first_centre(min(ya, points[b, 1], points[c, 1]), height)
+        stop = first_centre(max(ya, points[b, 1], points[c, 1]), height)
+        for row in range(first, stop):
+            y = row + 0.5
+            left, end = math.inf, -math.inf
+            for p, q in ((a, b), (b, c), (c, a)):
+                x = crossing(points, p, q, y)
+                if x < left:
+                    left = x
+                if x > end:
+                    end = x
+            for column in range(first_centre(left, width), first_centre(end, width)):
+                z = za + right * (column + 0.5 - xa) + down * (y - ya)
+                z = min(max(z, nearest), farthest)
+                if z < depth[row, column]:
+                    depth[row, column] = z
+                    face[row, column] = f

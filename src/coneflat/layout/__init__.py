@@ -1,5 +1,31 @@
 """From a flat metric on a disk to points in the plane."""
 
-from .least_squares import least_squares_layout
+from .free_seams import free_seams
+from .lay_out import lay_out
+from .least_squares import far_pins, fit_shapes, least_squares_layout, pinned_least_squares, shapes_of_angles
+from .relax import Lines, PointConstraints, Relaxed, StretchEnergy, relax
+from .relax.relax import rest_sides
+from .relax.seam_chains import SeamChains, find_chains
+from .relax_layouts import relax_layouts
+from .unfold import closed_chain, unfold
 
-__all__ = ["least_squares_layout"]
+__all__ = [
+    "Lines",
+    "PointConstraints",
+    "Relaxed",
+    "SeamChains",
+    "StretchEnergy",
+    "closed_chain",
+    "far_pins",
+    "find_chains",
+    "fit_shapes",
+    "free_seams",
+    "lay_out",
+    "least_squares_layout",
+    "pinned_least_squares",
+    "relax",
+    "relax_layouts",
+    "rest_sides",
+    "shapes_of_angles",
+    "unfold",
+]

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 
-from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..errors import MetricError
 from ..geometry import corner_angles, is_broken
 from ..geometry.planar import as_pairs
-from ..geometry.ties import argmax_tied, tie_key
-from ..mesh import NEXT, PREVIOUS, TriangleMesh
-from ..solver import HermitianFactor
+from ..linalg import HermitianFactor
+from ..linalg.shortest_paths import MultiGraph
+from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
+from ..mesh.ties import argmax_tied, tie_key
 
 # Radians that an angle has which came out as none: they keep the shape of its triangle finite.
 LEAST_ANGLE = 1e-3
@@ -139,10 +139,7 @@ def far_pins(disk: TriangleMesh, lengths: FloatArray, avoided: BoolArray | None 
 
     Two pins close together, or held by a triangle that has no shape, leave the system nearly singular.
     """
-    graph = csr_matrix(
-        (lengths[disk.edge_halfedges[:, 0] // 3, disk.edge_halfedges[:, 0] % 3], tuple(disk.edges.T)),
-        shape=(len(disk.vertices),) * 2,
-    )
+    graph = MultiGraph(len(disk.vertices), disk.edges, lengths.ravel()[disk.edge_halfedges[:, 0]])
     allowed = np.ones(len(disk.vertices), dtype=bool)
     allowed[disk.faces[is_broken(lengths) if avoided is None else avoided]] = False
     if allowed.sum() < 2:
@@ -152,7 +149,7 @@ def far_pins(disk: TriangleMesh, lengths: FloatArray, avoided: BoolArray | None 
     inside = allowed & ~disk.is_boundary_vertex
     pins = [int(np.argmax(np.where(inside if inside.any() else allowed, key, -np.inf)))]
     for _ in range(2):  # the farthest from there, then the farthest from that
-        distance = dijkstra(graph, directed=False, indices=pins[-1])
+        distance = graph.shortest_paths(np.array(pins[-1:])).distance
         distance[~allowed] = -1
         distance[pins[-1]] = -1
         pins.append(argmax_tied(distance, key))

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from scipy.sparse import bsr_matrix
 
-from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
-from ..compiled import compiled
+from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
+from ..base.compiled import compiled
 from ..errors import MetricError
 from ..geometry.planar import map_factors
 from ..geometry.straight import FlatTriangles
-from ..mesh import label_components
-from ..solver.factors import SuperLUFactor
+from ..linalg import SuperLUFactor
+from ..linalg.newton import ARMIJO, HALVINGS
+from ..mesh.connectivity import label_components
+from .relax.elements import RIDGE
 
 # Height over longest side up to which a triangle counts as degenerate: coordinates in the plane are good to
 # about 1e-12 of an edge, and a triangle must stay upright when they are rounded.
@@ -24,17 +25,10 @@ ENOUGH = 0.1
 # Regularisation of the determinant: its floor, and its size relative to the worst determinant of the patch
 # (Garanzha et al. 2021, Section 4).
 FLOOR, RELATIVE = 1e-3, 0.2
-# Newton steps after which a patch is given up, to be tried again with more of its surroundings; or sooner, where the
-# gap to what is enough has not shrunk to this part of itself in so many steps. Those that succeed take 4 at the median.
-STEPS, PATIENCE, SHRUNK = 60, 4, 0.9
-# Part of the slope that a step must gain at least, and halvings after which a patch is stuck.
-ARMIJO, HALVINGS = 1e-4, 20
-# Part of the largest entry that is added to the diagonal: patches that nothing holds may shift as a whole.
-RIDGE = 1e-10
-# Patches at rest are left out of the equations when they make up this part of them.
-AT_REST = 0.25
-# Parts of the shifts found that are tried in the end, so that no vertex moves further than it need.
-PARTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+# A patch is given up, to be tried again with more of its surroundings, after so many rounds of so many Newton steps, or
+# where the gap to what is enough has not shrunk to this part of itself in one. Those that succeed take 4 steps at the
+# median.
+ROUNDS, STEPS, SHRUNK = 15, 4, 0.9
 
 
 class Patches:
@@ -49,7 +43,6 @@ class Patches:
         faces: (f,) triangles with such a vertex.
         count: the number of patches, which have no movable vertex in common.
         patch, face_patch: (k,), (f,) the patch of each.
-        work: the number of times that a triangle's derivatives were computed.
     """
 
     def __init__(
@@ -58,7 +51,7 @@ class Patches:
         faces: IntArray,
         sides: ComplexArray,
         movable: BoolArray,
-        wanted: Callable[[ComplexArray], ComplexArray],
+        rest: ComplexArray,
     ) -> None:
         self.vertices = np.flatnonzero(movable)
         self.faces = np.flatnonzero(has_any(movable, faces))
@@ -72,12 +65,13 @@ class Patches:
         size = np.bincount(self.corners[is_loose], around) / np.bincount(self.corners[is_loose])
         frames = _corner_frames(flat, faces[self.faces], self.faces, movable)
         self.shift = np.where(is_loose, frames * size[self.corners], 0)
-        self._find_maps(wanted(self.sides))
+        rest = rest[self.faces]
+        scale = np.sqrt((np.abs(self.sides) ** 2).sum(axis=1) / (np.abs(rest) ** 2).sum(axis=1))
+        self._find_maps(rest * np.maximum(scale, scale.mean() * DEGENERATE)[:, None])
         ends = self.corners[:, [1, 2, 0]].ravel(), self.corners[:, [2, 0, 1]].ravel()
         joined = (ends[0] >= 0) & (ends[1] >= 0)
         self.count, self.patch = label_components(len(self.vertices), ends[0][joined], ends[1][joined])
         self.face_patch = self.patch[self.corners.max(axis=1)]
-        self.work = 0
 
     def _find_maps(self, wanted: ComplexArray) -> None:
         """Set a and b as they are, and their derivatives by the shifts of the corners."""
@@ -88,67 +82,51 @@ class Patches:
             found.append(factors * self.shift)
         self.a, self.a_of, self.b, self.b_of = found
 
-    def fingerprints(self) -> list[bytes]:
-        """Return a key of each patch, the same for patches that are the same."""
-        vertices, faces = (
-            np.split(
-                np.argsort(label, kind="stable"), np.cumsum(np.bincount(label, minlength=self.count))[:-1]
-            )
-            for label in (self.patch, self.face_patch)
-        )
-        return [
-            b"".join(array.tobytes() for array in (self.vertices[v], self.a[f], self.b[f]))
-            for v, f in zip(vertices, faces, strict=True)
-        ]
-
-    def solve(self, most_work: float) -> ComplexArray:
-        """Return shifts (k,) that make the determinants positive, where this succeeds within so much work.
+    def solve(self) -> ComplexArray:
+        """Return shifts (k,) that make the determinants positive, where this succeeds.
 
         Newton's method with the Hessian made positive triangle by triangle. All patches take their steps together, in
         one system, but every patch has its own regularisation and step length, and stops as soon as it is done or
         stuck: `solver.newton` has one of each.
         """
         shifts = np.zeros(len(self.vertices), dtype=np.complex128)
-        active = np.ones(self.count, dtype=bool)
-        gap = np.full(self.count, np.inf)
-        equations = None
-        for taken in range(STEPS):
-            worst = self.worst(shifts)
-            active &= worst < ENOUGH
-            if taken % PATIENCE == 0:
-                active &= ENOUGH - worst <= SHRUNK * gap
-                gap = ENOUGH - worst
-            if not active.any() or self.work >= most_work:
+        gap = ENOUGH - self.worst(shifts)
+        active = gap > 0
+        for _ in range(ROUNDS):
+            if not active.any():
                 break
-            if equations is None or np.count_nonzero(active[equations.face_patch]) < (1 - AT_REST) * len(
-                equations.rows
-            ):
-                equations = _Equations(self, active)
-            e = equations
-            a, b = self._maps_at(shifts)
-            a, b = a[e.rows], b[e.rows]
-            epsilon = np.hypot(FLOOR, RELATIVE * np.minimum(worst, 0.0))[e.face_patch]
-            step, slope = e.newton_step(a, b, epsilon)
-            self.work += len(e.rows)
-            step[~active[self.patch]] = 0.0
-            slopes = np.bincount(self.patch, slope, self.count)
-            a_step, b_step = self._changes(step)
-            a_step, b_step = a_step[e.rows], b_step[e.rows]
-            energy = np.empty(len(a))
-            fill_energies(a, b, epsilon, energy)
-            before = np.bincount(e.face_patch, energy, self.count)
-            length = np.ones(self.count)
-            for _ in range(HALVINGS):
-                t = length[e.face_patch]
-                fill_energies(a + t * a_step, b + t * b_step, epsilon, energy)
-                after = np.bincount(e.face_patch, energy, self.count)
-                gained = ~active | (after <= before + ARMIJO * length * slopes)
-                if gained.all():
-                    break
-                length[~gained] /= 2
-            active &= gained
-            shifts += np.where(active, length, 0.0)[self.patch] * step
-        return self._shorten(shifts)
+            equations = _Equations(self, active)
+            for _ in range(STEPS):
+                active &= self._step(equations, shifts, active)
+            before, gap = gap, ENOUGH - self.worst(shifts)
+            active &= gap <= SHRUNK * before
+        return shifts
+
+    def _step(self, e: _Equations, shifts: ComplexArray, active: BoolArray) -> BoolArray:
+        """Add a step to the shifts of active patches (count,); return those that gained by it, and may take more."""
+        worst = self.worst(shifts)
+        a, b = self._maps_at(shifts)
+        a, b = a[e.rows], b[e.rows]
+        epsilon = np.hypot(FLOOR, RELATIVE * np.minimum(worst, 0.0))[e.face_patch]
+        step, slope = e.newton_step(a, b, epsilon)
+        slopes = np.bincount(self.patch, slope, self.count)
+        a_step, b_step = self._changes(step)
+        a_step, b_step = a_step[e.rows], b_step[e.rows]
+        energy = np.empty(len(a))
+        fill_energies(a, b, epsilon, energy)
+        before = np.bincount(e.face_patch, energy, self.count)
+        length = np.ones(self.count)
+        for _ in range(HALVINGS):
+            t = length[e.face_patch]
+            fill_energies(a + t * a_step, b + t * b_step, epsilon, energy)
+            after = np.bincount(e.face_patch, energy, self.count)
+            gained = ~active | (after <= before + ARMIJO * length * slopes)
+            if gained.all():
+                break
+            length[~gained] /= 2
+        gained &= active & (worst < ENOUGH)
+        shifts += np.where(gained, length, 0.0)[self.patch] * step
+        return gained
 
     def moved(self, shifts: ComplexArray) -> ComplexArray:
         """Return (f, 3) the sides of the triangles with their vertices shifted."""
@@ -170,16 +148,6 @@ class Patches:
     def _changes(self, shifts: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         at = shifts[self.corners]
         return (self.a_of * at).sum(axis=1), (self.b_of * at).sum(axis=1)
-
-    def _shorten(self, shifts: ComplexArray) -> ComplexArray:
-        """Return the shifts of each patch, cut down to the least part of them that is as good."""
-        part = np.ones(self.count)
-        wanted = np.minimum(self.worst(shifts), ENOUGH)
-        for fraction in PARTS:
-            enough = self.worst(fraction * shifts) >= wanted
-            part[enough] = np.minimum(part[enough], fraction)
-        shortened: ComplexArray = part[self.patch] * shifts
-        return shortened
 
 
 class _Equations:

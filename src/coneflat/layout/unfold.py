@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import BoolArray, ComplexArray, FloatArray, IntArray, as_faces
-from ..compiled import compiled
+from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, as_faces
+from ..base.compiled import compiled
 from ..errors import ArrayShapeError
 from ..geometry.planar import as_pairs
 from ..geometry.straight import FlatTriangles
-from ..threads import FEW, meanwhile
 
 # Iterations that spread the gaps; each costs as much as half a breadth-first search.
 SWEEPS = 10
@@ -69,23 +66,22 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
 
     on_cut = np.flatnonzero(cut)
     pinned = np.zeros(count, dtype=np.bool_)
-    with meanwhile(partial(weigh_sides, corner, flat.sides, NO_LENGTH, count), m, FEW // 3) as weighing:
-        while (seeds := on_cut[~reached[on_cut // 3]]).size:
-            border, frames = _border(flat, cut, int(seeds[0]))
-            tails = corner[_next(border)]
-            points[tails] = closed_chain(frames * flat.sides[border])
-            placed[tails] = pinned[tails] = True
-            along, first = np.unique(border // 3, return_index=True)
-            frame[along] = frames[first]
-            reached[along] = True
-            queue[: len(along)] = along
-            spread(*arrays, len(along), reached, frame, placed, points)
-        while not reached.all():  # charts without a border
-            seed = int(reached.argmin())
-            reached[seed] = placed[corner[3 * seed]] = pinned[corner[3 * seed]] = True
-            queue[0] = seed
-            spread(*arrays, 1, reached, frame, placed, points)
-        _close_gaps(flat.sides, corner, frame, points, pinned, *weighing.result())
+    while (seeds := on_cut[~reached[on_cut // 3]]).size:
+        border, frames = _border(flat, cut, int(seeds[0]))
+        tails = corner[_next(border)]
+        points[tails] = closed_chain(frames * flat.sides[border])
+        placed[tails] = pinned[tails] = True
+        along, first = np.unique(border // 3, return_index=True)
+        frame[along] = frames[first]
+        reached[along] = True
+        queue[: len(along)] = along
+        spread(*arrays, len(along), reached, frame, placed, points)
+    while not reached.all():  # charts without a border
+        seed = int(reached.argmin())
+        reached[seed] = placed[corner[3 * seed]] = pinned[corner[3 * seed]] = True
+        queue[0] = seed
+        spread(*arrays, 1, reached, frame, placed, points)
+    _close_gaps(flat.sides, corner, frame, points, pinned, *weigh_sides(corner, flat.sides, NO_LENGTH, count))
     return as_pairs(points)
 
 

@@ -7,65 +7,64 @@ settings in the report and the tables in the documentation are made from it.
 
 from __future__ import annotations
 
+import inspect
 import math
+import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from ..progress import Progress
-from ..threads import THREADS
+from ..base.defaults import (
+    DISTORTION,
+    MAX_CONE_ANGLE,
+    MIN_CONE_ANGLE,
+    MOST_CONES,
+    MOST_PREFERENCE,
+    PADDING,
+    RESOLUTION,
+)
+from ..base.progress import Progress
+from ..base.threads import THREADS
 from .kinds import (
+    ANGLE,
+    ANGLE_OR_NONE,
+    COUNT,
+    POSITIVE,
     Choice,
-    Count,
     Direction,
     Edges,
     Flag,
     Kind,
-    Most,
     Number,
-    Strength,
     Vertices,
+    VerticesOrEdges,
     Weights,
-    Whole,
     WordOrVertices,
-)
+    strength,
+    whole,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-CONES = ("auto", "pursuit", "greedy", "none")
-#: From cones to a layout: this package's own, the paper's, and those that it compares with.
-METHODS = ("exact", "linear", "circle-patterns", "ricci", "linear-abf", "abf++", "lscm", "spectral", "bff")
-#: As some of them were used in 2008: circle patterns without flips, and angles that prescribe nothing at cones.
-VARIANTS = ("circle-patterns/fixed", "linear-abf/free", "abf++/free")
-# Those that solve what need not converge.
-ITERATIVE = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci", "abf++", "abf++/free")
-# Those whose metric lives on flipped triangles and is unfolded on the mesh's own.
-UNFOLDED = ("exact", "circle-patterns", "circle-patterns/fixed", "ricci")
-# Those whose cones have the curvatures that are prescribed; the others lay out what was cut open before.
-CONED = (*UNFOLDED, "linear", "bff", "linear-abf", "abf++")
+CONES = ("auto", "sparse", "greedy", "none")
+#: From cones to a layout: this package's own, and the paper's.
+METHODS = ("exact", "linear")
 #: Which triangles of a flat metric are relaxed.
-POLISHES = ("auto", "off", "whole")
-SOLVERS = ("auto", "pardiso", "cholespy", "scipy", "amg")
+RELAXED = ("auto", "off", "whole")
 CHARTS = ("atlas", "one")
 BOUNDARIES = ("free", "lengths", "disk", "straight")
-SYMMETRIES = ("auto", "x", "y", "z", "off")
-MIRRORED = ("apart", "overlap")
+NO_CORNERS = "boundary names no corners; for a round boundary, say 'disk'"
 
-# Radians: finer quanta than this restrict nothing that could be told from none, as multiples are known to 1e-6.
-LEAST_QUANTUM = 1e-4
 # Radians: no triangulation has room for wider cones than this.
 WIDEST_CONE = 1000 * math.pi
-# A preference for creases or hidden places of 1 makes seams ten times cheaper; with a factor of more than 1e10, the
-# lengths of seams are beneath the rounding of their costs.
-MOST_PREFERENCE = 10.0
 
 Cones = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
 
 #: The published method: `flatten(mesh, **PAPER)`.
 PAPER: Mapping[str, Any] = {
     "cones": "greedy",
-    "epsilon": 1.0,
     "max_cones": None,
     "method": "linear",
     "charts": "one",
@@ -74,326 +73,235 @@ PAPER: Mapping[str, Any] = {
 
 @dataclass(frozen=True)
 class Declaration:
-    """What is declared of an option beside its name, type and default.
+    """What is declared of an option.
 
     Attributes:
         kind: what values it takes.
-        doc: what it means, for people at the command line and in Python alike.
-        only: what alone has this choice: "pursuit" or "greedy" for cones, "exact" for the method; or "".
+        only: what alone has this choice: "sparse" for cones, "exact" for the method; or "".
         one_mesh: it names vertices of one mesh, so it fits no others.
         flag: the commands have it.
         command_default: what they take by default if it is not what Python takes; the reason stands beside it.
+        name, type, default: of the field.
+        group: what it is an option of, the first word of the docstring of its group.
+        doc: what it means, for people at the command line and in Python alike: as in the docstring of its group.
     """
 
     kind: Kind
-    doc: str
     only: str = ""
     one_mesh: bool = False
     flag: bool = True
     command_default: Any = None
+    name: str = ""
+    type: Any = None
+    default: Any = None
+    group: str = ""
+    doc: str = ""
 
 
-def option(default: Any, kind: Kind, doc: str, **more: Any) -> Any:
+def option(default: Any, kind: Kind, **more: Any) -> Any:
     """Return a field of a group, with its declaration."""
-    return field(default=default, metadata={"declaration": Declaration(kind, doc, **more)})
+    return field(default=default, metadata={"declared": Declaration(kind, **more)})
+
+
+@cache
+def declarations(group: Any) -> dict[str, Declaration]:
+    """Return the options of a group by name, its own before those of the groups that it is made of, in their order."""
+    known = {each.name: each for each in fields(group)}
+    found: dict[str, Declaration] = {}
+    for base in group.__mro__:
+        text = inspect.cleandoc(base.__doc__ or "")
+        title = re.split(r"\W", text)[0]
+        docs = dict(re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", text, re.MULTILINE))
+        for name in inspect.get_annotations(base):
+            if name in known and name not in found:
+                of = known[name]
+                doc = " ".join(docs.get(name, "").split())
+                told = {"name": name, "group": title, "doc": doc, "type": of.type, "default": of.default}
+                found[name] = replace(of.metadata["declared"], **told)
+    return found
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConeBounds:
-    """Cones: of which angles, and where."""
+    """Cones: of which angles, and where.
 
-    min_cone_angle: float = option(
-        math.pi / 2,
-        Number(is_angle=True),
-        "The sharpest cone: its angle, 2 pi less its curvature. Needles distort what is around them.",
-        only="pursuit",
-    )
-    max_cone_angle: float | None = option(
-        4 * math.pi,
-        Number(is_angle=True, optional=True),
-        "The widest saddle: its angle, above 2 pi; none or inf for any. Wider ones have no room in triangles.",
-        only="pursuit",
-    )
-    positive_only: bool = option(
-        False, Flag(), "No cones of negative curvature, which are saddles.", only="pursuit"
-    )
-    weights: ArrayLike | Mapping[int, float] | str | None = option(
-        None,
-        Weights(),
-        "Importance of each vertex, from which distortion keeps off: numbers, or a map of vertices to theirs, where "
-        "others are 1; the name of a property in the file; or color, where grey vertices are 1, those of a pure "
-        "colour 100.",
-        only="pursuit",
-    )
-    required_cones: Iterable[int] = option(
-        (), Vertices(), "Vertices that are cones in any case.", only="pursuit", one_mesh=True
-    )
-    forbidden_cones: Iterable[int] = option(
-        (), Vertices(), "Vertices that may not be cones.", only="pursuit", one_mesh=True
-    )
-    allowed_cones: Iterable[int] | None = option(
-        None, Vertices(optional=True), "Vertices that alone may be cones.", only="pursuit", one_mesh=True
-    )
+    Attributes:
+        required_cones: Vertices that are cones in any case.
+        forbidden_cones: Vertices that may not be cones.
+        weights: Importance of each vertex, from which distortion keeps off: numbers, or a map of vertices to theirs,
+            where others are 1; the name of a property in the file; or color, where grey vertices are 1, those of a pure
+            colour 100.
+        min_cone_angle: The sharpest cone: its angle, 2 pi less its curvature. Needles distort what is around them.
+        max_cone_angle: The widest saddle: its angle, above 2 pi; none or inf for any. Wider ones have no room in
+            triangles.
+        positive_only: No cones of negative curvature, which are saddles.
+    """
+
+    required_cones: Iterable[int] = option((), Vertices(), only="sparse", one_mesh=True)
+    forbidden_cones: Iterable[int] = option((), Vertices(), only="sparse", one_mesh=True)
+    weights: ArrayLike | Mapping[int, float] | str | None = option(None, Weights(), only="sparse")
+    min_cone_angle: float = option(MIN_CONE_ANGLE, ANGLE, only="sparse")
+    max_cone_angle: float | None = option(MAX_CONE_ANGLE, ANGLE_OR_NONE, only="sparse")
+    positive_only: bool = option(False, Flag(), only="sparse", flag=False)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConeNumber:
-    """Cones: how many."""
+    """Cones: how many.
 
-    distortion: float = option(
-        0.2,
-        Number(positive=True),
-        "The area distortion allowed, the standard deviation of the log of the scale by area; less needs more cones.",
-        only="pursuit",
-    )
-    cone_count: int | None = option(
-        None,
-        Count(),
-        "So many cones per component, placed for the least area distortion, instead.",
-        only="pursuit",
-    )
+    Attributes:
+        distortion: The area distortion allowed, the standard deviation of the log of the scale by area; less needs more
+            cones.
+        cone_count: So many cones per component, placed for the least area distortion, instead.
+    """
+
+    distortion: float = option(DISTORTION, POSITIVE, only="sparse")
+    cone_count: int | None = option(None, COUNT, only="sparse")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ConeOptions(ConeBounds, ConeNumber):
-    """Cones."""
+class ConeQuanta:
+    """Cones: of whole multiples.
 
-    cones: Cones = option(
-        "auto",
-        WordOrVertices(CONES, "cone", may_differ=True),
-        "How cones are found. pursuit: the fewest for the distortion allowed. greedy: the paper's search, which takes "
-        "three to six times as many. none: none, for bounded meshes and tori. Or vertices, each with its curvature, "
-        "or all without: the best curvatures are computed then; or some without, which have the least area distortion "
-        "beside the others. auto: pursuit, but none where the boundary is prescribed, the corners of a polyhedron that "
-        "has few, and greedy where handles need over a hundred.",
-    )
-    max_cones: int | None = option(None, Count(), "Searches stop at so many cones per component.")
-    quality: float | None = option(
-        None,
-        Number(optional=True),
-        "The mean quasi-conformal distortion wanted, 1.05 say: all triangles are relaxed, and there are up to a fifth "
-        "more cones, as few as reach it. A note says where they do not.",
-        only="pursuit",
-    )
-    quantise: float | None = option(
-        None,
-        Number(is_angle=True, optional=True),
-        "Cones have curvatures that are multiples of this, pi/2 say, so that seams turn by such multiples.",
-        only="pursuit",
-    )
-    correct_handles: bool = option(
-        False,
-        Flag(),
-        "With quantised cones and the exact metric: make rotations along handles, and around holes where the boundary "
-        "is free, multiples, too, by a map that is as little off conformal as can be.",
-        only="pursuit",
-    )
-    epsilon: float = option(
-        1.0,
-        Number(positive=True),
-        "The greedy search stops when the log of the scale varies by at most this.",
-        only="greedy",
-    )
+    Attributes:
+        quantise: Cones have curvatures that are multiples of this, pi/2 say, so that seams turn by such multiples.
+        correct_handles: With quantised cones and the exact metric: make rotations along handles, and around holes where
+            the boundary is free, multiples, too, by a map that is as little off conformal as can be.
+    """
+
+    quantise: float | None = option(None, ANGLE_OR_NONE, only="sparse")
+    correct_handles: bool = option(False, Flag(), only="sparse", flag=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConeOptions(ConeNumber, ConeBounds, ConeQuanta):
+    """Cones.
+
+    Attributes:
+        cones: How cones are found. sparse: the fewest for the distortion allowed. greedy: the paper's search, which
+            takes three to six times as many. none: none, for bounded meshes and tori. Or vertices, each with its
+            curvature or without: those without have the curvatures of the least area distortion. auto:
+            sparse, but none where the boundary is prescribed, the corners of a polyhedron that has few, and greedy
+            where handles need over a hundred.
+        max_cones: Searches stop at so many cones per component.
+    """
+
+    cones: Cones = option("auto", WordOrVertices(CONES, "cone", may_differ=True))
+    max_cones: int | None = option(None, COUNT)
 
 
 @dataclass(frozen=True, kw_only=True)
 class MetricOptions:
-    """Metric."""
+    """Metric.
 
-    method: str = option(
-        "exact",
-        Choice(METHODS),
-        "exact: no curvature error, and no flipped triangle. linear: the paper's linear system and least squares. The "
-        "others are there for comparison.",
-    )
-    boundary: Cones = option(
-        "free",
-        WordOrVertices(BOUNDARIES, "corner", "boundary names no corners; for a round boundary, say 'disk'"),
-        "Exact metric: free has the least area distortion. lengths is the same at the model's own scale, so that "
-        "lengths on the boundary are kept. disk is round. straight has straight sides between corners that the search "
-        "finds like cones. Or the corners of a polygon, vertices with curvatures, or all without for equal angles.",
-        only="exact",
-    )
-    refine: bool = option(
-        False,
-        Flag(),
-        "Exact metric: cut the input's triangles along the edges of the flat triangulation, which carries the exact "
-        "map; nothing can be inverted there. Polygons and groups are not kept.",
-        only="exact",
-    )
-    polish: str = option(
-        "auto",
-        Choice(POLISHES),
-        "Exact metric: less distortion of triangles, with the same cones, curvatures and seams. auto: those with a "
-        "quasi-conformal distortion above 1.35, beside cones, and three rings around them. whole: all. off: none, so "
-        "that the map is discretely conformal everywhere.",
-        only="exact",
-    )
-    stretch: float = option(
-        0.0,
-        Strength(1.0),
-        "Exact metric: from angles, 0, to areas, 1, which is as near to isometric as the cones allow. More than 0 "
-        "moves all vertices, except on a boundary that is prescribed.",
-        only="exact",
-    )
-    split: bool = option(
-        True,
-        Flag(),
-        "Where triangles would be inverted on straight sides whatever is moved, as around a cone that is too wide for "
-        "them, cut them, and no others, with a note. Without, the result has the input's own triangles, some inverted.",
-    )
-    best_effort: bool = option(
-        False, Flag(), "Give a result even if the metric did not converge, which is refused otherwise."
-    )
+    Attributes:
+        method: exact: no curvature error, and no flipped triangle. linear: the paper's linear system and least squares.
+        boundary: Exact metric: free has the least area distortion. lengths is the same at the model's own scale, so
+            that lengths on the boundary are kept. disk is round. straight has straight sides between corners that the
+            search finds like cones. Or the corners of a polygon, vertices with curvatures, or all without for equal
+            angles.
+        relax: Exact metric: less distortion of triangles, with the same cones, curvatures and seams. auto: those that
+            cones bend most, and three rings around them. whole: all. off: none, so that the map is discretely conformal
+            everywhere.
+        stretch: Exact metric: from angles, 0, to areas, 1, which is as near to isometric as the cones allow. More than
+            0 moves all vertices, except on a boundary that is prescribed.
+    """
+
+    method: str = option("exact", Choice(METHODS))
+    boundary: Cones = option("free", WordOrVertices(BOUNDARIES, "corner", NO_CORNERS), only="exact")
+    relax: str = option("auto", Choice(RELAXED), only="exact")
+    stretch: float = option(0.0, strength(1.0), only="exact")
 
 
 @dataclass(frozen=True, kw_only=True)
 class SeamOptions:
-    """Seams."""
+    """Seams.
 
-    seams: ArrayLike | str | tuple[str, ArrayLike] | None = option(
-        None,
-        Edges(("input",)),
-        "Edges that are cut in any case, pairs of vertices, or input: the seams of the file's own UVs, or both, as "
-        '("input", pairs). They act like a boundary. An edge that no other meets is no cut.',
-        one_mesh=True,
-    )
-    forbidden_seams: ArrayLike | None = option(
-        None,
-        Edges(),
-        "Edges, pairs of vertices, that the first cut must not use, not for sharp edges or seams of the file either; "
-        "what is cut later so that nothing overlaps avoids them where it can.",
-        one_mesh=True,
-    )
-    seamless: Iterable[int] = option(
-        (),
-        Vertices(),
-        "Vertices of regions without seams: an edge between two of them is one of forbidden_seams, and no search puts "
-        "a cone where no seam gets.",
-        one_mesh=True,
-    )
-    sharp_angle: float | None = option(
-        None,
-        Number(is_angle=True, optional=True),
-        "Cut edges at which the surface bends by more, 40deg say: CAD parts open there.",
-    )
-    creases: float = option(
-        0.0,
-        Strength(MOST_PREFERENCE),
-        "How much seams prefer sharp edges: at 1, one of 60 degrees and more costs a tenth of its length.",
-    )
-    hide_seams: float = option(
-        0.0,
-        Strength(MOST_PREFERENCE),
-        "How much seams prefer what can hardly be seen, in deep folds and, with a direction up, below: at 1, it costs "
-        "a tenth of its length.",
-    )
-    seam_weights: ArrayLike | str | None = option(
-        None,
-        Weights(),
-        "By how much seams are dearer at each vertex: numbers, or the name of a property in the file.",
-    )
+    Attributes:
+        seams: Edges that are cut in any case, pairs of vertices, or input: the seams of the file's own UVs, or both, as
+            ("input", pairs). They act like a boundary. An edge that no other meets is no cut.
+        no_seams: Edges, pairs of vertices, that the first cut must not use, not for sharp edges or seams of the file
+            either; or vertices: then the edges between two of them. No search puts a cone where no seam could reach.
+            What is cut later so that nothing overlaps avoids these edges where it can.
+        sharp_angle: Cut edges at which the surface bends by more, 40deg say: CAD parts open there. Other seams prefer
+            sharp edges: the cost of an edge falls from its length where the surface bends by 20 degrees to a tenth at
+            60.
+        hide_seams: How much seams prefer what can hardly be seen, in deep folds and, with a direction up, below: at 1,
+            it costs a tenth of its length.
+        seam_weights: By how much seams are dearer at each vertex: numbers, or the name of a property in the file.
+    """
 
-
-@dataclass(frozen=True, kw_only=True)
-class SymmetryOptions:
-    """Symmetry."""
-
-    symmetric: str = option(
-        "off",
-        Choice(SYMMETRIES),
-        "Cones, seams and charts are mirror symmetric. auto: where the model is, to three thousandths of its size, if "
-        "cones and seams become little more. x, y, z: about the plane of about that normal that fits best, to three "
-        "hundredths.",
-    )
-    mirrored: str = option(
-        "apart",
-        Choice(MIRRORED),
-        "overlap: both sides of a symmetric model lie on each other in the texture and share its texels.",
-    )
+    seams: ArrayLike | str | tuple[str, ArrayLike] | None = option(None, Edges(("input",)), one_mesh=True)
+    no_seams: ArrayLike | None = option(None, VerticesOrEdges(), one_mesh=True)
+    sharp_angle: float | None = option(None, ANGLE_OR_NONE)
+    hide_seams: float = option(0.0, strength(MOST_PREFERENCE))
+    seam_weights: ArrayLike | str | None = option(None, Weights())
 
 
 @dataclass(frozen=True, kw_only=True)
 class AtlasOptions:
-    """Atlas."""
+    """Atlas.
 
-    charts: str = option(
-        "atlas",
-        Choice(CHARTS),
-        "atlas: seams are moved, and cuts made where they must be, so that nothing overlaps. one: a single chart per "
-        "component, as in the paper, which may overlap itself; PAPER and --paper take it.",
-    )
-    resolution: int = option(
-        1024, Whole(2**16), "Texels along a side of the texture, by which padding counts."
-    )
-    padding: float = option(
-        2.0,
-        Number(),
-        "Texels between charts, and between them and the border, at least; to a quarter of a side.",
-    )
-    tiles: int = option(1, Whole(1000), "Textures (UDIM tiles) to distribute charts over, all at one scale.")
-    up: tuple[float, float, float] | None = option(
-        None,
-        Direction(),
-        "What is up in the model is to be up in the texture; without, charts lie as they fill it best.",
-    )
+    Attributes:
+        charts: atlas: seams are moved, and cuts made where they must be, so that nothing overlaps. one: a single chart
+            per component, as in the paper, which may overlap itself; PAPER and --paper take it.
+        resolution: Texels along a side of the texture, by which padding counts.
+        padding: Texels between charts, and between them and the border, at least; to a quarter of a side.
+        tiles: Textures (UDIM tiles) to distribute charts over, all at one scale.
+        up: What is up in the model is to be up in the texture; without, charts lie as they fill it best.
+    """
+
+    charts: str = option("atlas", Choice(CHARTS))
+    resolution: int = option(RESOLUTION, whole(2**16))
+    padding: float = option(PADDING, Number())
+    tiles: int = option(1, whole(1000))
+    up: tuple[float, float, float] | None = option(None, Direction())
 
 
 @dataclass(frozen=True, kw_only=True)
 class InputOptions:
-    """Input."""
+    """Input.
 
-    lengths: ArrayLike | None = option(
-        None,
-        Kind(),
-        "A metric of one's own instead of the distances between vertices: (m, 3) side lengths of the triangles given, "
-        "column i opposite corner i. For meshes given as arrays.",
-        flag=False,
-        one_mesh=True,
-    )
-    repair: bool = option(
-        False,
-        Flag(),
-        "Drop, split and cut what makes the input no manifold, with a note, instead of refusing it. Commands do so "
-        "unless told otherwise.",
-        # A file's user can seldom mend it; whoever has arrays wants to know that they are no mesh.
-        command_default=True,
-    )
-    strict: bool = option(
-        False,
-        Flag(),
-        "Refuse triangles without area, which otherwise are opened by a tiny change of lengths; for commands, what "
-        "is no manifold, too.",
-    )
-    progress: Progress | None = option(
-        None, Kind(), "Called with what is being done and the fraction of the whole that is done.", flag=False
-    )
+    Attributes:
+        lengths: A metric of one's own instead of the distances between vertices: (m, 3) side lengths of the triangles
+            given, column i opposite corner i. For meshes given as arrays.
+        repair: Drop, split and cut what makes the input no manifold, with a note, instead of refusing it. Commands do
+            so unless told otherwise.
+        strict: Refuse triangles without area, which otherwise are opened by a tiny change of lengths; for commands,
+            what is no manifold, too.
+        progress: Called with what is being done and the fraction of the whole that is done.
+    """
+
+    lengths: ArrayLike | None = option(None, Kind(), flag=False, one_mesh=True)
+    # A file's user can seldom mend it; whoever has arrays wants to know that they are no mesh.
+    repair: bool = option(False, Flag(), command_default=True)
+    strict: bool = option(False, Flag())
+    progress: Progress | None = option(None, Kind(), flag=False)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunOptions(InputOptions):
-    """Run."""
+    """Input, and how it is worked on.
 
-    solver: str = option(
-        "auto",
-        Choice(SOLVERS),
-        "What solves the linear systems; auto is the fastest that is installed. amg iterates, for what fits no other.",
-    )
-    threads: int = option(
-        THREADS,
-        Whole(256),
-        "Threads of PARDISO, which solves large systems; two stages at once at most are done by more than one. The "
-        "last digits depend on it, so that it is the same on every machine unless told otherwise.",
-    )
+    Attributes:
+        threads: Threads of PARDISO, which solves large systems; two stages at once at most are done by more than one.
+            The last digits depend on it, so that it is the same on every machine unless told otherwise.
+    """
+
+    threads: int = option(THREADS, whole(256))
 
 
 @dataclass(frozen=True, kw_only=True)
-class FindOptions(InputOptions, ConeBounds, ConeNumber):
+class FindOptions(ConeNumber, ConeBounds, InputOptions):
     """What `coneflat.find_cones` takes."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class CurveOptions(InputOptions, ConeBounds):
-    """What `coneflat.cone_curve` takes."""
+class CurveOptions(ConeBounds, InputOptions):
+    """What `coneflat.cone_curve` takes.
 
-    most: int = option(30, Most(), "The largest number of cones.")
+    Attributes:
+        most: The largest number of cones.
+    """
+
+    most: int = option(MOST_CONES, whole())

@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ..base.text import shown
 from ..errors import OptionError
-from ..text import shown
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .._arrays import IntArray
+    from ..base.arrays import IntArray
 
 # NumPy is imported late: commands that only print their help need none.
 
@@ -30,11 +30,6 @@ class Kind:
         """
         return value
 
-    @property
-    def bounds(self) -> str:
-        """What values there are, for tables."""
-        return ""
-
 
 @dataclass(frozen=True)
 class Choice(Kind):
@@ -46,10 +41,6 @@ class Choice(Kind):
         if not isinstance(value, str) or value not in self.words:
             raise OptionError(f"unknown {name} {shown(value)}: choose from {', '.join(self.words)}")
         return value
-
-    @property
-    def bounds(self) -> str:
-        return ", ".join(f"`{word}`" for word in self.words)
 
 
 @dataclass(frozen=True)
@@ -66,108 +57,67 @@ class Flag(Kind):
 
 @dataclass(frozen=True)
 class Number(Kind):
-    """A number; an angle is one in radians.
+    """A number; an angle is one in radians, a strength one from 0, where True and False are 1 and 0.
 
     Attributes:
-        is_angle: it is an angle.
+        least, most: bounds that it may reach.
+        is_whole: it is a whole number.
+        is_positive: it is finite and above 0.
+        is_angle, is_strength: it is one.
         optional: None stands for no number.
-        positive: it is finite and above 0.
     """
 
+    least: float = -math.inf
+    most: float = math.inf
+    is_whole: bool = False
+    is_positive: bool = False
     is_angle: bool = False
+    is_strength: bool = False
     optional: bool = False
-    positive: bool = False
 
     def parse(self, name: str, value: Any) -> float | None:
         if value is None and self.optional:
             return None
-        number = as_number(name, value)
-        if self.positive and not 0 < number < math.inf:
-            raise OptionError(f"{name} must be a positive number, not {number:g}")
+        if self.is_strength and type(value).__name__ in ("bool", "bool_"):
+            value = float(value)
+        number = as_whole(name, value) if self.is_whole else as_number(name, value)
+        if not self.least <= number <= self.most or (self.is_positive and not 0 < number < math.inf):
+            raise OptionError(f"{name} must be {self.text}, not {number:,.6g}")
         return number
 
     @property
-    def bounds(self) -> str:
-        return "above 0" if self.positive else "radians" if self.is_angle else ""
+    def text(self) -> str:
+        """What numbers there are."""
+        noun = "a whole number" if self.is_whole else "a number"
+        if self.is_positive:
+            return f"{noun} above 0"
+        if self.least == -math.inf:
+            return noun
+        return f"{noun} from {self.least:g}" + (f" to {self.most:,g}" if self.most < math.inf else "")
 
 
-@dataclass(frozen=True)
-class Strength(Kind):
-    """A number from 0 to a largest one; True and False are 1 and 0."""
-
-    most: float
-
-    def parse(self, name: str, value: Any) -> float:
-        import numpy as np
-
-        number = float(value) if isinstance(value, (bool, np.bool_)) else as_number(name, value)
-        if not 0 <= number <= self.most:
-            raise OptionError(f"{name} must be a number from 0 to {self.most:g}, not {number:g}")
-        return number
-
-    @property
-    def bounds(self) -> str:
-        return f"0 to {self.most:g}"
+ANGLE, ANGLE_OR_NONE = Number(is_angle=True), Number(is_angle=True, optional=True)
+POSITIVE = Number(is_positive=True)
+COUNT = Number(0, is_whole=True, optional=True)
 
 
-@dataclass(frozen=True)
-class Count(Kind):
-    """A whole number from 0; None for none."""
-
-    def parse(self, name: str, value: Any) -> int | None:
-        if value is None:
-            return None
-        count = as_whole(name, value)
-        if count < 0:
-            raise OptionError(f"{name} cannot be negative ({value})")
-        return count
-
-    @property
-    def bounds(self) -> str:
-        return "from 0"
+def strength(most: float) -> Number:
+    """Return a strength up to a largest one."""
+    return Number(0, most, is_strength=True)
 
 
-@dataclass(frozen=True)
-class Whole(Kind):
-    """A whole number from 1 to a largest one."""
-
-    most: int
-
-    def parse(self, name: str, value: Any) -> int:
-        number = as_whole(name, value)
-        if not 1 <= number <= self.most:
-            raise OptionError(f"{name} must be from 1 to {self.most:,}, not {number:,}")
-        return number
-
-    @property
-    def bounds(self) -> str:
-        return f"1 to {self.most:,}"
-
-
-@dataclass(frozen=True)
-class Most(Kind):
-    """The largest number of cones."""
-
-    def parse(self, name: str, value: Any) -> int:
-        import numpy as np
-
-        is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-        if not is_number or not float(value).is_integer() or value < 1:
-            raise OptionError(
-                f"the largest number of cones must be a whole number from 1, not {shown(value)}"
-            )
-        return int(value)
+def whole(most: float = math.inf) -> Number:
+    """Return a whole number from 1 to a largest one."""
+    return Number(1, most, is_whole=True)
 
 
 @dataclass(frozen=True)
 class Vertices(Kind):
-    """Vertices, from 0, as a tuple; None stands for none, or, if `optional`, for no choice."""
+    """Vertices, from 0, as a tuple; None stands for none."""
 
-    optional: bool = False
-
-    def parse(self, name: str, value: Any) -> tuple[int, ...] | None:
+    def parse(self, name: str, value: Any) -> tuple[int, ...]:
         if value is None:
-            return None if self.optional else ()
+            return ()
         noun = name.replace("_", " ").removesuffix("s")
         if isinstance(value, Mapping):
             raise OptionError(f"{noun}s are vertices alone, without curvatures: give a list of them")
@@ -198,36 +148,42 @@ class WordOrVertices(Kind):
             raise OptionError(self.lacking)
         return given
 
-    @property
-    def bounds(self) -> str:
-        return Choice(self.words).bounds + ", or vertices"
-
 
 @dataclass(frozen=True)
 class Edges(Kind):
     """Edges as (k, 2) pairs of vertices, a word, or a word and such pairs; None for none."""
 
-    words: tuple[str, ...] = ()
+    words: tuple[str, ...]
 
     def parse(self, name: str, value: Any) -> str | IntArray | tuple[str, IntArray] | None:
-        if isinstance(value, str) and self.words:
+        if isinstance(value, str):
             return Choice(self.words).parse(name, value)
-        if self.words and isinstance(value, (tuple, list)) and len(value) == 2 and isinstance(value[0], str):
-            return Choice(self.words).parse(name, value[0]), _pairs(name.replace("_", " "), value[1])
-        return None if value is None else _pairs(name.replace("_", " "), value)
+        if isinstance(value, (tuple, list)) and len(value) == 2 and isinstance(value[0], str):
+            return Choice(self.words).parse(name, value[0]), _pairs(name, value[1])
+        return None if value is None else _pairs(name, value)
 
-    @property
-    def bounds(self) -> str:
-        return (Choice(self.words).bounds + ", or " if self.words else "") + "pairs of vertices"
+
+@dataclass(frozen=True)
+class VerticesOrEdges(Kind):
+    """Vertices (k,), from 0, or edges as pairs of vertices (k, 2); None for none."""
+
+    def parse(self, name: str, value: Any) -> IntArray | None:
+        import numpy as np
+
+        if value is None:
+            return None
+        given = _indices(name, value)
+        if given.ndim not in (1, 2) or given.shape[1:] not in ((), (2,)) or given.dtype.kind not in "iu":
+            raise OptionError(
+                f"{name} must be vertices (k,) or pairs of vertices (k, 2), not of shape {given.shape} and type "
+                f"{given.dtype}"
+            )
+        return given.astype(np.int64)
 
 
 @dataclass(frozen=True)
 class Weights(Kind):
     """A number for each vertex, or for some; or the name of a property in the file; checked with the mesh."""
-
-    @property
-    def bounds(self) -> str:
-        return "(n,) numbers from 0, some vertices with theirs, or the name of a property"
 
 
 @dataclass(frozen=True)
@@ -284,11 +240,17 @@ def _array(name: str, value: object) -> NDArray[Any]:
         raise OptionError(f"{name}: {error}") from error
 
 
+def _indices(name: str, given: object) -> NDArray[Any]:
+    """Return an array, of integers if it is empty."""
+    values = _array(name, list(given) if isinstance(given, (set, frozenset)) else given)
+    return values if values.size else values.astype("i8")
+
+
 def _pairs(noun: str, given: object) -> IntArray:
     """Return (k, 2) pairs of vertices."""
     import numpy as np
 
-    pairs = _array(noun, list(given) if isinstance(given, (set, frozenset)) else given)
+    pairs = _indices(noun, given)
     if not pairs.size:
         return np.empty((0, 2), dtype=np.int64)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":

@@ -6,13 +6,13 @@ import difflib
 import inspect
 import math
 import textwrap
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import Field, fields
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, cast
 
 from ..errors import OptionError
 from .combined import Options
-from .declared import WIDEST_CONE, Declaration
+from .declared import WIDEST_CONE, declarations
+from .kinds import Edges, VerticesOrEdges, Weights
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -24,28 +24,6 @@ R_co = TypeVar("R_co", covariant=True)
 
 #: Other spellings.
 SPELLINGS = {"quantize": "quantise"}
-#: Names of before, and what to say instead.
-RENAMED = {
-    "quantum": "quantise",
-    "require": "required_cones",
-    "forbid": "forbidden_cones",
-    "only": "allowed_cones",
-    "cone": "cones",
-    "cones_file": "cones",
-    "corner": "boundary",
-    "keep_seams": "seams input",
-}
-#: Options of before that are none any more, and why.
-GONE = {
-    "at_cones": "where curvatures are given or searched for they are prescribed, else the scale is",
-    "length_rule": "the linear metric scales edges by the integral of the paper",
-    "lengths": "the linear metric scales edges by the integral of the paper",
-}
-
-
-def declarations(group: type) -> dict[str, tuple[Field[Any], Declaration]]:
-    """Return the options of a group by name, each as a field and its declaration."""
-    return {each.name: (each, each.metadata["declaration"]) for each in fields(group)}
 
 
 def read_options(given: Mapping[str, Any], group: type[G] = Options) -> G:  # type: ignore[assignment]
@@ -58,54 +36,34 @@ def read_options(given: Mapping[str, Any], group: type[G] = Options) -> G:  # ty
     Raises:
         OptionError: there is no such option, a value makes no sense, or options do not go together.
     """
-    known = declarations(group)
+    known = declarations(cast(type, group))
     parsed: dict[str, Any] = {}
     for name, value in given.items():
         name = SPELLINGS.get(name, name)
         if name not in known:
-            raise OptionError(unknown_option(name, known))
+            near = difflib.get_close_matches(name, list(known), 1)
+            raise OptionError(f"unknown option {name}" + (f"; did you mean {near[0]}?" if near else ""))
         if name in parsed:
             raise OptionError(f"{name} is given twice, in two spellings")
-        parsed[name] = known[name][1].kind.parse(name, value)
+        parsed[name] = known[name].kind.parse(name, value)
     widest = parsed.get("max_cone_angle")
     if widest is not None and WIDEST_CONE < widest <= math.inf:
         parsed["max_cone_angle"] = None  # no bound
     return group(**parsed)
 
 
-def unknown_option(name: str, known: Iterable[str], prefix: str = "") -> str:
-    """Return what is said of an option that does not exist.
-
-    prefix: of names: "--" at the command line.
-    """
-
-    def spelled(each: str) -> str:
-        return prefix + each.replace("_", "-") if prefix else each
-
-    if name in RENAMED:
-        return f"{spelled(name)} is now {spelled(RENAMED[name])}"
-    if name in GONE:
-        return f"there is no option {spelled(name)} any more: {GONE[name]}"
-    near = difflib.get_close_matches(name, list(known), 1)
-    return f"unknown option {spelled(name)}" + (f"; did you mean {spelled(near[0])}?" if near else "")
-
-
 def settings(options: Options) -> dict[str, Any]:
     """Return options as plain values, for a report."""
     values: dict[str, Any] = {}
-    for name, (_, declaration) in declarations(type(options)).items():
+    for name, each in declarations(cast(type, type(options))).items():
         value = getattr(options, name)
-        if name == "lengths" and value is not None:
-            values[name] = "given"
-        if not declaration.flag:
-            continue
-        if isinstance(value, tuple) and name == "seams":
-            value = [value[0], value[1].tolist()]
-        elif hasattr(value, "tolist"):
-            value = value.tolist() if "seams" in name else "given"
-        elif name in ("weights", "seam_weights") and not isinstance(value, (str, type(None))):
-            value = "given"
-        values[name] = value
+        if isinstance(each.kind, (Edges, VerticesOrEdges)):
+            value = [value[0], value[1].tolist()] if isinstance(value, tuple) else value
+            value = value.tolist() if hasattr(value, "tolist") else value
+        elif isinstance(each.kind, Weights) or name == "lengths":
+            value = value if value is None or isinstance(value, str) else "given"
+        if name != "progress" and (name != "lengths" or value is not None):
+            values[name] = value
     return values
 
 
@@ -124,21 +82,19 @@ def takes(declared: Callable[P, Any]) -> Callable[[Callable[..., R]], OfMesh[P, 
     """
 
     def decorate(function: Callable[..., R]) -> OfMesh[P, R]:
-        known = declarations(cast(type, declared))
+        known = declarations(cast(type, declared)).values()
         signature = inspect.signature(function)
         before = [each for each in signature.parameters.values() if each.kind is not each.VAR_KEYWORD]
         keywords = [
             inspect.Parameter(
-                name, inspect.Parameter.KEYWORD_ONLY, default=each.default, annotation=each.type
+                each.name, inspect.Parameter.KEYWORD_ONLY, default=each.default, annotation=each.type
             )
-            for name, (each, _) in known.items()
+            for each in known
         ]
         function.__signature__ = signature.replace(parameters=[*before, *keywords])  # type: ignore[attr-defined]
         lines = (
-            textwrap.fill(
-                f"{name}: {declaration.doc}", 110, initial_indent=" " * 8, subsequent_indent=" " * 12
-            )
-            for name, (_, declaration) in known.items()
+            textwrap.fill(f"{each.name}: {each.doc}", 110, initial_indent=" " * 8, subsequent_indent=" " * 12)
+            for each in known
         )
         function.__doc__ = (function.__doc__ or "").replace("        options: see below.", "\n".join(lines))
         return cast("OfMesh[P, R]", function)

@@ -1,16 +1,6 @@
 """Where to cut: seams that open a surface to a disk with every cone on its border."""
 
-from .costs import detail_factors, edge_costs
-from .cut import CutMesh, cut_open, open_along
-from .find import find_seams
-from .mirrored import mirrored_seams
+from .costs import edge_costs, seam_costs
+from .tree import cut_to_disk, find_seams
 
-__all__ = [
-    "CutMesh",
-    "cut_open",
-    "detail_factors",
-    "edge_costs",
-    "find_seams",
-    "mirrored_seams",
-    "open_along",
-]
+__all__ = ["cut_to_disk", "edge_costs", "find_seams", "seam_costs"]

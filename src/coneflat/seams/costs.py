@@ -5,31 +5,30 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import FloatArray
+from ..base.arrays import FloatArray
+from ..base.defaults import MOST_PREFERENCE
 from ..errors import OptionError
 from ..geometry.normals import dihedral_angles
-from ..geometry.operators import at_safe_scale, vertex_areas
+from ..geometry.operators import at_safe_scale
 from ..geometry.visibility import visible_share
-from ..mesh import TriangleMesh
-from ..options import MOST_PREFERENCE
+from ..mesh.connectivity import TriangleMesh
+from ..stages import SeamSpec
 
-# Radians: edges that bend less are no creases, those that bend more are full ones.
+# Radians: edges that bend less are not creases, those that bend more are full ones.
 SMOOTH, SHARP = np.radians(20), np.radians(60)
-# What a full crease, and what can hardly be seen, costs of its length, where creases and hiding are 1.
+# What a full crease costs of its length, and, where hiding is 1, what can hardly be seen.
 CHEAPEST = 0.1
 # Of the largest: weights below count as this, so that seams do not wander about where they cost nothing.
 LEAST_WEIGHT = 1e-3
 # Rounds of averages over neighbours, that take the grain from what is seen of single vertices.
 ROUNDS = 2
-# The same for detail; from which mean curvature on, times the size, a place is full of it; and what it then costs.
-DETAIL_ROUNDS, DETAILED, DETAIL = 10, 60.0, 2.0
 
 
 def edge_costs(
     mesh: TriangleMesh,
     lengths: FloatArray,
     *,
-    creases: float = 0.0,
+    creases: bool = False,
     hiding: float = 0.0,
     visibility: FloatArray | None = None,
     vertex_weights: ArrayLike | None = None,
@@ -40,9 +39,9 @@ def edge_costs(
     Args:
         mesh: the mesh.
         lengths: (e,) of its edges, positive.
-        creases: how much seams prefer sharp edges, 0 to 10: at 1, one that bends by 60 degrees and more costs a tenth
-            of its length, at 2 a hundredth.
-        hiding: how much they prefer what is hidden, 0 to 10: at 1, what can hardly be seen costs a tenth.
+        creases: seams prefer sharp edges: one that bends by 60 degrees and more costs a tenth of its length.
+        hiding: how much they prefer what is hidden, 0 to 10: at 1, what can hardly be seen costs a tenth, at 2 a
+            hundredth.
         visibility: (n,) what can be seen of each vertex, 0 to 1; by default what `visible_share` finds.
         vertex_weights: (n,) of the user, 0 and up; an edge gets the mean of its ends.
         edge_weights: (e,) likewise.
@@ -50,13 +49,12 @@ def edge_costs(
     Raises:
         OptionError: a number makes no sense.
     """
-    for name, strength in (("creases", creases), ("hiding", hiding)):
-        if not 0 <= strength <= MOST_PREFERENCE:
-            raise OptionError(f"{name} must be a number from 0 to {MOST_PREFERENCE:g}, not {strength:g}")
+    if not 0 <= hiding <= MOST_PREFERENCE:
+        raise OptionError(f"hiding must be a number from 0 to {MOST_PREFERENCE:g}, not {hiding:g}")
     costs = np.array(lengths, dtype=np.float64)
     angles = dihedral_angles(mesh) if creases or hiding else np.zeros(len(costs))
     if creases:
-        costs *= CHEAPEST ** (creases * np.clip((np.abs(angles) - SMOOTH) / (SHARP - SMOOTH), 0.0, 1.0))
+        costs *= CHEAPEST ** np.clip((np.abs(angles) - SMOOTH) / (SHARP - SMOOTH), 0.0, 1.0)
     if hiding:
         share = visible_share(mesh.vertices, mesh.faces) if visibility is None else visibility
         costs *= CHEAPEST ** (hiding * _hidden(mesh, share, angles))
@@ -67,28 +65,25 @@ def edge_costs(
     return costs
 
 
-def detail_factors(mesh: TriangleMesh, lengths: FloatArray) -> FloatArray:
-    """Return (e,) by how much seams are dearer where the surface has detail: 1 where it is smooth, to 3.
+def seam_costs(
+    mesh: TriangleMesh, lengths: FloatArray, spec: SeamSpec, follows_sharp: bool = False
+) -> FloatArray:
+    """Return (e,) the cost of cutting each edge of a connected mesh, by what is asked of its seams.
 
-    Of two ways around a symmetric shape that are much alike, that over the back of a head is to be preferred to that
-    over the face. Detail is the mean curvature, evened over some rings of vertices, times the size of the surface: a
-    sphere has 3.5, limbs 20, a face 60 and more.
-
-    lengths: (m, 3) of the sides.
+    Args:
+        mesh: the mesh.
+        lengths: (m, 3) side lengths.
+        spec: what is asked.
+        follows_sharp: sharp edges are cheaper in any case.
     """
-    count = len(mesh.vertices)
-    sides = lengths.ravel()[mesh.edge_halfedges[:, 0]]
-    bending = np.bincount(mesh.edges.ravel(), np.repeat(np.abs(dihedral_angles(mesh)) * sides / 4, 2), count)
-    areas = vertex_areas(mesh.faces, lengths, count)
-    size = np.sqrt(areas.sum())
-    degree = np.bincount(mesh.edges.ravel(), minlength=count)
-    both = np.stack([bending, areas])
-    for _ in range(DETAIL_ROUNDS):
-        shared = (both / degree)[:, mesh.edges[:, ::-1]].reshape(2, -1)
-        both = (both + [np.bincount(mesh.edges.ravel(), each, count) for each in shared]) / 2
-    detail = both[0] / both[1] * size / DETAILED
-    factors: FloatArray = 1 + DETAIL * np.clip(detail[mesh.edges].mean(axis=1), 0.0, 1.0)
-    return factors
+    return edge_costs(
+        mesh,
+        lengths.ravel()[mesh.edge_halfedges[:, 0]],
+        creases=follows_sharp or spec.follows_sharp,
+        hiding=spec.hiding,
+        visibility=spec.visibility,
+        vertex_weights=spec.weights,
+    )
 
 
 def _hidden(mesh: TriangleMesh, share: FloatArray, angles: FloatArray) -> FloatArray:

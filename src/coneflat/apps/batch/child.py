@@ -8,20 +8,14 @@ import sys
 import time
 from typing import IO, Any
 
-# What the summary tells of a mesh, from its report.
-COLUMNS = (
-    "vertices", "triangles", "cones", "curvature_error_max", "qc_mean", "qc_max", "area_std", "area_distortion",
-    "flipped", "charts", "seam_length", "seam_mismatch_max", "rotation_deviation", "uv_scale",
-)  # fmt: skip
+from .jobs import COLUMNS
 
 
 def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     """Flatten a mesh file to a file and return the row of the summary; errors become rows, too."""
-    from ...errors import ConeflatError
-    from ...files.read import read_joined
-    from ...files.write import write_measured
-    from ...pipeline import flatten
-    from ...result.requirements import REPORTED, breaches, parse_requirements
+    from ... import ConeflatError, flatten
+    from ...io import read_joined, write_measured
+    from ...measure import REPORTED, breaches, parse_requirements
 
     start = time.perf_counter()
     row: dict[str, Any] = {"mesh": job["mesh"], "output": job["output"]}

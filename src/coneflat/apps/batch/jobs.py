@@ -12,7 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import OptionError
-from ...files.read import find_meshes
+from ...io import find_meshes
+
+# What the summary tells of a mesh, from its report.
+COLUMNS = (
+    "vertices", "triangles", "cones", "curvature_error_max", "qc_mean", "qc_max", "area_std", "area_distortion",
+    "flipped", "charts", "seam_length", "seam_mismatch_max", "rotation_deviation", "uv_scale",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -22,7 +28,7 @@ class Job:
     Attributes:
         mesh, output: absolute paths.
         options: keyword arguments of `coneflat.flatten`, as JSON has them.
-        weld: merge vertices at the same position; None for the default, see `coneflat.files.read.read_joined`.
+        weld: merge vertices at the same position; None for the default, see `coneflat.io.read.read_joined`.
         mark: what changes when the mesh file, the options or the version do; "" where there is no such file.
         required: what measures must be, such as "flipped=0"; a mesh that does not meet it has failed.
     """

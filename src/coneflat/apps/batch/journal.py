@@ -9,16 +9,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ...base import printable
 from ...errors import MeshFileError, OptionError
-from ...files import atomic_write
-from ...files.atomic import check_target
-from ...text import printable
-from .child import COLUMNS
-from .jobs import Job
+from ...io import atomic_write, check_target
+from .jobs import COLUMNS, Job
 
 NAME = "batch.jsonl"
 HEADINGS = ("mesh", "status", "error", "output", "seconds", *COLUMNS, "notes")
-SUMMARIES = (".csv", ".parquet")
 # What every row says.
 NEEDED = ("mesh", "output", "status")
 
@@ -77,38 +74,21 @@ def check_summary(path: Path) -> None:
     """Raise an error if a summary cannot be written.
 
     Raises:
-        OptionError: it cannot have this ending, or what writes it is not installed.
+        OptionError: it cannot have this ending.
         MeshFileError: its folder is missing, or writing is not permitted.
     """
-    if path.suffix.lower() not in SUMMARIES:
-        raise OptionError(f"a summary is a {' or '.join(SUMMARIES)} file, not {path.name}")
-    if path.suffix.lower() == ".parquet":
-        _parquet()
+    if path.suffix.lower() != ".csv":
+        raise OptionError(f"a summary is a .csv file, not {path.name}")
     check_target(path)
 
 
 def write_summary(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write a table with a row per mesh, as CSV or Parquet by its ending."""
+    """Write a table with a row per mesh as CSV."""
     rows = [
         {name: printable(each) if isinstance(each, str) else each for name, each in row.items()}
         for row in rows
     ]
-    if path.suffix.lower() == ".parquet":
-        arrow, parquet = _parquet()
-        table = arrow.table({name: [row.get(name) for row in rows] for name in HEADINGS})
-        with atomic_write(path) as file:
-            parquet.write_table(table, file)
-        return
     with atomic_write(path, "w") as file:
         writer = csv.DictWriter(file, HEADINGS, extrasaction="ignore", restval="", lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
-
-
-def _parquet() -> tuple[Any, Any]:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError as error:
-        raise OptionError("a Parquet summary needs pyarrow: pip install 'coneflat[parquet]'") from error
-    return pyarrow, pyarrow.parquet

@@ -19,7 +19,8 @@ from contextlib import suppress
 from queue import SimpleQueue
 from typing import Any
 
-from ...files.atomic import remove_unfinished
+from ...errors import OptionError
+from ...io import remove_unfinished
 from .jobs import Job
 
 # Each process computes on one core: there are as many processes as cores.
@@ -28,8 +29,6 @@ ONE_THREAD = dict.fromkeys(
 )
 
 COMMAND = [sys.executable, "-m", "coneflat.apps.batch.child"]
-# Seconds between attempts to end processes: one may just be starting.
-PAUSE = 0.05
 
 
 def rows_of_processes(
@@ -62,7 +61,7 @@ def rows_of_processes(
             while any(future.running() for future in futures):
                 for child in children:
                     child.kill()
-                time.sleep(PAUSE)
+                time.sleep(0.05)  # seconds: one may just be starting
             for child in children:
                 child.end()
 
@@ -101,18 +100,16 @@ class Child:
             process = self._started()
         except OSError as error:  # No memory for another process, say.
             return failed(job, f"no process could be started: {error.strerror or error}")
-        timer = threading.Timer(limit, process.kill) if limit is not None else None
+        timer = threading.Timer(threading.TIMEOUT_MAX if limit is None else limit, process.kill)
         line = ""
-        if timer is not None:
-            timer.start()
+        timer.start()
         assert process.stdin is not None
         assert process.stdout is not None
         with suppress(OSError):  # It may die before it takes the job.
             process.stdin.write(job.as_json() + "\n")
             process.stdin.flush()
             line = process.stdout.readline()
-        if timer is not None:
-            timer.cancel()
+        timer.cancel()
         seconds = time.perf_counter() - start
         if line.endswith("\n"):
             with suppress(ValueError):
@@ -153,3 +150,68 @@ class Child:
                 env={**os.environ, **ONE_THREAD},
             )
         return self._process
+
+
+# Workers that may be lost under one mesh before it counts as failed: it may be the mesh that kills them.
+LOSSES = 3
+# Seconds in which a scheduler must answer: one that is there takes a fraction of one.
+PATIENCE = 4.0
+
+_own = threading.local()
+
+
+def flatten_here(job: Job, limit: float | None) -> dict[str, Any]:
+    """Flatten in a child process of this thread of a worker, which can be ended at the time limit."""
+    if not hasattr(_own, "child"):
+        _own.child = Child()
+    row: dict[str, Any] = _own.child.flatten(job, limit)
+    return row
+
+
+def rows_of_cluster(
+    jobs: Sequence[Job], address: str, limit: float | None
+) -> Iterator[tuple[Job, dict[str, Any]]]:
+    """Yield jobs with their rows as they are done; work of lost workers is done again by others.
+
+    Raises:
+        OptionError: no cluster can be reached at the address, or Dask is not installed.
+    """
+    try:
+        from distributed import Client, as_completed
+    except ImportError as error:
+        raise OptionError("a Dask cluster needs distributed: pip install 'coneflat[dask]'") from error
+    try:
+        _require_scheduler(address)
+        client = Client(address, timeout=PATIENCE, set_as_default=False)
+    except Exception as error:  # The library has many ways to fail at an address that is none.
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise OptionError(f"no Dask scheduler answers at {address}: {why}") from error
+    with client:
+        futures = {client.submit(flatten_here, job, limit, pure=False, retries=LOSSES): job for job in jobs}
+        try:
+            for future in as_completed(futures, loop=client.loop):
+                job = futures[future]
+                lost = future.exception()
+                if lost is None:
+                    yield job, future.result()
+                else:
+                    yield job, failed(job, f"the cluster gave up: {type(lost).__name__}: {lost}")
+        finally:
+            client.cancel(list(futures))
+
+
+def _require_scheduler(address: str) -> None:
+    """Raise an error if no scheduler answers at an address; a client would go on trying, and fail again at the end."""
+    import asyncio
+
+    from distributed.comm import connect
+
+    async def knock() -> None:
+        comm = await connect(address, timeout=PATIENCE)
+        try:
+            await comm.write({"op": "identity", "reply": True})
+            await comm.read()
+        finally:
+            comm.abort()
+
+    asyncio.run(asyncio.wait_for(knock(), PATIENCE))

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ...base import plural
 from ...errors import OptionError
-from ...files.atomic import make_folder
-from ...text import plural
+from ...io import make_folder
 from .jobs import Job
 from .journal import Journal, check_summary, write_summary
 
@@ -62,7 +62,7 @@ def run_batch(
         limit: seconds per mesh, after which it has failed; None, or infinity, for none.
         dask: address of a Dask scheduler, to work on its cluster instead; its workers must see the same files.
         redo: work on meshes that are done, too.
-        summary: .csv or .parquet; None: summary.csv in the folder.
+        summary: a .csv file; None: summary.csv in the folder.
         listener: called as results come in.
 
     Raises:
@@ -98,15 +98,10 @@ def _rows(
     jobs: Sequence[Job], processes: int | None, limit: float | None, dask: str | None
 ) -> Iterator[tuple[Job, dict[str, Any]]]:
     if dask is not None:
-        from .cluster import rows_of_cluster
+        from .process import rows_of_cluster
 
         return rows_of_cluster(jobs, dask, limit)
     from .process import rows_of_processes
 
-    return rows_of_processes(jobs, min(processes or _cores(), max(len(jobs), 1)), limit)
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return rows_of_processes(jobs, min(processes or cores, max(len(jobs), 1)), limit)

@@ -4,52 +4,53 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ...options import Options, read_options
-from ...options.outputs import FORMATS
-from ...text import plural, printable
-from .options import check_combinations, flag_of, keywords, option_flags, paper_option
-from .shared import checking, input_options, measures_alone, require_option, verbosity_options
+from ...base import plural, printable
+from ...options import FORMATS, Options, read_options
+from .options import (
+    check_combinations,
+    chosen,
+    flag,
+    flag_of,
+    keywords,
+    option_flags,
+    paper_option,
+    path_flag,
+)
+from .shared import GroupedCommand, input_options, require_option, verbosity_options
 
-FAILED = 1
-LONGEST = 3  # meshes that are named
+
+@dataclass(frozen=True, kw_only=True)
+class BatchFlags:
+    """Output.
+
+    Attributes:
+        out: Folder for the results, the journal and the summary; it is made if need be.
+        format: What to write.
+        summary: A .csv file.  [default: summary.csv in --out]
+        jobs: Processes on this machine.  [default: as many as there are cores]
+        time_limit: Seconds per mesh, after which it has failed.
+        dask: Work on the cluster of this Dask scheduler, tcp://host:8786 say.
+        redo: Flatten again what is done.
+    """
+
+    out: Path = path_flag(required=True)
+    format: str = flag("obj", type=click.Choice(FORMATS))
+    summary: Path | None = path_flag()
+    jobs: int | None = flag(type=int)
+    time_limit: float = flag(3600.0, type=float)
+    dask: str | None = flag(metavar="ADDRESS")
+    redo: bool = flag(False, is_flag=True)
 
 
-@click.command(short_help="Flatten many meshes, on this machine or on a Dask cluster.")
+@click.command(cls=GroupedCommand, short_help="Flatten many meshes, on this machine or on a Dask cluster.")
 @click.argument("patterns", metavar="PATTERN...", nargs=-1, required=True)
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    required=True,
-    help="Folder for the results, the journal and the summary; it is made if need be.",
-)
-@click.option(
-    "--format",
-    "ending",
-    type=click.Choice(FORMATS),
-    default="obj",
-    show_default=True,
-    help="What to write.",
-)
-@click.option(
-    "--summary", type=click.Path(path_type=Path), help="A .csv or .parquet.  [default: summary.csv in --out]"
-)
-@click.option("--jobs", type=int, help="Processes on this machine.  [default: as many as there are cores]")
-@click.option(
-    "--time-limit",
-    type=float,
-    default=3600.0,
-    show_default=True,
-    help="Seconds per mesh, after which it has failed.",
-)
-@click.option(
-    "--dask", metavar="ADDRESS", help="Work on the cluster of this Dask scheduler, tcp://host:8786 say."
-)
-@click.option("--redo", is_flag=True, help="Flatten again what is done.")
+@option_flags(BatchFlags)
 @paper_option
 @option_flags(Options, one_mesh=False)
 @input_options
@@ -60,18 +61,10 @@ def batch(
     context: click.Context,
     /,
     patterns: tuple[str, ...],
-    out: Path,
-    ending: str,
-    summary: Path | None,
-    jobs: int | None,
-    time_limit: float,
-    dask: str | None,
-    redo: bool,
-    repair: bool,
     weld: bool | None,
     required: tuple[str, ...],
     verbosity: str | None,
-    **method: Any,
+    **given: Any,
 ) -> None:
     """Flatten all meshes that the patterns name: files, folders, or *, ? and ** in quotes.
 
@@ -80,23 +73,24 @@ def batch(
     \b
     Examples:
       coneflat batch models --out flat
-      coneflat batch "scans/**/*.ply" --out flat --format glb --distortion 0.1 --summary flat.parquet
+      coneflat batch "scans/**/*.ply" --out flat --format glb --distortion 0.1 --summary flat.csv
       coneflat batch models --out flat --dask tcp://10.0.0.1:8786
     """
-    from ...files.atomic import make_folder
-    from ...result.requirements import REPORTED, parse_requirements
+    from ...io import make_folder
+    from ...measure import REPORTED, parse_requirements
     from ..batch import find_jobs, run_batch
     from .console import Console
 
     check_combinations(context)
-    if jobs is not None and dask is not None:
+    flags = chosen(given, BatchFlags)
+    if flags.jobs is not None and flags.dask is not None:
         raise click.UsageError("the cluster has its own processes: leave out --jobs", context)
-    options = {**keywords(method), **checking(repair)}
+    options = keywords(given)
     _refuse_vertices(context, options)
-    parse_requirements(measures_alone(required), REPORTED)
+    parse_requirements(required, REPORTED)
     read_options(options)  # Says what makes no sense before the work.
-    todo = find_jobs(patterns, out.absolute(), f".{ending}", options, weld, required)
-    make_folder(out)
+    todo = find_jobs(patterns, flags.out.absolute(), f".{flags.format}", options, weld, required)
+    make_folder(flags.out)
     rows = []
     with Console(verbosity) as console:
 
@@ -108,16 +102,16 @@ def batch(
             )
             console.progress(f"{done} of {plural(count, 'mesh', 'meshes')}", done / count)
 
-        console.say([f"flattening {plural(len(todo), 'mesh', 'meshes')} into {out}"])
+        console.say([f"flattening {plural(len(todo), 'mesh', 'meshes')} into {flags.out}"])
         console.progress("flatten", 0.0)
         found = run_batch(
             todo,
-            out.absolute(),
-            processes=jobs,
-            limit=time_limit,
-            dask=dask,
-            redo=redo,
-            summary=summary,
+            flags.out.absolute(),
+            processes=flags.jobs,
+            limit=flags.time_limit,
+            dask=flags.dask,
+            redo=flags.redo,
+            summary=flags.summary,
             listener=tell,
         )
         before = f", {found.skipped:,} of them before" if found.skipped else ""
@@ -125,9 +119,9 @@ def batch(
         console.say(f"note: {note}" for note in found.notes)
         console.say([f"{len(todo) - found.failed:,} of {len(todo):,} meshes are flattened{before}{failed}"])
         console.say(_slowest(rows, console.elapsed))
-        console.finish([summary or out / "summary.csv"])
+        console.finish([flags.summary or flags.out / "summary.csv"])
     if found.failed:
-        sys.exit(FAILED)
+        sys.exit(1)
 
 
 def _lines(row: dict[str, Any], verbose: bool) -> Iterator[str]:
@@ -146,7 +140,7 @@ def _slowest(rows: Sequence[dict[str, Any]], elapsed: float) -> Iterator[str]:
     """Yield where the time went, if anything was done."""
     took = sorted(((row["seconds"] or 0.0, printable(Path(row["mesh"]).name)) for row in rows), reverse=True)
     if took:
-        longest = ", ".join(f"{name} {seconds:.1f}" for seconds, name in took[:LONGEST])
+        longest = ", ".join(f"{name} {seconds:.1f}" for seconds, name in took[:3])
         yield f"time {elapsed:.1f} s, {sum(seconds for seconds, _ in took):.1f} s of work; the longest: {longest}"
 
 

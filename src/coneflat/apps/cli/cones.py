@@ -4,59 +4,48 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
+from ...base import DISTORTION, MOST_CONES, plural
 from ...options import FindOptions
-from ...text import plural
-from .options import keywords, option_flags
-from .shared import checking, input_options, verbosity_options
-
-#: What is allowed by default.
-DISTORTION = FindOptions().distortion
+from .options import chosen, flag, is_given, keywords, option_flags, path_flag
+from .shared import GroupedCommand, input_options, verbosity_options
 
 if TYPE_CHECKING:
-    from ...curve import ConeCurve, FoundCones
+    from ... import ConeCurve
+    from ...cone_curve import FoundCones
 
 
-@click.command(short_help="Find cones, or show what how many of them gain.")
+@dataclass(frozen=True, kw_only=True)
+class ConeFlags:
+    """Output.
+
+    Attributes:
+        output: File to write the cones to, VERTEX CURVATURE on each line, for flatten --cones.
+        curve: A table and a picture of the area distortion against the number of cones.
+        most: With --curve: the largest number of cones.
+        picture: With --curve: the picture to write.  [default: MESH's name with _cones, as .png]
+    """
+
+    output: Path | None = path_flag()
+    curve: bool = flag(False, is_flag=True)
+    most: int = flag(MOST_CONES, type=int)
+    picture: Path | None = path_flag()
+
+
+@click.command(cls=GroupedCommand, short_help="Find cones, or show what how many of them gain.")
 @click.argument("mesh", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    help="File to write the cones to, VERTEX CURVATURE on each line, for flatten --cones.",
-)
-@option_flags(FindOptions, one_mesh=True)
-@click.option(
-    "--curve", is_flag=True, help="A table and a picture of the area distortion against the number of cones."
-)
-@click.option(
-    "--most", type=int, default=30, show_default=True, help="With --curve: the largest number of cones."
-)
-@click.option(
-    "--picture",
-    type=click.Path(path_type=Path),
-    help="With --curve: the picture to write.  [default: MESH's name with _cones, as .png]",
-)
+@option_flags(FindOptions)
+@option_flags(ConeFlags)
 @input_options
 @verbosity_options
 @click.pass_context
 def cones(
-    context: click.Context,
-    /,
-    mesh: Path,
-    output: Path | None,
-    curve: bool,
-    most: int,
-    picture: Path | None,
-    repair: bool,
-    weld: bool | None,
-    verbosity: str | None,
-    **search: Any,
+    context: click.Context, /, mesh: Path, weld: bool | None, verbosity: str | None, **given: Any
 ) -> None:
     """Find the cones of MESH's largest component, without flattening it.
 
@@ -65,55 +54,48 @@ def cones(
       coneflat cones horse.ply --distortion 0.1 -o horse.cones
       coneflat cones horse.ply --curve
     """
-    from ...curve import cone_curve, find_cones
-    from ...files import atomic_write
-    from ...files.atomic import check_target
-    from ...files.read import read_joined
-    from ...view import check_figure_target, make_figure, new_figure, save_figure
+    from ... import cone_curve, find_cones
+    from ...io import atomic_write, check_target, read_joined
+    from ..view import check_figure_target, make_figure, new_figure, save_figure
     from .console import Console
     from .run import FLATTENED, READ
 
-    if curve:
+    flags, options = chosen(given, ConeFlags), keywords(given, FindOptions)
+    picture = None
+    if flags.curve:
         new_figure(1, 1)  # says what is missing before the work
-        picture = picture or Path(f"{mesh.stem}_cones.png")
-    else:
-        for name, is_given in (
-            ("--picture", picture is not None),
-            ("--most", context.get_parameter_source("most") is not ParameterSource.DEFAULT),
-        ):
-            if is_given:
-                raise click.UsageError(f"only --curve takes {name}: add it, or leave out {name}", context)
-    if output is not None:
-        check_target(output)
-    if picture is not None:
-        check_figure_target(picture)
-    given = {**keywords(search, FindOptions), **checking(repair)}
+        picture = check_figure_target(flags.picture or Path(f"{mesh.stem}_cones.png"))
+    for name in () if flags.curve else ("picture", "most"):
+        if is_given(context, name):
+            raise click.UsageError(f"only --curve takes --{name}: add it, or leave out --{name}", context)
+    if flags.output is not None:
+        check_target(flags.output)
     with Console(verbosity) as console:
         with console.stage("read", 0.0):
             joined = read_joined(mesh, weld)
-            source, given = joined.mesh, joined.renamed(given)
+            source, options = joined.mesh, joined.renamed(options)
         with console.stage("cones", READ):
-            chosen = find_cones(source, progress=console.part(READ, 0.5 if curve else FLATTENED), **given)
+            found_cones = find_cones(
+                source, progress=console.part(READ, 0.5 if flags.curve else FLATTENED), **options
+            )
         console.say(f"note: {note}" for note in joined.notes())
-        if curve:
-            wanted = given.pop("distortion", DISTORTION)
-            given.pop("cone_count", None)
+        wanted = options.pop("distortion", DISTORTION)
+        count = options.pop("cone_count", None)
+        if flags.curve:
             with console.stage("curve", 0.5):
-                most = max(most, len(chosen.vertices))
-                found = cone_curve(source, most=most, progress=console.part(0.5, FLATTENED), **given)
+                most = max(flags.most, len(found_cones.vertices))
+                found = cone_curve(source, most=most, progress=console.part(0.5, FLATTENED), **options)
             console.say(_curve_lines(found, wanted))
         else:
-            console.say(
-                _cone_lines(chosen, None if "cone_count" in given else given.get("distortion", DISTORTION))
-            )
+            console.say(_cone_lines(found_cones, wanted if count is None else None))
         if picture is not None:
             with console.stage("draw", FLATTENED):
                 save_figure(make_figure(found, "curve", distortion=wanted, title=mesh.name), picture)
-        if output is not None:
-            with atomic_write(output, "w") as file:
-                for vertex, curvature in zip(chosen.vertices, chosen.curvatures, strict=True):
+        if flags.output is not None:
+            with atomic_write(flags.output, "w") as file:
+                for vertex, curvature in zip(found_cones.vertices, found_cones.curvatures, strict=True):
                     file.write(f"{vertex} {float(curvature)!r}\n")
-        console.finish([path for path in (picture, output) if path is not None])
+        console.finish([path for path in (picture, flags.output) if path is not None])
 
 
 def _curve_lines(curve: ConeCurve, wanted: float) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import textwrap
 import threading
@@ -15,16 +16,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ...progress import Progress as Listener
-from ...progress import Stages
-from ...result.flattening import Flattening
+from ... import Flattening
+from ...base import Progress as Listener
+from ...base import Stopwatch
 from .shared import QUIET, VERBOSE
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
 PATIENCE = 1.0  # seconds between the plain lines that say what is going on, and before the first of them
-PLAIN_WIDTH, LEAST_WIDTH = 110, 20  # of tables outside a terminal, and of their last column
 #: What an artist asks first, in this order; the other rows are printed if verbose.
 FIRST_ROWS = ("charts", "overlap", "flipped", "texel density", "seam length", "QC distortion", "cones")
 
@@ -41,7 +41,7 @@ class Console:
 
     def __init__(self, verbosity: str | None = None) -> None:
         self.quiet, self.verbose = verbosity == QUIET, verbosity == VERBOSE
-        self._stages = Stages(self.progress)
+        self._stages = Stopwatch(self.progress)
         self.seconds = self._stages.seconds
         self._start = time.perf_counter()
         self._last_line = 0.0
@@ -132,16 +132,15 @@ class Console:
         if result is not None:
             self.table(self._result_rows(result))
         if self.seconds:
-            self.say([f"time           {self._spent(() if result is None else result.solvers)}"])
+            self.say([f"time           {self._spent()}"])
 
-    def _spent(self, solvers: Sequence[str]) -> str:
+    def _spent(self) -> str:
         each = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in self.seconds.items())
-        by = f" (solved by {', '.join(solvers)})" if solvers else ""
-        return f"{sum(self.seconds.values()):.2f} s: {each}{by}"
+        return f"{sum(self.seconds.values()):.2f} s: {each}"
 
     def _result_rows(self, result: Flattening) -> list[tuple[str, str, str]]:
         """Return what an artist wants to know; if verbose, all measures and how the result was found."""
-        from ...result.from_uv import shown_rows
+        from ..view.from_uv import shown_rows
 
         rows = {row[0]: row for row in shown_rows(result)}
         first = [rows.pop(name) for name in FIRST_ROWS if name in rows]
@@ -161,10 +160,7 @@ class Console:
         if self._bar:
             self._bar.stop()
             self._bar = None
-        if sys.stdout.isatty():
-            _print_table(rows)
-        else:
-            self.say(_plain_table(list(rows)))
+        self.say(_lines_of_table(list(rows)))
 
 
 def _bar() -> Progress:
@@ -181,26 +177,16 @@ def _bar() -> Progress:
     )
 
 
-def _print_table(rows: Iterable[tuple[str, str, str]]) -> None:
-    """Print a table on a terminal, as wide as that is."""
-    from rich.console import Console as RichConsole
-    from rich.table import Table
+def _lines_of_table(rows: Sequence[tuple[str, str, str]]) -> Iterator[str]:
+    """Yield the lines of a table as wide as the terminal, or 110; its last column is wrapped.
 
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column(style="bold")
-    table.add_column()
-    table.add_column(style="dim")
-    for row in rows:
-        table.add_row(*row)
-    RichConsole(highlight=False, markup=False).print(table)
-
-
-def _plain_table(rows: Sequence[tuple[str, str, str]]) -> Iterator[str]:
-    """Yield the lines of a table, the last column of which is wrapped."""
+    Outside a terminal click leaves the styles out.
+    """
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 110
     names, values = (max((len(row[column]) for row in rows), default=0) for column in (0, 1))
-    rest = max(PLAIN_WIDTH - names - values - 4, LEAST_WIDTH)
+    rest = max(width - names - values - 4, 20)
     for name, value, meaning in rows:
         first, *more = textwrap.wrap(meaning, rest) or [""]
-        yield f"{name:{names}}  {value:{values}}  {first}".rstrip()
-        for line in more:
-            yield " " * (names + values + 4) + line
+        told = click.style(f"{name:{names}}", bold=True), f"{value:{values}}", click.style(first, dim=True)
+        yield "  ".join(told if first else told[:2]).rstrip()
+        yield from (" " * (names + values + 4) + click.style(line, dim=True) for line in more)

@@ -1,19 +1,20 @@
-"""`coneflat figure`."""
+"""`coneflat figure` and `coneflat demo`."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 from ...errors import OptionError
-from ...options.quads import QUADS
-from .shared import Eye, again_option, checking, color_option, input_options, up_option, verbosity_options
+from ..quads.options import QUADS
+from .options import chosen, eye_of, flag, flag_of, is_given, option_flags, path_flag
+from .shared import again_option, checking, color_option, input_options, up_option, verbosity_options
 
 if TYPE_CHECKING:
-    from ...grid import QuadMesh
+    from ..quads.quad_mesh import QuadMesh
     from .console import Console
 
 KINDS = ("layout", "checker", "quality", "cones", "curvature", "color", "curve", "quads")
@@ -33,68 +34,60 @@ _TAKEN_BY = {
 }
 
 
+@dataclass(frozen=True, kw_only=True)
+class FigureFlags:
+    """Output.
+
+    Attributes:
+        kind: layout: the charts in the unit square.  checker: the model with a checkerboard.  quality: distortion of
+            angles and scale.  color: numbers of your own.  cones: cones and seams on the model.  curvature: before and
+            after.  curve: distortion against the number of cones.  quads: the model made into quads.
+        output: File to write: .png, .svg or .pdf.  [default: MESH's name with _KIND, as .png]
+        eye: Where to look from: front, back, left, right, top, bottom, two of them for three quarters, or a direction
+            X,Y,Z; repeat for several views.  [default: front-right]
+        size: Inches.  [default: what it needs]
+        dpi: Dots per inch of pictures.
+        colors: Of quality, color and curvature: a colour map of matplotlib.
+        cells: Of the checkerboard: so many in a row as long as the root of the area.
+        color_charts: Of the layout: a colour for each chart.
+        most: Of the curve: the largest number of cones.
+        quads: Of quads: about how many.
+        title: A line above all.
+    """
+
+    kind: str = flag("layout", type=click.Choice(KINDS))
+    output: Path | None = path_flag()
+    eye: tuple[Any, ...] = flag((), type=eye_of, metavar="EYE", multiple=True)
+    size: tuple[float, float] | None = flag(type=float, nargs=2, metavar="WIDTH HEIGHT")
+    dpi: float = flag(300.0, type=float)
+    colors: str | None = flag(metavar="NAME")
+    cells: float = flag(36.0, type=float)
+    color_charts: bool = flag(False, is_flag=True)
+    most: int = flag(30, type=int)
+    quads: int = flag(QUADS, type=int)
+    title: str = flag("")
+
+
 @click.command(short_help="Draw a flattening: its layout, texture, quality, cones or curvature.")
 @click.argument("mesh", type=click.Path(path_type=Path))
-@click.option(
-    "--kind",
-    type=click.Choice(KINDS),
-    default="layout",
-    show_default=True,
-    help="layout: the charts in the unit square.  checker: the model with a checkerboard.  quality: distortion of "
-    "angles and scale.  color: numbers of your own.  cones: cones and seams on the model.  curvature: before "
-    "and after.  curve: distortion against the number of cones.  quads: the model made into quads.",
-)
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    help="File to write: .png, .svg or .pdf.  [default: MESH's name with _KIND, as .png]",
-)
-@click.option(
-    "--eye",
-    type=Eye(),
-    metavar="EYE",
-    multiple=True,
-    help="Where to look from: front, back, left, right, top, bottom, two of them for three quarters, or a direction "
-    "X,Y,Z; repeat for several views.  [default: front-right]",
-)
+@option_flags(FigureFlags)
 @up_option
-@click.option("--size", type=float, nargs=2, metavar="WIDTH HEIGHT", help="Inches.  [default: what it needs]")
-@click.option("--dpi", type=float, default=300.0, show_default=True, help="Dots per inch of pictures.")
 @color_option
-@click.option("--colors", metavar="NAME", help="Of quality, color and curvature: a colour map of matplotlib.")
-@click.option(
-    "--cells",
-    type=float,
-    default=36.0,
-    show_default=True,
-    help="Of the checkerboard: so many in a row as long as the root of the area.",
-)
-@click.option("--color-charts", is_flag=True, help="Of the layout: a colour for each chart.")
-@click.option(
-    "--most", type=int, default=30, show_default=True, help="Of the curve: the largest number of cones."
-)
-@click.option("--quads", type=int, help=f"Of quads: about how many.  [default: {QUADS}]")
 @again_option
 @input_options
-@click.option("--title", default="", help="A line above all.")
 @verbosity_options
 @click.pass_context
 def figure(
     context: click.Context,
     /,
     mesh: Path,
-    kind: str,
-    output: Path | None,
-    eye: tuple[Any, ...],
-    most: int,
-    quads: int | None,
+    up: str,
     color: str | None,
     again: bool,
     repair: bool,
     weld: bool | None,
     verbosity: str | None,
-    **look: Any,
+    **given: Any,
 ) -> None:
     """Draw MESH for print: the UVs that it has, or those of a result (.npz); without any it is flattened first.
 
@@ -106,21 +99,24 @@ def figure(
       coneflat figure scan.ply --color quality
       coneflat flatten horse.ply -o horse.npz --distortion 0.1 && coneflat figure horse.npz --kind quality
     """
-    from ...curve import cone_curve
-    from ...view import Look, check_figure_target, make_figure, new_figure, save_figure
-    from ...view.own import own_quantity
+    from ... import cone_curve
+    from ..view import Look, check_figure_target, make_figure, new_figure, save_figure
+    from ..view.quantity import own_quantity
     from .console import Console
     from .run import FLATTENED, READ, archive_of, open_result
 
-    if color is not None and context.get_parameter_source("kind") is ParameterSource.DEFAULT:
-        kind = "color"
+    flags = chosen(given, FigureFlags)
+    kind = "color" if color is not None and not is_given(context, "kind") else flags.kind
     if color is None and kind == "color":
         raise click.UsageError("--kind color needs --color", context)
     _check_combinations(context, kind)
     # What can fail at the end is looked at before the work.
     new_figure(1, 1)
-    output = check_figure_target(output or Path(f"{mesh.stem}_{kind}.png"))
-    look |= {"eyes": eye or ("front-right",), "size": look["size"] or None}
+    output = check_figure_target(flags.output or Path(f"{mesh.stem}_{kind}.png"))
+    look: dict[str, Any] = {"up": up, "eyes": flags.eye or ("front-right",)}
+    look |= {
+        name: getattr(flags, name) for name in ("size", "dpi", "colors", "cells", "color_charts", "title")
+    }
     Look(**look)
     with Console(verbosity) as console:
         shown: Any
@@ -129,15 +125,11 @@ def figure(
                 surface, notes = _surface(mesh, weld)
             console.say(f"note: {note}" for note in notes)
             with console.stage("cones", READ):
-                shown = cone_curve(
-                    surface,
-                    most=most,
-                    repair=repair,
-                    strict=not repair,
-                    progress=console.part(READ, FLATTENED),
-                )
+                part = console.part(READ, FLATTENED)
+                shown = cone_curve(surface, most=flags.most, progress=part, **checking(repair))
         elif kind == "quads":
-            shown, notes = _quads(mesh, console, quads, repair=repair, weld=weld)
+            count = flags.quads if is_given(context, "quads") else None
+            shown, notes = _quads(mesh, console, count, repair=repair, weld=weld)
             console.say(f"note: {note}" for note in notes)
         else:
             shown = open_result(mesh, console, again=again, repair=repair, weld=weld)
@@ -151,8 +143,8 @@ def figure(
 
 def _surface(file: Path, weld: bool | None) -> tuple[Any, tuple[str, ...]]:
     """Return what a search for cones takes, a mesh file as it is, of a result its mesh; and notes on reading it."""
-    from ...files import read_flattening
-    from ...files.read import read_joined
+    from ... import read_flattening
+    from ...io import read_joined
 
     if file.suffix.lower() != ".npz":
         joined = read_joined(file, weld)
@@ -165,9 +157,9 @@ def _quads(
     file: Path, console: Console, count: int | None, *, repair: bool, weld: bool | None
 ) -> tuple[QuadMesh, tuple[str, ...]]:
     """Return the quads that a .npz file holds, or those of a mesh; and notes on them."""
-    from ...files.quads import read_quads
-    from ...files.read import read_joined
-    from ...grid.quads import quads
+    from ...io import read_joined
+    from ..quads.files import read_quads
+    from ..quads.quads import quads
     from .run import FLATTENED, READ
 
     with console.stage("read", 0.0):
@@ -185,6 +177,37 @@ def _quads(
 def _check_combinations(context: click.Context, kind: str) -> None:
     """Refuse options that would have no effect."""
     for name, kinds in _TAKEN_BY.items():
-        if kind not in kinds and context.get_parameter_source(name) is not ParameterSource.DEFAULT:
-            option = name.replace("_", "-")
-            raise click.UsageError(f"--kind {kind} takes no --{option}: only {', '.join(kinds)} do", context)
+        if kind not in kinds and is_given(context, name):
+            raise click.UsageError(
+                f"--kind {kind} takes no {flag_of(name)}: only {', '.join(kinds)} do", context
+            )
+
+
+@click.command(short_help="Flatten a sample model, and draw it.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("coneflat-demo"),
+    show_default=True,
+    help="Folder to write to; made if it is missing.",
+)
+@verbosity_options
+def demo(output: Path, verbosity: str | None) -> None:
+    """Flatten the sample that comes with coneflat; write the textured mesh, its report and a picture."""
+    from ... import sample_path
+    from ...io import make_folder
+    from ..view import demo_figure, new_figure, save_figure
+    from .console import Console
+    from .run import FLATTENED, flatten_file, save
+
+    new_figure(1, 1)  # says what is missing before the work
+    make_folder(output)
+    mesh, report, picture = (output / f"sample.{ending}" for ending in ("obj", "json", "png"))
+    with Console(verbosity) as console:
+        result = flatten_file(sample_path(), console, {"charts": "atlas"})
+        result = save(result, console, mesh, report)
+        with console.stage("draw", FLATTENED):
+            save_figure(demo_figure(result), picture)
+        console.finish([mesh, report, picture], result)
+        console.say(["", "Now try your own:  coneflat flatten MESH -o OUT.obj"])

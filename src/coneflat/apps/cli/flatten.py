@@ -3,69 +3,71 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...options import Options, declarations
-from ...options.outputs import FORMATS
-from .options import check_combinations, flag_of, is_given, keywords, option_flags, paper_option
-from .shared import checking, input_options, measures_alone, require_option, verbosity_options
+from ...options import FORMATS, Options, declarations
+from .options import (
+    check_combinations,
+    chosen,
+    flag,
+    flag_of,
+    is_given,
+    keywords,
+    option_flags,
+    paper_option,
+    path_flag,
+)  # fmt: skip
+from .shared import GroupedCommand, input_options, require_option, verbosity_options
 
 if TYPE_CHECKING:
-    from ...result.flattening import Flattening
+    from ... import Flattening
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileFlags:
+    """Output.
+
+    Attributes:
+        output: File to write: .obj, .ply, .glb or .npz; - for standard output.  [default: MESH's name with _uv, as
+            .obj; of standard input -]
+        format: Of standard output, and without -o: what to write.  [default: obj]
+        texture: Of a .glb: the texture that it carries, a checkerboard or an image file.
+        project: In place of MESH and of all that says how it is flattened: a project of `coneflat studio`, .json.
+        report: Write all measures to this JSON file.
+    """
+
+    output: Path | None = path_flag()
+    format: str | None = flag(type=click.Choice(FORMATS))
+    texture: str | None = flag(metavar="checker|IMAGE")
+    project: Path | None = path_flag()
+    report: Path | None = path_flag()
 
 
 @click.command(
+    cls=GroupedCommand,
     short_help="Flatten a mesh and write it with UV coordinates.",
     context_settings={"allow_extra_args": True},
 )
 @click.argument("mesh", type=click.Path(path_type=Path), required=False)
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    help="File to write: .obj, .ply, .glb or .npz; - for standard output.  [default: MESH's name with _uv, as .obj; of "
-    "standard input -]",
-)
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(FORMATS),
-    help="Of standard output, and without -o: what to write.  [default: obj]",
-)
+@option_flags(FileFlags)
 @paper_option
-@option_flags(Options, one_mesh=True)
+@option_flags(Options)
 @input_options
 @require_option
-@click.option(
-    "--texture",
-    metavar="checker|IMAGE",
-    help="Of a .glb: the texture that it carries, a checkerboard or an image file.",
-)
-@click.option(
-    "--project",
-    type=click.Path(path_type=Path),
-    help="In place of MESH and of all that says how it is flattened: a project of `coneflat studio`, .json.",
-)
-@click.option("--report", type=click.Path(path_type=Path), help="Write all measures to this JSON file.")
 @verbosity_options
 @click.pass_context
 def flatten(
     context: click.Context,
     /,
     mesh: Path | None,
-    output: Path | None,
-    form: str | None,
     required: tuple[str, ...],
-    repair: bool,
     weld: bool | None,
-    texture: str | None,
-    project: Path | None,
-    report: Path | None,
     verbosity: str | None,
-    **method: Any,
+    **given: Any,
 ) -> None:
     """Flatten MESH (.obj, .ply, .stl, .off, .gltf, .glb; - for standard input) and write it with UV coordinates.
 
@@ -85,29 +87,29 @@ def flatten(
             f"{mesh} {context.args[0]} ... --out FOLDER` flattens many",
             context,
         )
-    from ...result.requirements import REPORTED, parse_requirements
+    from ...measure import REPORTED, parse_requirements
     from .run import named_output, run
 
-    requirements = parse_requirements(measures_alone(required), REPORTED)
+    requirements = parse_requirements(required, REPORTED)
     check_combinations(context)
-    noted = None
-    if project is not None:
-        mesh, options, noted = of_project(context, project)
+    flags, noted = chosen(given, FileFlags), None
+    if flags.project is not None:
+        mesh, options, noted = of_project(context, flags.project)
     elif mesh is None:
         raise click.MissingParameter(ctx=context, param_hint="'MESH'", param_type="argument")
     else:
-        options = {**keywords(method), **checking(repair)}
-    ending = f".{form or 'obj'}"
-    output = named_output(mesh, ending) if output is None else output
-    if form is not None and output.suffix.lower() not in ("", ending):
+        options = keywords(given)
+    ending = f".{flags.format or 'obj'}"
+    output = named_output(mesh, ending) if flags.output is None else flags.output
+    if flags.format is not None and output.suffix.lower() not in ("", ending):
         raise click.UsageError(f"{output} is no {ending} file: leave out --format", context)
     run(
         mesh,
         output,
         options,
         weld=weld,
-        report=report,
-        texture=texture,
+        report=flags.report,
+        texture=flags.texture,
         verbosity=verbosity,
         ending=ending,
         requirements=requirements,

@@ -9,18 +9,15 @@ from typing import NoReturn
 
 import click
 
-from ... import __version__
-from ...errors import ConeflatError
+from ... import ConeflatError, __version__
 from .batch import batch
-from .compare import compare, paper
 from .cones import cones
-from .demo import demo
-from .figure import figure
+from .figure import demo, figure
 from .flatten import flatten
 from .measure import measure
+from .peers import compare, paper
 from .quads import quads
-from .studio import studio
-from .view import view
+from .view import studio, view
 
 USER_ERROR = 2
 INTERNAL_ERROR = 1
@@ -33,17 +30,8 @@ def cli() -> None:
     """Flatten triangle meshes into the plane, conformally and by themselves."""
 
 
-cli.add_command(flatten)
-cli.add_command(batch)
-cli.add_command(quads)
-cli.add_command(measure)
-cli.add_command(cones)
-cli.add_command(figure)
-cli.add_command(view)
-cli.add_command(studio)
-cli.add_command(compare)
-cli.add_command(paper)
-cli.add_command(demo)
+for command in (flatten, batch, quads, measure, cones, figure, view, studio, compare, paper, demo):
+    cli.add_command(command)
 
 
 def main() -> NoReturn:
@@ -57,8 +45,6 @@ def main() -> NoReturn:
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         code = USER_ERROR
-    except click.NoSuchOption as error:
-        code = _fail(f"{_renamed(error) or error.format_message()}{_hint(error)}", USER_ERROR)
     except click.ClickException as error:
         code = _fail(f"{error.format_message()}{_hint(error)}", USER_ERROR)
     except ConeflatError as error:
@@ -90,14 +76,6 @@ def main() -> NoReturn:
 def _fail(message: str, code: int) -> int:
     click.echo(f"coneflat: error: {' '.join(message.split())}", err=True)
     return code
-
-
-def _renamed(error: click.NoSuchOption) -> str:
-    """Return what an option of before is called now; "" for one that never was."""
-    from ...options.reading import GONE, RENAMED, unknown_option
-
-    name = error.option_name.lstrip("-").replace("-", "_")
-    return unknown_option(name, (), "--") if name in RENAMED or name in GONE else ""
 
 
 def _hint(error: click.ClickException) -> str:

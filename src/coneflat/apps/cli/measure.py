@@ -11,8 +11,8 @@ import click
 from .shared import QUIET, check_required, input_options, require_option, verbosity_options
 
 if TYPE_CHECKING:
-    from ...result.measure_uv import UVMeasures
-    from ...result.report import Row
+    from ... import UVMeasures
+    from ...measure import Row
 
 
 @click.command(short_help="Measure the UVs that a file has, of any tool.")
@@ -39,12 +39,11 @@ def measure(
       coneflat measure asset.glb --json
       coneflat measure asset.glb --require flipped=0,overlap=0 --require "qc_mean<=1.1"
     """
-    from ...files.atomic import atomic_write, check_target
-    from ...result.mapped import as_mapped
-    from ...result.measure_uv import MEASURED, measure_mapped
-    from ...result.requirements import parse_requirements
+    from ...io import as_mapped, check_target
+    from ...measure import parse_requirements
+    from ...measure_uv import MEASURED, measure_mapped
     from .console import Console
-    from .run import require_distinct
+    from .run import require_distinct, write_report
 
     requirements = parse_requirements(required, MEASURED)
     if report is not None:
@@ -57,9 +56,7 @@ def measure(
             measured = measure_mapped(mapped, strict=not repair)
         found = measured.report()
         if report is not None:
-            with atomic_write(report, "w") as stream:
-                json.dump(found, stream, indent=2)
-                stream.write("\n")
+            write_report(report, found)
         if as_json and verbosity != QUIET:
             click.echo(json.dumps(found, indent=2))
         elif not as_json:
@@ -71,7 +68,7 @@ def measure(
 
 def rows_of_measures(measured: UVMeasures) -> list[Row]:
     """Return the rows of the table of measures of UVs."""
-    from ...result.report import map_rows, number_text, packing_row
+    from ...measure import map_rows, number_text, packing_row
     from .console import FIRST_ROWS
 
     counts, of_map = measured.counts, map_rows(measured.distortion)

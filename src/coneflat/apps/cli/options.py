@@ -3,94 +3,103 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, Field
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
 import click
 from click.core import ParameterSource
 
+from ... import PAPER
+from ... import options as declared
 from ...errors import OptionError
-from ...options import PAPER, Options, declarations
-from ...options.declared import CONES, ConeOptions, Declaration, MetricOptions
-from ...options.kinds import (
-    Choice,
-    Count,
-    Direction,
-    Edges,
-    Flag,
-    Number,
-    Strength,
-    Vertices,
-    Weights,
-    Whole,
-    WordOrVertices,
-)
-from .values import is_file, parse_angle, read_pairs, read_vertex_map, read_vertices, read_weights
+from ...options import ConeOptions, Declaration, Kind, MetricOptions, Number, Options, declarations, option
+from .shared import Grouped, checking
+from .values import (
+    is_file,
+    parse_angle,
+    read_pairs,
+    read_vertex_map,
+    read_vertices,
+    read_vertices_or_pairs,
+    read_weights,
+)  # fmt: skip
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+G = TypeVar("G")
 
 #: Options that `shared.input_options` adds.
 OF_INPUT = ("repair", "strict")
 #: Other spellings of flags.
-SPELLINGS = {"quantise": ("--quantize",), "quads": ("--faces",)}
+SPELLINGS = {"quantise": ("--quantize",), "quads": ("--faces",), "output": ("-o",)}
 
 paper_option = click.option(
     "--paper",
+    cls=Grouped,
+    group="Metric",
     is_flag=True,
     help="The method exactly as published (Ben-Chen et al. 2008), one chart per component.",
 )
 
 
-class Angle(click.ParamType):  # type: ignore[type-arg]
-    """An angle such as 1.57, pi/2, 0.1pi or 90deg."""
+@dataclass(frozen=True)
+class As(Kind):
+    """What click makes of a text.
 
-    name = "angle"
+    Attributes:
+        more: arguments of `click.option`.
+    """
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return radians."""
-        if isinstance(value, (int, float)) or value.strip().lower() == "inf":
-            return float(value)
-        try:
-            return parse_angle(value)
-        except OptionError as error:
-            self.fail(str(error), param, ctx)
+    more: Mapping[str, Any]
 
 
-class HowMuch(click.ParamType):  # type: ignore[type-arg]
-    """A strength."""
-
-    name = "strength"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return a number."""
-        try:
-            return float(value)
-        except ValueError:
-            self.fail(f"{value!r} is no strength: write a number after it, 1 say", param, ctx)
+def flag(default: Any = None, **more: Any) -> Any:
+    """Return a field of a group that a command alone has; more: arguments of `click.option`."""
+    return option(default, As(more))
 
 
-class Axis(click.ParamType):  # type: ignore[type-arg]
-    """A direction in space such as z, -y or 0,0.5,1."""
+def path_flag(default: Path | None = None, **more: Any) -> Any:
+    """Return a field of such a group that is a path."""
+    return flag(default, type=click.Path(path_type=Path), **more)
 
-    name = "direction"
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float, float]:
-        """Return its three coordinates."""
-        if isinstance(value, tuple):
-            return value
-        text = value.strip().lower()
-        axis = "xyz".find(text[-1:])
-        if axis >= 0 and text[:-1] in ("", "+", "-"):
-            length = -1.0 if text[0] == "-" else 1.0
-            return (length * (axis == 0), length * (axis == 1), length * (axis == 2))
-        try:
-            one, two, three = (float(word) for word in text.split(","))
-        except ValueError:
-            self.fail(f"{value!r} is no direction; write z, -y or 0,0.5,1", param, ctx)
-        return (one, two, three)
+def _angle(value: Any) -> float:
+    """Return radians from 1.57, pi/2, 0.1pi, 90deg or inf."""
+    try:
+        return math.inf if value.strip().lower() == "inf" else parse_angle(value)
+    except OptionError as error:
+        raise click.BadParameter(str(error)) from error
+
+
+def _strength(value: Any) -> float:
+    """Return a number."""
+    try:
+        return float(value)
+    except ValueError as error:
+        raise click.BadParameter(f"{value!r} is no strength: write a number after it, 1 say") from error
+
+
+def _direction(value: Any) -> tuple[float, float, float]:
+    """Return three coordinates from z, -y or 0,0.5,1."""
+    text = value.strip().lower()
+    axis = "xyz".find(text[-1:])
+    if axis >= 0 and text[:-1] in ("", "+", "-"):
+        length = -1.0 if text[0] == "-" else 1.0
+        return (length * (axis == 0), length * (axis == 1), length * (axis == 2))
+    try:
+        one, two, three = (float(word) for word in text.split(","))
+    except ValueError as error:
+        raise click.BadParameter(f"{value!r} is no direction; write z, -y or 0,0.5,1") from error
+    return (one, two, three)
+
+
+def eye_of(value: Any) -> Any:
+    """Return three numbers from 1,0.5,2, or words such as front-right."""
+    try:
+        return tuple(float(number) for number in value.split(",")) if "," in value else value
+    except ValueError as error:
+        raise click.BadParameter(f"{value!r} is no direction; write 1,0.5,2 or front-right") from error
 
 
 def flag_of(name: str) -> str:
@@ -98,30 +107,19 @@ def flag_of(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-def option_flags(group: type, *, one_mesh: bool) -> Callable[[Command], Command]:
-    """Return a decorator that adds the flags of a group of options to a command, the group's own first.
+def option_flags(group: type, *, one_mesh: bool = True) -> Callable[[Command], Command]:
+    """Return a decorator that adds the flags of a group of options to a command.
 
     one_mesh: also those that name vertices of one mesh.
     """
-    chosen = [
-        (name, field, declaration)
-        for name, (field, declaration) in own_first(group)
-        if declaration.flag and name not in OF_INPUT and (one_mesh or _may_fit_any_mesh(declaration))
-    ]
+    added = [each for each in declarations(group).values() if each.flag and each.name not in OF_INPUT]
 
     def decorate(command: Command) -> Command:
-        for name, field, declaration in reversed(chosen):
-            command = _flag(name, field, declaration)(command)
+        for each in reversed(added):
+            command = _flag(each)(command) if one_mesh or _may_fit_any_mesh(each) else command
         return command
 
     return decorate
-
-
-def own_first(group: type) -> list[tuple[str, tuple[Field[Any], Declaration]]]:
-    """Return the options of a group, its own before those of the groups that it is made of."""
-    known = declarations(group)
-    own = [name for name in vars(group).get("__annotations__", {}) if name in known]
-    return [(name, known[name]) for name in dict.fromkeys([*own, *known])]
 
 
 def _may_fit_any_mesh(declaration: Declaration) -> bool:
@@ -129,49 +127,50 @@ def _may_fit_any_mesh(declaration: Declaration) -> bool:
     return not declaration.one_mesh or bool(getattr(declaration.kind, "words", ()))
 
 
-def _flag(name: str, field: Field[Any], declaration: Declaration) -> Callable[[Command], Command]:
+def _flag(declaration: Declaration) -> Callable[[Command], Command]:
     """Return what adds one flag; its value is None, or an empty tuple, where it is not given."""
-    kind, more, flag = declaration.kind, dict[str, Any](), flag_of(name)
-    if field.default is True:
-        flag += f"/--no-{flag[2:]}"
+    kind, name = declaration.kind, declaration.name
+    more, spelled, doc = dict[str, Any](), flag_of(name), declaration.doc
+    if declaration.default is True:
+        spelled += f"/--no-{spelled[2:]}"
     match kind:
-        case Flag():
+        case As():
+            more = dict(kind.more)
+        case declared.Flag():
             more = {"is_flag": True, "default": None}
-        case Choice():
+        case declared.Choice():
             more = {"type": click.Choice(kind.words)}
             if len(kind.words) > 5:
                 more["metavar"] = "NAME"
+                doc += f" One of {', '.join(kind.words)}."
+        case Number(is_angle=True):
+            more = {"type": _angle, "metavar": "ANGLE"}
+        case Number(is_strength=True):
+            more = {"type": _strength, "is_flag": False, "flag_value": 1.0, "metavar": "STRENGTH"}
         case Number():
-            more = {"type": Angle(), "metavar": "ANGLE"} if kind.is_angle else {"type": float}
-        case Strength():
-            more = {"type": HowMuch(), "is_flag": False, "flag_value": 1.0, "metavar": "STRENGTH"}
-        case Count() | Whole():
-            more = {"type": int}
-        case Direction():
-            more = {"type": Axis(), "metavar": "DIRECTION"}
-        case Vertices():
+            more = {"type": int if kind.is_whole else float}
+        case declared.Direction():
+            more = {"type": _direction, "metavar": "DIRECTION"}
+        case declared.Vertices() | declared.VerticesOrEdges():
             more = {"multiple": True, "metavar": "VERTICES|FILE"}
-        case WordOrVertices():
+        case declared.WordOrVertices():
             more = {"multiple": True, "metavar": "|".join((*kind.words, "VERTEX[:CURVATURE],...", "FILE"))}
-        case Edges():
+        case declared.Edges():
             more = {"multiple": True, "metavar": "|".join((*kind.words, "FILE"))}
-        case Weights():
+        case declared.Weights():
             more = {"metavar": "NAME|FILE"}
-    listed = isinstance(kind, Choice) and len(kind.words) > 5
-    doc = declaration.doc + (
-        f" One of {', '.join(kind.words)}." if listed and isinstance(kind, Choice) else ""
-    )
-    shown = shown_default(field)
+    shown = shown_default(declaration)
     doc += f"  [default: {shown}]" if shown else ""
-    return click.option(flag, *SPELLINGS.get(name, ()), name, help=doc, **more)
+    names = (spelled, *SPELLINGS.get(name, ()), name)
+    return click.option(*names, cls=Grouped, group=declaration.group, help=doc, **more)
 
 
-def shown_default(field: Field[Any]) -> str:
+def shown_default(declaration: Declaration) -> str:
     """Return an option's default as tables show it; "" where it stands for none."""
-    value = field.default
-    if value is MISSING or value is None or value is False or value == ():
+    value = declaration.default
+    if value is None or value is False or value == ():
         return ""
-    if isinstance(field.metadata["declaration"].kind, Number) and field.metadata["declaration"].kind.is_angle:
+    if isinstance(declaration.kind, Number) and declaration.kind.is_angle:
         turns = value / math.pi
         return f"{turns:g}pi" if turns >= 1 else f"pi/{1 / turns:g}"
     if value is True:
@@ -180,7 +179,7 @@ def shown_default(field: Field[Any]) -> str:
 
 
 def keywords(params: Mapping[str, Any], group: type = Options) -> dict[str, Any]:
-    """Return the keyword arguments of `coneflat.flatten` that a command line gives.
+    """Return the keyword arguments of `coneflat.flatten` that a command line gives, with what `--repair` means.
 
     Args:
         params: the command's.
@@ -191,32 +190,40 @@ def keywords(params: Mapping[str, Any], group: type = Options) -> dict[str, Any]
         MeshFileError: a file of them cannot be read.
     """
     given = dict(PAPER) if params.get("paper") else {}
-    for name, (_, declaration) in declarations(group).items():
+    for name, declaration in declarations(group).items():
         value = params.get(name)
         if name not in OF_INPUT and value is not None and value != ():
-            given[name] = _value(name, declaration, value)
-    return given
+            given[name] = _value(declaration, value)
+    return {**given, **checking(params["repair"])}
 
 
-def _value(name: str, declaration: Declaration, value: Any) -> Any:
+def chosen(params: dict[str, Any], group: type[G]) -> G:
+    """Return a group of a command's own flags, which are taken out of its parameters."""
+    given = {name: params.pop(name) for name in declarations(cast(type, group))}
+    return group(**{name: value for name, value in given.items() if value is not None and value != ()})
+
+
+def _value(declaration: Declaration, value: Any) -> Any:
     """Return what a flag's texts mean."""
-    kind, flag = declaration.kind, flag_of(name)
+    kind, flag = declaration.kind, flag_of(declaration.name)
     match kind:
-        case Vertices():
+        case declared.Vertices():
             return tuple(dict.fromkeys(v for text in value for v in read_vertices(flag, text)))
-        case WordOrVertices():
+        case declared.VerticesOrEdges():
+            return read_vertices_or_pairs(flag, value)
+        case declared.WordOrVertices():
             words = [text for text in value if text.replace("-", "").isalpha() and not is_file(text)]
             if words and len(value) > 1:
                 raise OptionError(f"{flag} {words[0]} is one choice, and {value[0]}, {value[1]} are two")
             return words[0] if words else read_vertex_map(flag, kind.noun, value)
-        case Edges():
+        case declared.Edges():
             return _edges(flag, kind, value)
-        case Weights():
+        case declared.Weights():
             return read_weights(value)
     return value
 
 
-def _edges(flag: str, kind: Edges, texts: Sequence[str]) -> Any:
+def _edges(flag: str, kind: declared.Edges, texts: Sequence[str]) -> Any:
     import numpy as np
 
     words = [text for text in texts if text in kind.words]
@@ -236,22 +243,22 @@ def check_combinations(context: click.Context) -> None:
     method = params["method"] or "exact"
     known = declarations(Options)
     search = [name for name in declarations(ConeOptions) if name != "cones"]
-    of_method = [*search, "cones", *(name for name in declarations(MetricOptions) if name != "best_effort")]
-    only = {
-        what: [name for name in known if known[name][1].only == what]
-        for what in ("pursuit", "greedy", "exact")
-    }
-    searched = cones in ("auto", "pursuit")
-    given = cones not in CONES
+    of_method = [*search, "cones", *declarations(MetricOptions)]
+    only = {what: [name for name in known if known[name].only == what] for what in ("sparse", "exact")}
+    given = cones not in declared.CONES
     rules = [
         (params["paper"], of_method, "--paper fixes the method"),
         (given, search, "with cones given there is nothing to search"),
         (cones == "none", search, "--cones none searches for none"),
-        (cones == "greedy", only["pursuit"], "--cones greedy has no such choice"),
-        (searched, only["greedy"], "only --cones greedy has this choice"),
+        (cones == "greedy", only["sparse"], "--cones greedy has no such choice"),
         (params["cone_count"] is not None, ("distortion", "max_cones"), "the number of cones is given"),
         (method != "exact", only["exact"], f"--method {method} has no such choice"),
     ]
+    refuse(context, rules)
+
+
+def refuse(context: click.Context, rules: Iterable[tuple[Any, Iterable[str], str]]) -> None:
+    """Refuse flags that are given: for each rule that applies, of some names, for a reason."""
     for applies, names, reason in rules:
         for name in names if applies else ():
             if is_given(context, name):

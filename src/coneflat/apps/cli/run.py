@@ -12,17 +12,21 @@ from io import BytesIO
 from pathlib import Path
 from typing import IO, Any
 
+from ... import Flattening, flatten, read_flattening
 from ...errors import OptionError
-from ...files import PIPE, atomic_write, check_output, read_flattening, write_stream
-from ...files.atomic import check_target
-from ...files.read import read_joined
-from ...files.write import write_measured
-from ...files.written import as_written
-from ...input.join import Joined
-from ...pipeline import flatten
-from ...result.flattening import Flattening
-from ...result.mapped import has_uv
-from ...result.requirements import Requirement
+from ...io import (
+    PIPE,
+    Joined,
+    as_written,
+    atomic_write,
+    check_output,
+    check_target,
+    has_uv,
+    read_joined,
+    write_measured,
+    write_stream,
+)
+from ...measure import Requirement
 from .console import Console
 from .shared import check_required, checking
 
@@ -107,7 +111,7 @@ def open_result(
             return read_flattening(file)
         source = read_joined(file, weld)
     if not again and has_uv(source.mesh):
-        from ...result.from_uv import own_flattening
+        from ..view.from_uv import own_flattening
 
         with console.stage("measure", READ):
             own = own_flattening(source, strict=not repair)
@@ -161,10 +165,15 @@ def save(
             stdout.flush()
     result = replace(result, seconds=dict(console.seconds))
     if report is not None:
-        with atomic_write(report, "w") as file:
-            json.dump(result.report(), file, indent=2)
-            file.write("\n")
+        write_report(report, result.report())
     return result
+
+
+def write_report(path: Path, report: Mapping[str, Any]) -> None:
+    """Write measures as JSON."""
+    with atomic_write(path, "w") as file:
+        json.dump(report, file, indent=2)
+        file.write("\n")
 
 
 def require_distinct(files: Mapping[str, Path | None]) -> None:

@@ -2,34 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from ...options import MOST_TRIANGLES
+
 if TYPE_CHECKING:
-    from ...result.requirements import Requirement
+    from ...measure import Requirement
 
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+#: Titles of groups of flags in the help.
+GROUPS = ("Quads", "Cones", "Metric", "Seams", "Atlas", "Input", "Output")
 #: Exit code where what `--require` asks for is not met.
 NOT_MET = 3
 
 
-class Eye(click.ParamType):  # type: ignore[type-arg]
-    """A direction: 1,0.5,2, or words such as front-right."""
+class Grouped(click.Option):
+    """A flag that the help lists under the title of a group."""
 
-    name = "eye"
+    def __init__(self, *args: Any, group: str, **more: Any) -> None:
+        super().__init__(*args, **more)
+        self.group = group
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return three numbers, or the words."""
-        if not isinstance(value, str) or "," not in value:
-            return value
-        try:
-            return tuple(float(number) for number in value.split(","))
-        except ValueError:
-            self.fail(f"{value!r} is no direction; write 1,0.5,2 or front-right", param, ctx)
+
+class GroupedCommand(click.Command):
+    """A command whose help lists its flags in groups; those without one are of the output."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the flags, group by group."""
+        groups: dict[str, list[tuple[str, str]]] = {title: [] for title in GROUPS}
+        for param in self.get_params(ctx):
+            record = param.get_help_record(ctx) if isinstance(param, click.Option) else None
+            if record is not None:
+                groups[getattr(param, "group", GROUPS[-1])].append(record)
+        for title, records in groups.items():
+            if records:
+                with formatter.section(title):
+                    formatter.write_dl(records)
 
 
 up_option = click.option(
@@ -44,12 +57,16 @@ _INPUT = (
     click.option(
         "--repair/--strict",
         "repair",
+        cls=Grouped,
+        group="Input",
         default=True,
         help="Repair what is no manifold (split edges and vertices, drop degenerate faces, cut one-sided surfaces), "
         "with a note; or refuse it, and triangles without area, too.  [default: repair]",
     ),
     click.option(
         "--weld/--no-weld",
+        cls=Grouped,
+        group="Input",
         default=None,
         help="Merge all vertices at the same position, or none.  [default: all in STL and glTF; in others those along "
         "borders that coincide]",
@@ -71,12 +88,20 @@ color_option = click.option(
     ".npz, or FILE.npy, FILE.npz:NAME; one for each vertex or triangle.",
 )
 
+most_option = click.option(
+    "--most-triangles",
+    type=click.IntRange(1),
+    default=MOST_TRIANGLES,
+    show_default=True,
+    help="Thin a larger mesh to so many, for display only.",
+)
+
 again_option = click.option(
     "--again", is_flag=True, help="Flatten a mesh that has UVs, too, instead of showing these."
 )
 
 
-def checking(repair: bool) -> dict[str, bool]:
+def checking(repair: bool) -> dict[str, Any]:
     """Return what `--repair` or `--strict` mean as keyword arguments of `coneflat.flatten`."""
     return {"repair": repair, "strict": not repair}
 
@@ -96,7 +121,7 @@ def check_required(requirements: Iterable[Requirement], measures: dict[str, Any]
 
     written: what has been written nevertheless.
     """
-    from ...result.requirements import breaches
+    from ...measure import breaches
 
     lines = breaches(requirements, measures)
     if not lines:
@@ -106,16 +131,6 @@ def check_required(requirements: Iterable[Requirement], measures: dict[str, Any]
     if written:
         click.echo(f"coneflat: {written} is written nevertheless", err=True)
     raise click.exceptions.Exit(NOT_MET)
-
-
-def measures_alone(words: Sequence[str]) -> Sequence[str]:
-    """Return what `--require` is given, unless it is a vertex, as it once could be."""
-    for word in words:
-        if word.strip().lstrip("+-").isdecimal():
-            raise click.UsageError(
-                f"--require takes measures, flipped=0 say; a vertex that is a cone in any case: --required-cones {word}"
-            )
-    return words
 
 
 QUIET, VERBOSE = "quiet", "verbose"

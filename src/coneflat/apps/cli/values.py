@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from ...errors import MeshFileError, OptionError
 
 if TYPE_CHECKING:
-    from ..._arrays import FloatArray, IntArray
+    from ...base import FloatArray, IntArray
 
 _CURVATURE = re.compile(
     r"(?P<number>[-+]?(?:\d+\.?\d*(?:e[-+]?\d+)?|\.\d+)?)\s*\*?\s*(?P<unit>pi|π|deg|°|rad)?\s*(?:/\s*(?P<by>\d+\.?\d*))?",
@@ -96,6 +96,28 @@ def read_pairs(name: str) -> IntArray:
     if not pairs:
         raise OptionError(f"{path} holds no pairs of vertices")
     return np.array(pairs, dtype=np.int64)
+
+
+def read_vertices_or_pairs(option: str, texts: Sequence[str]) -> IntArray:
+    """Return vertices (k,) from "3,17,8" or files of such, or pairs (k, 2) from files with two on each line.
+
+    Raises:
+        OptionError: it is neither, or both are given.
+        MeshFileError: a file cannot be read.
+    """
+    import numpy as np
+
+    of_pairs = [text for text in texts if is_file(text) and _holds_pairs(Path(text))]
+    if not of_pairs:
+        return np.array([v for text in texts for v in read_vertices(option, text)], dtype=np.int64)
+    if len(of_pairs) < len(texts):
+        raise OptionError(f"{option} takes vertices or pairs of them, not both")
+    return np.concatenate([read_pairs(text) for text in of_pairs])
+
+
+def _holds_pairs(path: Path) -> bool:
+    lines = [re.split(r"[\s,;-]+", line.split("#", 1)[0].strip()) for line in _lines(path)]
+    return all(len(words) == 2 for words in lines if words != [""])
 
 
 def read_weights(text: str) -> str | FloatArray:

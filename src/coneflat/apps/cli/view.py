@@ -1,56 +1,59 @@
-"""`coneflat view`."""
+"""`coneflat view` and `coneflat studio`: pages in the browser."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ...options.outputs import MOST_TRIANGLES, SHOWS
-from .shared import again_option, color_option, input_options, up_option, verbosity_options
+from ...options import SHOWS
+from .options import chosen, flag, option_flags, path_flag
+from .shared import (
+    QUIET,
+    VERBOSE,
+    again_option,
+    color_option,
+    input_options,
+    most_option,
+    up_option,
+    verbosity_options,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewFlags:
+    """Output.
+
+    Attributes:
+        output: Page to write, .html.  [default: FILE's name with _view, opened in the browser]
+        texture: PNG, JPEG, GIF or WebP picture to lay on the model.
+        show: What the page shows first.  [default: checker, or picture with --texture]
+    """
+
+    output: Path | None = path_flag()
+    texture: Path | None = path_flag()
+    show: str | None = flag(type=click.Choice(SHOWS))
 
 
 @click.command(short_help="Show a mesh and its layout in the browser.")
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    help="Page to write, .html.  [default: FILE's name with _view, opened in the browser]",
-)
-@click.option(
-    "--texture", type=click.Path(path_type=Path), help="PNG, JPEG, GIF or WebP picture to lay on the model."
-)
-@click.option(
-    "--show",
-    type=click.Choice(SHOWS),
-    help="What the page shows first.  [default: checker, or picture with --texture]",
-)
+@option_flags(ViewFlags)
 @color_option
 @up_option
 @again_option
 @input_options
-@click.option(
-    "--most-triangles",
-    type=int,
-    default=MOST_TRIANGLES,
-    show_default=True,
-    help="Thin a larger mesh to so many, for display only.",
-)
+@most_option
 @verbosity_options
 def view(
     file: Path,
-    output: Path | None,
-    texture: Path | None,
-    show: str | None,
     color: str | None,
-    up: str,
     again: bool,
     repair: bool,
     weld: bool | None,
-    most_triangles: int,
     verbosity: str | None,
+    **given: Any,
 ) -> None:
     """Write a page, one HTML file, that shows FILE and its layout side by side.
 
@@ -67,26 +70,21 @@ def view(
       coneflat view hand.obj -o hand.html --texture leather.jpg
       coneflat quads hand.obj -o hand.npz && coneflat view hand.npz
     """
-    from ...files.quads import holds_quads, read_quads
-    from ...files.texture import read_picture
-    from ...view.own import own_quantity
-    from ...view.page.quads import page_of_quads
-    from ...view.page.webpage import check_page, open_page, page_of, write_page
+    from ...io import read_picture
+    from ..quads.files import holds_quads, read_quads
+    from ..quads.page import page_of_quads
+    from ..view.page.webpage import check_page, open_page, page_of, write_page
+    from ..view.quantity import own_quantity
     from .console import Console
     from .run import FLATTENED, archive_of, open_result
 
     # What can fail at the end is looked at before the work.
-    page = check_page(Path(f"{file.stem}_view.html") if output is None else output)
-    if texture is not None:
-        read_picture(texture)
+    flags = chosen(given, ViewFlags)
+    page = check_page(Path(f"{file.stem}_view.html") if flags.output is None else flags.output)
+    if flags.texture is not None:
+        read_picture(flags.texture)
     with Console(verbosity) as console:
-        look: dict[str, Any] = {
-            "name": file.name,
-            "texture": texture,
-            "up": up,
-            "show": show,
-            "most_triangles": most_triangles,
-        }
+        look = {"name": file.name, "texture": flags.texture, "show": flags.show, **given}
         result = None
         if holds_quads(file):
             if color is not None:
@@ -103,5 +101,44 @@ def view(
                 text = page_of(result, **look)
         write_page(text, page)
         console.finish([page], result)
-        if output is None and not open_page(page):
+        if flags.output is None and not open_page(page):
             console.say(["open it in any browser"])
+
+
+@click.command(short_help="Flatten by hand and eye, live in the browser.")
+@click.argument("file", type=click.Path(path_type=Path), metavar="[MESH|PROJECT]", required=False)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    show_default="a free one",
+    help="Port of this machine at which the page is.",
+)
+@click.option("--no-open", is_flag=True, help="Print the page's address, and open no browser.")
+@color_option
+@most_option
+@verbosity_options
+def studio(
+    file: Path | None, port: int, no_open: bool, color: str | None, most_triangles: int, verbosity: str | None
+) -> None:
+    """Move cones and draw seams on a mesh, and see at once what comes of it.
+
+    The page is at an address of this machine that nobody else can use; it is printed first. What is chosen is kept in
+    the current folder, in MESH's name with _studio, as .json, from which the studio goes on, and `coneflat flatten
+    --project` makes the same layout. A mesh can also be dropped on the page. Ctrl-C ends it.
+
+    \b
+    Examples:
+      coneflat studio hand.obj
+      coneflat studio hand_studio.json
+      coneflat studio --port 8000 --no-open
+    """
+    from ..studio.serve import run_studio
+
+    def say(line: str) -> None:
+        # Without a browser nobody would find the page.
+        if verbosity != QUIET or no_open:
+            click.echo(line)
+
+    tell = click.echo if verbosity == VERBOSE else None
+    run_studio(file, port, opens=not no_open, say=say, tell=tell, color=color, most_triangles=most_triangles)

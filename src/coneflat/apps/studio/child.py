@@ -17,17 +17,17 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from ...errors import ConeflatError, NonManifoldError, NonOrientableError
-from ...progress import asking
+from ... import ConeflatError
+from ...base import asking
+from ...errors import NonManifoldError, NonOrientableError
 from .frames import Head, read_frame, write_frame
 from .known import with_prints
 
 if TYPE_CHECKING:
-    from ...flattener import Flattener
-    from ...input.join import Joined
-    from ...result.flattening import Flattening
-    from ...view.page.content import Model
-    from ...view.quantity import Quantity
+    from ... import Flattener, Flattening
+    from ...io import Joined
+    from ..view.page.content import Model
+    from ..view.quantity import Quantity
 
 #: Polygons from which on the first layout is shown, too: of smaller meshes the last is there as soon.
 EARLY = 20_000
@@ -133,7 +133,7 @@ class Bench:
 
     def _coloured(self, job: Head, result: Flattening, name: str) -> tuple[Head, bytes]:
         """Return what the page shows of a result, with colours of the user's own; without, if there are none such."""
-        from ...view.own import own_quantity
+        from ..view.quantity import own_quantity
         from .wording import in_page
 
         if not job.get("color"):
@@ -165,10 +165,10 @@ class Bench:
 
         own: numbers that are shown as colours.
         """
-        from ...options.outputs import MOST_TRIANGLES
-        from ...result.from_uv import shown_rows
-        from ...view.page.content import Model, content_of
-        from ...view.page.payload import Told, head_and_block
+        from ...options import MOST_TRIANGLES
+        from ..view.from_uv import shown_rows
+        from ..view.page.content import Model, content_of
+        from ..view.page.payload import Told, head_and_block
         from .wording import in_page
 
         told = None
@@ -189,8 +189,8 @@ class Bench:
         return told_of, block
 
     def _open(self, mesh: str, sha256: str, told: Callable[[str, float], None]) -> tuple[Joined, Flattener]:
-        from ...files.read import read_joined
-        from ...flattener import Flattener
+        from ... import Flattener
+        from ...io import read_joined
 
         if self._source is None or self._flattener is None or self._read != (mesh, sha256):
             told("read", 0.0)
@@ -202,7 +202,7 @@ class Bench:
 
 def with_whole(head: Head, block: bytes, model: Model, result: Flattening) -> tuple[Head, bytes]:
     """Return what the page shows of a result, and all vertices and triangles of its mesh beside."""
-    from ...view.page.payload import pack
+    from ..view.page.payload import pack
 
     arrays = {
         "whole_places": model.places.astype(np.float32),

@@ -5,21 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
+from ...base import MAX_CONE_ANGLE, shown
 from ...errors import OptionError, StudioError
-from ...options import Options, declarations, read_options
-from ...options.kinds import Flag, as_number, as_whole
-from ...text import shown
-from .meaning import CORNERS, edges_of, meaning
+from ...options import Flag, Options, as_number, as_whole, declarations, read_options
 from .paint import Paint, Region
 
 #: Options that are chosen as they are; cones and seams are chosen one by one.
 PLAIN = (
-    "distortion", "cone_count", "boundary", "stretch", "charts", "seams", "sharp_angle", "creases", "hide_seams",
-    "symmetric", "mirrored", "resolution", "padding", "repair",
+    "distortion", "cone_count", "boundary", "stretch", "charts", "seams", "sharp_angle", "hide_seams",
+    "resolution", "padding", "repair",
 )  # fmt: skip
 #: Those of them that say how many cones a search is to find.
 NUMBERS = ("distortion", "cone_count")
@@ -27,8 +27,6 @@ NUMBERS = ("distortion", "cone_count")
 BOUNDARIES = ("free", "lengths", "disk", "straight", "rectangle")
 #: What the file's unit of length may be; "" is not known. It changes nothing but the lengths that are shown.
 UNITS = ("", "mm", "cm", "m", "inch")
-#: Radians: no cone has a wider angle, as of searches; triangles have no room for more.
-WIDEST = 4 * math.pi
 
 Path = tuple[int, ...]
 
@@ -93,12 +91,10 @@ class Choices:
             raise OptionError(f"seams are drawn, or those of the file, 'input', not {shown(value)}")
         kept, declared = dict(self.options), declarations(Options)[name]
         if value != "rectangle":
-            value = declared[1].kind.parse(name, value)
-        if name == "symmetric" and value == "off":
-            kept.pop("mirrored", None)
+            value = declared.kind.parse(name, value)
         for other in NUMBERS if name in NUMBERS else (name,):
             kept.pop(other, None)
-        if value != declared[0].default or isinstance(declared[1].kind, Flag):
+        if value != declared.default or isinstance(declared.kind, Flag):
             kept[name] = value
         chosen = replace(self, options=MappingProxyType(kept))
         return chosen.searching() if name in NUMBERS else chosen
@@ -207,8 +203,8 @@ class Choices:
             StudioError: there are four already.
         """
         corners = {*self.corners} ^ {vertex}
-        if len(corners) > CORNERS:
-            raise StudioError(f"a rectangle has {CORNERS} corners: pick one of them to take it away first")
+        if len(corners) > 4:
+            raise StudioError("a rectangle has 4 corners: pick one of them to take it away first")
         return replace(self, corners=tuple(sorted(corners)))
 
     def measured_in(self, of_file: object, as_shown: object) -> Choices:
@@ -303,9 +299,10 @@ class Choices:
 
 
 def _checked_angle(angle: float | None) -> float | None:
-    if angle is not None and not 0 < angle <= WIDEST * (1 + 1e-12):
+    if angle is not None and not 0 < angle <= MAX_CONE_ANGLE * (1 + 1e-12):
         raise StudioError(
-            f"a cone has a positive angle of at most {math.degrees(WIDEST):g} degrees, not {math.degrees(angle):,g}"
+            f"a cone has a positive angle of at most {math.degrees(MAX_CONE_ANGLE):g} degrees, not "
+            f"{math.degrees(angle):,g}"
         )
     return angle
 
@@ -315,3 +312,58 @@ def _checked(path: Iterable[Any]) -> Path:
     if len(vertices) < 2 or any(a == b for a, b in pairwise(vertices)):
         raise StudioError(f"a path leads from one vertex to others, not along {shown(list(vertices))}")
     return vertices
+
+
+def meaning(chosen: Choices) -> dict[str, Any]:
+    """Return keyword arguments of `coneflat.flatten`; whether they go together is not looked at."""
+    words = dict(chosen.options)
+    if chosen.by_hand:
+        words.pop("distortion", None)
+        words.pop("cone_count", None)
+        words |= _cones_by_hand(chosen)
+    elif chosen.cones:
+        words["required_cones"] = [cone.vertex for cone in chosen.cones]
+    if words.get("boundary") == "rectangle":
+        words |= _rectangle(words.pop("boundary"), chosen)
+    if chosen.cuts:
+        cut = _pairs(chosen.cuts)
+        words["seams"] = ("input", cut) if "seams" in words else cut
+    if chosen.paint.no_seam:
+        words["no_seams"] = np.array([*chosen.paint.no_seam.vertices(), *chain(*chosen.kept)])
+    elif chosen.kept:
+        words["no_seams"] = _pairs(chosen.kept)
+    return words | _painted(chosen)
+
+
+def _cones_by_hand(chosen: Choices) -> dict[str, Any]:
+    if not chosen.cones:
+        return {"cones": "none"}
+    return {"cones": {cone.vertex: cone.curvature for cone in chosen.cones}}
+
+
+def _rectangle(boundary: str, chosen: Choices) -> dict[str, Any]:
+    """Return the corners of a rectangle; while some are still to be picked, nothing, so that the boundary is free."""
+    return {"boundary": dict.fromkeys(chosen.corners)} if len(chosen.corners) == 4 else {}
+
+
+def _painted(chosen: Choices) -> dict[str, Any]:
+    """Return what is painted, as far as it means something: cones placed by hand or locked lie where they are."""
+    paint = chosen.paint
+    words: dict[str, Any] = {}
+    if paint.no_cone and not chosen.by_hand:
+        locked = {cone.vertex for cone in chosen.cones}
+        words["forbidden_cones"] = [v for v in paint.no_cone.vertices() if v not in locked]
+    # Where all angles are given there is nothing to weigh.
+    if paint.importance and (not chosen.by_hand or any(cone.angle is None for cone in chosen.cones)):
+        words["weights"] = paint.weights()
+    return words
+
+
+def _pairs(paths: Iterable[tuple[int, ...]]) -> Any:
+    edges = {tuple(sorted(edge)) for path in paths for edge in edges_of(path)}
+    return np.array(sorted(edges), dtype=np.int64)
+
+
+def edges_of(path: tuple[int, ...]) -> set[frozenset[int]]:
+    """Return the edges that a path runs along."""
+    return {frozenset(edge) for edge in pairwise(path)}

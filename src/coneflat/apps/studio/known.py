@@ -11,15 +11,14 @@ from .frames import Head
 Picture = tuple[Head, bytes]
 #: Pictures of which it is known what was in them: more than the page can be behind by.
 MOST = 16
-#: Bytes of a print: two arrays never have the same by chance.
-SIZE = 16
 
 
 def with_prints(head: Head, block: bytes) -> Head:
     """Return the head of a picture with a print of each of its arrays, by which the same are known."""
     view = memoryview(block)
+    # 16 bytes: two arrays never have the same print by chance.
     arrays = [
-        {**each, "print": blake2b(view[slice(*_span(each))], digest_size=SIZE).hexdigest()}
+        {**each, "print": blake2b(view[slice(*_span(each))], digest_size=16).hexdigest()}
         for each in head["arrays"]
     ]
     return {**head, "arrays": arrays}

@@ -15,18 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...base import shown
 from ...errors import ArrayShapeError, OptionError, StudioError
-from ...files.atomic import atomic_write
-from ...files.obj_write import lines_of
-from ...input.arrays import as_input
-from ...text import shown
+from ...io import as_input, atomic_write, lines_of
 from .serve import address_of, listening, studio_server
 from .session import PATIENCE, Session
 
 if TYPE_CHECKING:
-    from ...result.flattening import Flattening
-
-HEIGHT = 720  # pixels
+    from ... import Flattening
 
 
 class Studio:
@@ -49,7 +45,7 @@ class Studio:
         *,
         folder: str | PathLike[str] | None = None,
         color: str | None = None,
-        height: int = HEIGHT,
+        height: int = 720,
         through: str | None = None,
     ) -> None:
         """Args:
@@ -139,7 +135,7 @@ class Studio:
         Raises:
             StudioError: they cannot be, and why.
         """
-        from ...files.npz import read_flattening
+        from ... import read_flattening
 
         if not self._session.wait_until_idle():
             raise StudioError(f"there is no layout after {PATIENCE:g} seconds")

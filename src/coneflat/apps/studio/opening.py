@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ...base import shown
 from ...errors import ProjectError, StudioError
-from ...text import shown
 from .choices import Choices
 from .project import ENDING, Project, hash_of, read_project
 

@@ -7,11 +7,17 @@ from collections.abc import Callable
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ... import TriangleMesh
+from ...base import MOST_CONES
 from ...errors import StudioError
+from ...mesh import end_corners
+from ..view.page.content import outline_halfedges
 
 if TYPE_CHECKING:
-    from ...input.join import Joined
-    from ...result.flattening import Flattening
+    from ... import Flattening
+    from ...io import Joined
     from .choices import Choices
 
 #: What a result can be saved as: .json is its report, .png a picture of the layout.
@@ -21,11 +27,9 @@ QUADS = (".obj", ".ply", ".glb")
 MOST_QUADS = 1_000_000
 #: Options that a search for any number of cones heeds, and those that quads heed.
 OF_CURVES = (
-    "required_cones", "forbidden_cones", "weights", "seams", "forbidden_seams", "seamless", "sharp_angle", "repair",
+    "required_cones", "forbidden_cones", "weights", "seams", "no_seams", "sharp_angle", "repair",
 )  # fmt: skip
 OF_QUADS = ("forbidden_cones", "weights", "sharp_angle", "stretch", "repair")
-#: Cones to look at: as many as this, and so many more than are locked.
-MOST_CONES, MORE = 30, 12
 
 Told = Callable[[str, float], None]
 
@@ -41,17 +45,15 @@ def saved(result: Flattening | None, ending: str) -> bytes:
     if ending == ".json":
         return (json.dumps(result.report(), indent=2) + "\n").encode("utf-8")
     if ending == ".svg":
-        from .outlines import layout_svg
-
         return layout_svg(result).encode("utf-8")
     stream = BytesIO()
     if ending == ".png":
-        from ...view import make_figure
-        from ...view.figures.figure import write_figure
+        from ..view import make_figure
+        from ..view.figures.figure import write_figure
 
         write_figure(make_figure(result, "layout"), stream, ending)
     else:
-        from ...files.write import write_stream
+        from ...io import write_stream
 
         write_stream(result, stream, ending)
     return stream.getvalue()
@@ -70,8 +72,8 @@ def quads_of(source: Joined, choices: Choices, count: int, ending: str, told: To
         ending: one of `QUADS`.
         told: as of `coneflat.flatten`'s progress.
     """
-    from ...files.quads import write_quads_stream
-    from ...grid.quads import quads
+    from ..quads.files import write_quads_stream
+    from ..quads.quads import quads
 
     words = choices.searching().keywords()
     options = {name: words[name] for name in OF_QUADS if name in words}
@@ -88,11 +90,11 @@ def curve_of(source: Joined, choices: Choices, told: Told) -> dict[str, Any]:
 
     That of the whole, with so many cones in each of its parts: components, and what is between marked seams.
     """
-    from ...curve import whole_curve
+    from ...cone_curve import whole_curve
     from ...options import read_options
 
     words = curve_options(choices)
-    most = max(MOST_CONES, len(words.get("required_cones", ())) + MORE)
+    most = max(MOST_CONES, len(words.get("required_cones", ())) + 12)  # of which a dozen are free
     found = whole_curve(
         source.mesh, None, read_options({**source.renamed(words), "cone_count": most, "progress": told}), most
     )
@@ -104,3 +106,34 @@ def curve_options(choices: Choices) -> dict[str, Any]:
     """Return what of the choices a curve depends on."""
     words = choices.searching().keywords()
     return {name: words[name] for name in OF_CURVES if name in words}
+
+
+def layout_svg(result: Flattening) -> str:
+    """Return an SVG drawing of the unit square, v upwards: seams in black, the boundary in grey, cones as dots."""
+    outline, seams = outline_halfedges(TriangleMesh(result.vertices, result.faces), result.uv_faces)
+    begin, end = (result.uv_faces.reshape(-1)[corners] for corners in end_corners(outline))
+    places = np.round(np.column_stack([result.uv[:, 0], 1 - result.uv[:, 1]]) * 1000, 3)
+
+    def path(chosen: slice, name: str) -> str:
+        lines = (
+            f"M{a[0]:g} {a[1]:g}L{b[0]:g} {b[1]:g}"
+            for a, b in zip(places[begin[chosen]].tolist(), places[end[chosen]].tolist(), strict=True)
+        )
+        return f'<path class="{name}" d="{"".join(lines)}"/>'
+
+    is_cone = np.isin(result.faces.reshape(-1), result.cones)
+    dots = (
+        f'<circle cx="{x:g}" cy="{y:g}" r="3"/>'
+        for x, y in places[np.unique(result.uv_faces.reshape(-1)[is_cone])].tolist()
+    )
+    return "\n".join(
+        (
+            '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1000 1000" width="1000" height="1000">',
+            "<style>path{fill:none;stroke-width:1.5;stroke-linecap:round}.seam{stroke:#000}.boundary{stroke:#777}"
+            "circle{fill:#d62121}</style>",
+            path(slice(2 * seams), "seam"),
+            path(slice(2 * seams, None), "boundary"),
+            *dots,
+            "</svg>\n",
+        )
+    )

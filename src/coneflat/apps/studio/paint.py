@@ -8,16 +8,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from ...base import shown
 from ...errors import StudioError
-from ...options.kinds import as_number
-from ...text import shown
+from ...options import as_number
 
 if TYPE_CHECKING:
-    from ..._arrays import IntArray
+    from ...base import IntArray
 
 #: A region in words: numbers, and first and last of those that follow each other.
 _RUN = re.compile(r"([0-9]{1,15})(?:-([0-9]{1,15}))?")
-_BEYOND = 2**53  # above all vertices
 #: What is painted beside importance.
 FLAGS = ("no_cone", "no_seam")
 MOST_IMPORTANT = 1e6
@@ -87,7 +86,7 @@ class Region:
     def without(self, other: Region) -> Region:
         """Return what is in this one and not in the other."""
         left, at = [], 0
-        taken = (*other.runs, (_BEYOND, _BEYOND))
+        taken = (*other.runs, (2**53, 2**53))  # above all vertices
         for first, last in self.runs:
             begin = first
             while taken[at][1] < begin:

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...errors import ConeflatError, MeshFileError, ProjectError
-from ...files.atomic import atomic_write
+from ... import ConeflatError
+from ...errors import MeshFileError, ProjectError
+from ...io import atomic_write
 from .choices import Choices
 
 KIND, VERSION = "coneflat project", 1
 ENDING = ".json"
-#: Bytes: a project of a million drawn edges is smaller.
-LARGEST = 64 * 1024 * 1024
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ def read_project(path: Path) -> Project:
         ProjectError: it cannot be read, or is none.
     """
     try:
-        if path.stat().st_size > LARGEST:
+        if path.stat().st_size > 64 * 1024 * 1024:  # a project of a million drawn edges is smaller
             raise ProjectError(f"{path} is no project: it has {path.stat().st_size:,} bytes")
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -8,8 +8,6 @@ from typing import Any
 from .choices import Choices
 from .paint import region_of
 
-#: Letters that may stand in the panel.
-LONGEST = 20_000
 #: Numbers that are written one by one.
 FEW = 12
 
@@ -40,7 +38,7 @@ def command_line(mesh: str, project: str, choices: Choices) -> str:
         flag = "--" + name.replace("_", "-")
         if name == "repair":
             parts += ["--repair"] if value else []
-        elif name in ("required_cones", "allowed_cones"):
+        elif name == "required_cones":
             parts += [flag, ",".join(str(vertex) for vertex in value)]
         elif isinstance(value, dict):
             parts += [flag, ",".join(_cone(vertex, curvature) for vertex, curvature in value.items())]
@@ -52,7 +50,7 @@ def command_line(mesh: str, project: str, choices: Choices) -> str:
 def python_lines(mesh: str, choices: Choices) -> str:
     """Return Python that flattens a mesh by what was chosen."""
     given = [f"    {name}={_written(value)}," for name, value in choices.keywords().items()]
-    if sum(map(len, given)) > LONGEST:
+    if sum(map(len, given)) > 20_000:  # letters in the panel
         return "# What was drawn or painted is too much to be written here; the project's file has it."
     call = "\n".join([f"result = coneflat.flatten(\n    {mesh!r},", *given, ")"])
     return f"import coneflat\n\n{call}"

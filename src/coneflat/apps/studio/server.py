@@ -19,8 +19,9 @@ from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route
 from starlette.types import ASGIApp
 
-from ...errors import ConeflatError, StudioError
-from ...files import INPUT_FORMATS
+from ... import ConeflatError
+from ...errors import StudioError
+from ...io import INPUT_FORMATS
 from .guard import MOST_ASKED, Guard
 from .opening import file_within
 from .page import studio_page

@@ -8,13 +8,12 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ...options import Options
-from ...text import list_some, plural
-from .choices import WIDEST, Choices
+from ...base import MAX_CONE_ANGLE, MIN_CONE_ANGLE, list_some, plural
+from .choices import Choices
 from .paint import Region
 
 if TYPE_CHECKING:
-    from ...result.flattening import Flattening
+    from ... import Flattening
 
 
 def misplaced(chosen: Choices) -> tuple[str, ...]:
@@ -43,7 +42,7 @@ def within(region: Region, vertices: Iterable[int]) -> list[int]:
 
 def strained(chosen: Choices, result: Flattening) -> tuple[str, ...]:
     """Return a sentence on cones of a result whose angle is out of bounds, as those that were typed leave no other."""
-    least, most = Options().min_cone_angle, WIDEST
+    least, most = MIN_CONE_ANGLE, MAX_CONE_ANGLE
     typed = {cone.vertex for cone in chosen.cones if cone.angle is not None}
     if not (chosen.by_hand and typed):
         return ()

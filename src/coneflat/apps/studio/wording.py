@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import re
 
-from ...input.validation import REPAIR_ADVICE
+from ...mesh import REPAIR_ADVICE
 
 #: By the name of an option: what is written on the control that sets it.
 CONTROLS = {
     "distortion": "Distortion",
     "cone_count": "Number",
     "required_cones": "Lock",
-    "allowed_cones": "Placed by hand",
     "forbidden_cones": "No cones",
-    "seamless": "No seams",
     "weights": "Important",
     "seams": "Keep those of the file's UVs",
-    "forbidden_seams": "Keep whole",
+    "no_seams": "No seams",
     "sharp_angle": "Cut edges sharper than",
-    "creases": "Along sharp edges",
     "hide_seams": "Hide them",
     "boundary": "Boundary",
-    "symmetric": "Symmetry",
-    "mirrored": "Both sides on the same texels",
     "stretch": "From angles to areas",
     "charts": "Charts",
     "resolution": "Texels a side",
@@ -31,7 +26,7 @@ CONTROLS = {
 }
 #: A flag, or a name that is no word; a name that is one means an option where a message begins with it.
 _NAMED = re.compile(
-    r"--(?P<flag>[a-z]+(?:-[a-z]+)*)(?: (?:greedy|exact|linear|amg)\b)?"
+    r"--(?P<flag>[a-z]+(?:-[a-z]+)*)(?: (?:greedy|exact|linear)\b)?"
     rf"|\b(?P<name>{'|'.join(name for name in CONTROLS if '_' in name)})\b"
     rf"|\A(?P<first>{'|'.join(CONTROLS)})(?= (?:must|cannot|is|needs)\b)"
 )

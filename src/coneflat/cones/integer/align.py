@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..._arrays import FloatArray, IntArray
+from ...base.arrays import FloatArray, IntArray
 from ...geometry.handles import off_multiple
-from ..solution import ConeSolution
+from ...stages import ConeSolution
 from ..sparse import ConeSearch
 from .search import QuantisedCones
 

@@ -6,16 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..._arrays import FloatArray, IntArray
-from ..sparse.best_sets import BestSets
-from ..sparse.dense_model import DenseModel, above_rounding
+from ...base.arrays import FloatArray, IntArray
+from ..sparse.dense_model import GAIN, BestSets, DenseModel, above_rounding
 from ..sparse.fit_curvatures import fit_curvatures
-from .moves import NOBODY, Quanta, best_merge, best_pair, best_split, descend, energy_of
+from .moves import Quanta, best_merge, best_pair, best_split, descend, energy_of
 
-# An exchange of cones must lower E^2 by this share, or rounding could make them go in circles.
-EXCHANGE_GAIN = 1e-6
-# Pairs of opposite cones that are looked at closely before one is left out.
-PAIRS = 8
 # Exchanges tried at a time: for more than a hundred cones, what comes later gains little.
 EXCHANGES = 100
 
@@ -94,43 +89,23 @@ class Lattice:
         model, (quantum, least, most, _) = self.model, self.quanta
         if least > -1 or most < 1:
             return None
-        one, two = best_pair(model.gram, model.slope, cones.members, cones.indices, quantum, model.usable)
-        if one < 0:
+        pair = best_pair(model.gram, model.slope, cones.members, cones.indices, quantum, model.usable)
+        if pair is None:
             return None
-        return self.descended(np.append(cones.members, [one, two]), np.append(cones.indices, [1, -1]))
-
-    def shrunk_by_pair(self, cones: IndexedCones) -> IndexedCones | None:
-        """Return cones with two less, of opposite indices, the best after moves of the best before them."""
-        moved = [self.descended(each.members, each.indices) for each in self._without_pairs(cones)[:PAIRS]]
-        return min(moved, key=lambda each: each.energy, default=None)
-
-    def _without_pairs(self, cones: IndexedCones) -> list[IndexedCones]:
-        """Return cones without each pair of opposite ones, the least energy first."""
-        fixed, found = len(self.model.fixed), []
-        for i in range(fixed, len(cones)):
-            for j in range(fixed, i):
-                if cones.indices[i] == -cones.indices[j]:
-                    found.append(
-                        self._left(np.delete(cones.members, [i, j]), np.delete(cones.indices, [i, j]))
-                    )
-        return sorted(found, key=lambda each: each.energy)
-
-    def _left(self, members: IntArray, indices: IntArray) -> IndexedCones:
-        """Return cones with their energy."""
-        model = self.model
-        energy = energy_of(model.gram, model.slope, model.constant, members, indices, self.quanta.quantum)
-        return IndexedCones(above_rounding(energy), members, indices)
+        return self.descended(np.append(cones.members, pair), np.append(cones.indices, [1, -1]))
 
     def without(self, cones: IndexedCones, place: int) -> IndexedCones | None:
         """Return cones with the one at a place merged into the one that takes its quanta best."""
         model = self.model
-        heir = best_merge(model.gram, model.slope, cones.members, cones.indices, place, self.quanta)
-        if heir == NOBODY:
+        can_go, heir = best_merge(model.gram, model.slope, cones.members, cones.indices, place, self.quanta)
+        if not can_go:
             return None
         indices = cones.indices.copy()
         if heir >= 0:
             indices[heir] += indices[place]
-        return self._left(np.delete(cones.members, place), np.delete(indices, place))
+        members, indices = np.delete(cones.members, place), np.delete(indices, place)
+        energy = energy_of(model.gram, model.slope, model.constant, members, indices, self.quanta.quantum)
+        return IndexedCones(above_rounding(energy), members, indices)
 
     def shrunk(self, cones: IndexedCones) -> IndexedCones | None:
         """Return cones with one less, the best after moves."""
@@ -152,7 +127,7 @@ class Lattice:
                 break
             rest = self.without(cones, place)
             again = None if rest is None or not len(rest) else self.grown(rest)
-            if again is not None and again.energy < cones.energy * (1 - EXCHANGE_GAIN):
+            if again is not None and again.energy < cones.energy * (1 - GAIN):
                 cones, unchanged = again, 0
             else:
                 unchanged += 1

@@ -10,14 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..._arrays import BoolArray, FloatArray, IntArray
-from ...compiled import compiled
-from ..sparse.scores import gradients
+from ...base.arrays import BoolArray, FloatArray, IntArray
+from ...base.compiled import compiled
+from ..solution import TIE
+from ..sparse.dense_model import first_least
 
-# A move must lower E^2 by this share, or rounding could make them go in circles.
-GAIN = 1e-9
-# Changes that differ by less, relatively, are equal, and the first met is taken.
-TIE = 1e-9
 # Transfers of up to so many quanta at once, either way: of the quarter turns there is room for no more in a cone.
 REACH = 3
 
@@ -56,7 +53,11 @@ def slopes(
     gram: FloatArray, slope: FloatArray, members: IntArray, quantum: float, indices: IntArray
 ) -> FloatArray:
     """Return (m,) half the derivative of E^2 by the curvature of each candidate."""
-    return gradients(gram, slope, members, quantum * indices.astype(np.float64), 0.0)
+    gradient = slope.copy()
+    for i in range(len(members)):
+        for t in range(len(gradient)):
+            gradient[t] += quantum * indices[i] * gram[members[i], t]
+    return gradient
 
 
 @compiled
@@ -102,7 +103,7 @@ def descend(
     free = without_members(usable, members)
     for _ in range(100 + 20 * size):  # comes to rest in a few per cone
         gradient = slopes(gram, slope, members, quantum, indices)
-        best, kind, one, other, amount = -GAIN * abs(energy), 0, -1, -1, 0
+        best, kind, one, other, amount = -TIE * abs(energy), 0, -1, -1, 0
         for i in range(size):
             s = members[i]
             if not quanta.has_sum:
@@ -174,7 +175,6 @@ def best_split(
     return chosen, amount, giver
 
 
-@compiled
 def best_pair(
     gram: FloatArray,
     slope: FloatArray,
@@ -182,41 +182,37 @@ def best_pair(
     indices: IntArray,
     quantum: float,
     usable: BoolArray,
-) -> tuple[int, int]:
-    """Return the two further cones, of a quantum and of minus that, which lower E^2 most; -1 if there is no room."""
-    free = without_members(usable, members)
-    gradient = slopes(gram, slope, members, quantum, indices)
-    best, one, two = np.inf, -1, -1
-    for s in range(len(slope)):
-        for t in range(len(slope)):
-            if free[s] and free[t] and s != t:
-                change = transfer(gram, gradient, s, t, quantum)
-                if one < 0 or change < best - TIE * abs(best):
-                    best, one, two = change, t, s
-    return one, two
-
-
-# What `best_merge` returns where no cone can take the quanta, and where they just go.
-NOBODY, NOWHERE = -2, -1
+) -> tuple[int, int] | None:
+    """Return the two further cones, of a quantum and of minus that, which lower E^2 most; None if there is no room."""
+    free = np.flatnonzero(without_members(usable, members))
+    if len(free) < 2:
+        return None
+    gradient = slopes(gram, slope, members, quantum, indices)[free]
+    gram = gram[np.ix_(free, free)]
+    norms = gram.diagonal()[:, None] + gram.diagonal() - 2 * gram
+    changes = (2 * (gradient - gradient[:, None]) + quantum * norms) * quantum
+    np.fill_diagonal(changes, np.inf)
+    giver, taker = divmod(first_least(changes.ravel()), len(free))
+    return int(free[taker]), int(free[giver])
 
 
 @compiled
 def best_merge(
     gram: FloatArray, slope: FloatArray, members: IntArray, indices: IntArray, place: int, quanta: Quanta
-) -> int:
-    """Return the place of the cone that best takes all quanta of the one at `place`.
+) -> tuple[bool, int]:
+    """Return whether all quanta of the cone at `place` can go, and the place of the cone that best takes them.
 
-    NOBODY if none can; NOWHERE if it is best that they just go, without a sum to keep.
+    The place is -1 if it is best that they just go, without a sum to keep.
     """
     gradient = slopes(gram, slope, members, quanta.quantum, indices)
     s = members[place]
     k = quanta.quantum * indices[place]
-    best, chosen = np.inf, NOBODY
+    best, chosen, is_found = np.inf, -1, not quanta.has_sum
     if not quanta.has_sum:
-        best, chosen = (k * gram[s, s] - 2 * gradient[s]) * k, NOWHERE
+        best = (k * gram[s, s] - 2 * gradient[s]) * k
     for j in range(len(members)):
         if j != place and is_within(indices[j] + indices[place], quanta):
             change = transfer(gram, gradient, s, members[j], k)
-            if chosen == NOBODY or change < best - TIE * abs(best):
-                best, chosen = change, j
-    return chosen
+            if not is_found or change < best - TIE * abs(best):
+                best, chosen, is_found = change, j, True
+    return is_found, chosen

@@ -11,27 +11,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..._arrays import IntArray
+from ...base.arrays import IntArray
+from ...base.defaults import DISTORTION, LEAST_QUANTUM
 from ...errors import CurvatureError, OptionError
-from ...options import LEAST_QUANTUM
-from ..solution import FULL_TURN, ConeSolution
+from ...stages import ConeSolution
+from ..solution import FULL_TURN, TYPED
+from ..sparse.dense_model import GAIN
 from ..sparse.exact_model import ROUNDS, WORTHWHILE
 from ..sparse.search import COARSE_DOUBT, ConeSearch
 from .lattice import IndexedCones, Lattice
 from .moves import Quanta
 
-# How far, relative, 2 pi chi may be from a multiple of the quantum: what a quantum typed with seven digits is off by.
-WHOLE = 1e-6
 # Curvature, radians, that stands for "no bound": more than that of any cone worth having.
 UNBOUNDED = 2000 * math.pi
 # The survey ends so many sizes after the goal is met, or after E has ceased to fall: more cones of whole quanta need
 # not be better.
 BEYOND, STALLED = 2, 5
-# Cones whose E^2 is more than so many times that of the best of their number are not improved by exchanges, nor fewer
-# cones sought from a number whose E^2 is so many times the goal.
-PROMISING, HOPELESS = 1.5, 4.0
-# Decimals of the largest score to which scores are told apart.
-DIGITS = 6
+# Fewer cones are not sought from a number whose E^2 is more than so many times the goal.
+HOPELESS = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +50,9 @@ class QuantisedCones:
 
 def quantise_cones(
     search: ConeSearch,
-    quantum: float = math.pi / 2,
+    quantum: float,
     *,
-    distortion: float = 0.2,
+    distortion: float = DISTORTION,
     count: int | None = None,
     most: int | None = None,
 ) -> QuantisedCones:
@@ -105,22 +102,22 @@ def quantise_cones(
 
 def open_lattice(search: ConeSearch, quantum: float) -> Lattice:
     """Return the lattice of multiples of a quantum that a search's limits allow, without cones yet."""
-    if not LEAST_QUANTUM <= quantum <= FULL_TURN * (1 + WHOLE):
+    if not LEAST_QUANTUM <= quantum <= FULL_TURN * (1 + TYPED):
         raise OptionError(f"the quantum must be from {LEAST_QUANTUM:g} radians to 2 pi, not {quantum:g}")
     parts = round(FULL_TURN / quantum)
-    if abs(parts * quantum - FULL_TURN) <= WHOLE * FULL_TURN:
+    if abs(parts * quantum - FULL_TURN) <= TYPED * FULL_TURN:
         quantum = FULL_TURN / parts
     limits = search.limits
     total = None
     if limits.has_sum:
         total = round(limits.total / quantum)
-        if abs(total * quantum - limits.total) > WHOLE * max(abs(limits.total), 1.0):
+        if abs(total * quantum - limits.total) > TYPED * max(abs(limits.total), 1.0):
             raise CurvatureError(
                 f"curvatures must sum to 2 pi chi = {limits.total / np.pi:.6g} pi, which is no multiple of "
                 f"{quantum / np.pi:.6g} pi"
             )
-    least = math.ceil(max(limits.least, -UNBOUNDED) / quantum - WHOLE)
-    most = math.floor(min(limits.most, UNBOUNDED) / quantum + WHOLE)
+    least = math.ceil(max(limits.least, -UNBOUNDED) / quantum - TYPED)
+    most = math.floor(limits.most / quantum + TYPED)
     if (
         least > most
         or least == most == 0
@@ -142,8 +139,8 @@ def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
     """
     order, required = search.exact.in_order(members), len(search.exact.fixed)
     slope = search.exact.slope[members[order[required:]]]
-    digits = np.round(slope / max(np.abs(slope).max(initial=0.0), np.finfo(float).tiny), DIGITS)
-    return np.append(order[:required], order[required:][np.argsort(-digits, kind="stable")])
+    steps = np.round(slope / max(GAIN * np.abs(slope).max(initial=0.0), np.finfo(float).tiny))
+    return np.append(order[:required], order[required:][np.argsort(-steps, kind="stable")])
 
 
 def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None:
@@ -162,7 +159,6 @@ def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None
     size, beyond, stalled, least = min(best.sizes), 0, 0, math.inf
     while size < most and beyond < BEYOND and stalled < STALLED:
         _offer(lattice, lattice.grown(best[size]), most)
-        _offer(lattice, lattice.grown_by_pair(best[size]), most)
         size = min((other for other in best.sizes if other > size), default=most)
         beyond += best.energy(size) <= goal
         stalled = 0 if best.energy(size) < least * (1 - WORTHWHILE) else stalled + 1
@@ -171,7 +167,6 @@ def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None
         if best.energy(size) > goal * HOPELESS and size < most:
             break
         _offer(lattice, lattice.shrunk(best[size]), most)
-        _offer(lattice, lattice.shrunk_by_pair(best[size]), most)
 
 
 def _offer(lattice: Lattice, cones: IndexedCones | None, most: float = math.inf) -> None:
@@ -179,7 +174,7 @@ def _offer(lattice: Lattice, cones: IndexedCones | None, most: float = math.inf)
     if (
         cones is not None
         and len(cones) <= most
-        and cones.energy < PROMISING * lattice.best.energy(len(cones))
+        and cones.energy < COARSE_DOUBT * lattice.best.energy(len(cones))
     ):
         lattice.best.offer(lattice.exchanged(cones))
 

@@ -11,27 +11,22 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from ..._arrays import FloatArray, IntArray
-from ...compiled import compiled
+from ...base.arrays import FloatArray, IntArray
+from ...base.compiled import compiled
+from ..solution import TIE
 
 # Largest factor by which one level shrinks the model: an aggregate is a vertex and its neighbours.
 LARGEST_AGGREGATE = 7.0
-# Couplings below this share of the geometric mean of the diagonals do not join vertices (across slivers).
-WEAK = 0.02
 # Damping of the Jacobi step that smooths the aggregates: 4/3 over the largest eigenvalue of D^-1 L, about 2.
 DAMPING = 2 / 3
 # Entries below this share of what is large in their row are rounding.
 ROUNDED = 1e-12
 # Functions that meet at an unknown at most, or it is not smoothed: a hub, which would join all of them to one another.
 MEETING = 100
-# So many unknowns are few enough in any case.
-SMALL = 600
-# The last level has at most so many times the number of functions wanted, if a few tries can do it.
-CLOSE, TRIES = 1.05, 4
+# The last level has at most so many times the number of functions wanted, if smaller aggregates can do it.
+CLOSE = 1.05
 # A level with more than this share of the unknowns of the one before is no progress.
 STUCK = 0.9
-# Values that differ by less, relatively, are equal, and the first in the order of vertices is taken.
-TIE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,16 +54,14 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
     functions: csr_matrix | None = None
     level, mass = laplacian, None
     order = np.arange(laplacian.shape[0])
-    while level.shape[0] > max(1.2 * size, SMALL):
+    while level.shape[0] > 1.2 * size:
         level = _without_rounding(level, level.diagonal())
         ratio = level.shape[0] / size
         steps = max(1, round(np.log(ratio) / np.log(LARGEST_AGGREGATE)))
         most = size if steps == 1 else None
-        for weak in (WEAK, 0.0):
-            part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most, weak)
-            if part.shape[1] <= STUCK * level.shape[0]:
-                break
-        else:  # hardly anything is coupled, as on a strip between two boundaries: whatever is next in order
+        part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most)
+        if part.shape[1] > STUCK * level.shape[0]:
+            # Hardly anything is coupled, as on a strip between two boundaries: whatever is next in order.
             part = _pieces(np.argsort(order, kind="stable") * size // len(order), size)
         transposed = csr_matrix(part.T)
         level = csr_matrix(transposed @ (level @ part))
@@ -90,26 +83,18 @@ def _pieces(labels: IntArray, number: int) -> csr_matrix:
     return csr_matrix((np.ones(count), (np.arange(count), labels)), shape=(count, number))
 
 
-def _smoothed_aggregates(
-    level: csr_matrix, order: IntArray, size: float, most: int | None, weak: float
-) -> csr_matrix:
-    """Return basis functions made of about `size` vertices each, `most` of them if that can be had.
-
-    Couplings below the share `weak` do not join vertices.
-    """
+def _smoothed_aggregates(level: csr_matrix, order: IntArray, size: float, most: int | None) -> csr_matrix:
+    """Return basis functions made of about `size` vertices each, `most` of them if that can be had."""
     count = level.shape[0]
     diagonal = np.maximum(level.diagonal(), 1e-300)
     rows = level.indptr.astype(np.int64), level.indices.astype(np.int64), level.data, diagonal, order
-    labels, number = aggregate(*rows, size, weak)
-    for _ in range(TRIES):
-        if most is None or number <= most * CLOSE:
-            break
+    labels, number = aggregate(*rows, size)
+    before = count + 1
+    while most is not None and most * CLOSE < number < before:
         # Vertices left over make aggregates smaller than wished, and another level for that little makes all dense.
         size *= number / most
         before = number
-        labels, number = aggregate(*rows, size, weak)
-        if number == before:
-            break
+        labels, number = aggregate(*rows, size)
     pieces = _pieces(labels, number)
     image = csr_matrix(level @ pieces)
     damping = np.where(np.diff(image.indptr) > MEETING, 0.0, DAMPING / diagonal)
@@ -137,11 +122,10 @@ def aggregate(
     diagonal: FloatArray,
     order: IntArray,
     size: float,
-    weak: float,
 ) -> tuple[IntArray, int]:
     """Return (n,) the aggregate of each vertex, and their number.
 
-    A vertex whose strong neighbours are mostly free takes the strongest of them; leftovers join their strongest
+    A vertex whose neighbours are mostly free takes those that are coupled most strongly; leftovers join their strongest
     neighbour's aggregate.
     """
     count = len(diagonal)
@@ -154,7 +138,7 @@ def aggregate(
         taken = 0
         for e in range(indptr[vertex], indptr[vertex + 1]):
             other = indices[e]
-            if other != vertex and -weights[e] > weak * np.sqrt(diagonal[vertex] * diagonal[other]):
+            if other != vertex and weights[e] < 0.0:
                 if labels[other] < 0:
                     free += 1
                 else:
@@ -171,7 +155,7 @@ def aggregate(
                 other = indices[e]
                 if other != vertex and labels[other] < 0:
                     strength = -weights[e] / np.sqrt(diagonal[vertex] * diagonal[other])
-                    if strength > max(weak, best * (1 + TIE)):
+                    if strength > best * (1 + TIE):
                         strongest, best = other, strength
             if strongest < 0:
                 break
@@ -205,26 +189,14 @@ def _order_of_aggregates(part: csr_matrix, order: IntArray) -> IntArray:
 
 
 def representatives(basis: csr_matrix, fitness: FloatArray) -> IntArray:
-    """Return for each coarse function the vertex where it is largest, times the fitness, without repetitions."""
-    first = rows_of_largest(basis.indptr, basis.indices, basis.data, np.asarray(fitness), basis.shape[1])
-    return np.unique(first[first >= 0])
+    """Return for each coarse function the vertex where it is largest, times the fitness, without repetitions.
 
-
-@compiled
-def rows_of_largest(
-    starts: IntArray, columns: IntArray, values: FloatArray, factors: FloatArray, count: int
-) -> IntArray:
-    """Return the row with the largest positive value of each of `count` columns, the first but for ties; -1 if none.
-
-    starts, columns, values: a matrix by rows. factors: one for each row.
+    The first but for ties; none where the function is nowhere positive.
     """
-    largest, first = np.zeros(count), np.full(count, -1)
-    for row in range(len(starts) - 1):
-        for at in range(starts[row], starts[row + 1]):
-            largest[columns[at]] = max(largest[columns[at]], values[at] * factors[row])
-    for row in range(len(starts) - 1):
-        for at in range(starts[row], starts[row + 1]):
-            column, value = columns[at], values[at] * factors[row]
-            if first[column] < 0 and value > 0.0 and value >= largest[column] * (1 - TIE):
-                first[column] = row
-    return first
+    columns = _with_scaled_rows(basis, fitness).tocsc()
+    column = np.repeat(np.arange(basis.shape[1]), np.diff(columns.indptr))
+    largest = np.zeros(basis.shape[1])
+    np.maximum.at(largest, column, columns.data)
+    is_largest = (columns.data > 0) & (columns.data >= largest[column] * (1 - TIE))
+    _, first = np.unique(column[is_largest], return_index=True)
+    return np.unique(columns.indices[is_largest][first]).astype(np.int64)

@@ -8,16 +8,12 @@ import numpy as np
 from scipy.linalg import lapack
 from scipy.sparse import csr_matrix
 
-from ..._arrays import FloatArray, IntArray
-from ...compiled import compiled
+from ...base.arrays import FloatArray, IntArray
+from ...base.compiled import compiled
 from ...errors import MetricError
+from ..solution import TIE
 from .aggregation import coarse_basis, representatives
 from .green import GreenOperator
-
-# E^2 that is zero but for rounding.
-ROUNDING = 1e-18
-# Rows of a product of dense matrices that are computed at a time.
-BLOCK = 320
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +51,7 @@ class CoarseModel:
         one number takes most of the error away.
         """
         # A surface that is evenly curved has no E to compare.
-        scale = constant / self.constant if min(constant, self.constant) > ROUNDING else 1.0
+        scale = constant / self.constant if min(constant, self.constant) > TIE**2 else 1.0
         return CoarseModel(self.basis, self.kernel * scale, self.slope * scale, constant)
 
     def squared_distances(self, one: int, others: IntArray) -> FloatArray:
@@ -85,8 +81,8 @@ def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> C
         stiffness += np.outer(weights, weights) * (stiffness.trace() / (weights @ weights) / len(weights))
     green = inverse_of_definite(stiffness)
     weighted = areas[:, None] * green if coarse.mass is None else coarse.mass @ green
-    kernel, mean = symmetric_product(green, weighted), green @ weights
-    kernel -= np.outer(mean, mean)
+    kernel, mean = green @ weighted, green @ weights
+    kernel = (kernel + kernel.T) / 2 - np.outer(mean, mean)
     bare = curvature if basis is None else basis.T @ curvature
     slope = -(kernel @ bare)
     return CoarseModel(basis, kernel, slope, float(-(slope @ bare)))
@@ -100,20 +96,6 @@ def candidates(model: CoarseModel, fitness: FloatArray) -> IntArray:
     if model.basis is None or np.count_nonzero(fitness) <= model.size:
         return np.flatnonzero(fitness)
     return representatives(model.basis, fitness)
-
-
-def symmetric_product(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return the product of two matrices (m, m) that is symmetric: what is left of the diagonal is not computed."""
-    product = np.empty_like(one)
-    for start in range(0, len(one), BLOCK):
-        stop = start + BLOCK
-        product[start:stop, start:] = one[start:stop] @ other[:, start:]
-        product[stop:, start:stop] = product[start:stop, stop:].T
-    # The blocks on the diagonal are symmetric but for rounding.
-    for start in range(0, len(one), BLOCK):
-        block = product[start : start + BLOCK, start : start + BLOCK]
-        block[:] = (block + block.T) / 2
-    return product
 
 
 def inverse_of_definite(matrix: FloatArray) -> FloatArray:
@@ -140,6 +122,8 @@ def squared_distances(
     indptr: IntArray, indices: IntArray, data: FloatArray, kernel: FloatArray, one: int, others: IntArray
 ) -> FloatArray:
     """Return (p,) the squared norm of the difference of row `one` and each other row of a sparse matrix.
+
+    By products of sparse matrices a whole search for 20 to 50 cones takes 20% longer.
 
     Args:
         indptr, indices, data: the matrix (n, m).

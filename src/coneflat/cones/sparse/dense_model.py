@@ -1,24 +1,96 @@
-"""Energies of cones on a dense model, and the best sets found by the moves of `exchange`."""
+"""Energies of cones on a dense model, the moves that improve a set of cones, and the best sets found.
+
+The distortion of cones S with curvatures k is E^2 = constant + 2 slope_S k + k gram_SS k. With the other cones
+refitted freely, candidate t lowers it by (slope_t + gram_tS k + lambda)^2 / h_t, where h_t is what remains of gram_tt
+after projection (orthogonal matching pursuit: Y. Pati, R. Rezaiifar, P. Krishnaprasad 1993). All candidates are
+scored at once, and the best are fitted exactly, bounds and all.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-from ..._arrays import BoolArray, FloatArray, IntArray
-from .best_sets import BestSets, ConeSet
-from .exchange import TIE, Choice, Energies, best_addition, exchange, fit_set, least_missed, shake
-from .fit_curvatures import index_of_least
+from ...base.arrays import BoolArray, FloatArray, IntArray
+from ..solution import TIE
+from .fit_curvatures import fit_curvatures, inverse_with_sum
 from .limits import Limits
 
-# How many of the best scored moves are fitted exactly: scores leave out that bounds of other cones may become active,
-# or cease to be.
-FITTED = 5
+# A set must lower E^2 by this share to replace one of its size: rounding must not decide.
+GAIN = 1e-6
 # So many cones more that bring E^2 down by less than this factor are no use: bounds are in the way.
 STALL, STALLED = 10, 0.99
+
+
+class Sized(Protocol):
+    """What has E^2 and a number of cones."""
+
+    @property
+    def energy(self) -> float:
+        """E^2."""
+
+    def __len__(self) -> int: ...
+
+
+@dataclass(frozen=True, eq=False)
+class ConeSet:
+    """Cones on a dense model.
+
+    Attributes:
+        energy: E^2, infinite where bounds leave no curvatures.
+        members: (s,) candidates, the required ones first.
+    """
+
+    energy: float
+    members: IntArray
+
+    def __len__(self) -> int:
+        return len(self.members)
+
+
+SetT = TypeVar("SetT", bound=Sized)
+
+
+class BestSets(Generic[SetT]):
+    """The best set found of each size."""
+
+    def __init__(self) -> None:
+        self._sets: dict[int, SetT] = {}
+
+    def __iter__(self) -> Iterator[SetT]:
+        return iter(self._sets.values())
+
+    def __contains__(self, size: int) -> bool:
+        return size in self._sets
+
+    def __getitem__(self, size: int) -> SetT:
+        return self._sets[size]
+
+    @property
+    def sizes(self) -> list[int]:
+        """The sizes of which there is one, upwards."""
+        return sorted(self._sets)
+
+    def energy(self, size: int) -> float:
+        """Return E^2 of the best of a size, infinite if there is none."""
+        return self._sets[size].energy if size in self._sets else math.inf
+
+    def offer(self, found: SetT) -> bool:
+        """Keep a set if it is the best of its size, and tell so."""
+        is_better = found.energy < self.energy(len(found)) * (1 - GAIN)
+        if is_better:
+            self._sets[len(found)] = found
+        return is_better
+
+    def fewest(self, goal: float, most: float = math.inf) -> SetT:
+        """Return the smallest set, up to a size, with E^2 <= goal; if there is none, that of least E^2."""
+        known = [found for found in self if len(found) <= most]
+        good = [found for found in known if found.energy <= goal]
+        return min(good, key=len) if good else min(known, key=lambda found: (found.energy, len(found)))
 
 
 def above_rounding(energy: float) -> float:
@@ -45,7 +117,15 @@ class Fit:
 
 def first_least(values: FloatArray) -> int:
     """Return the first index whose value is the least but for rounding."""
-    return int(index_of_least(values, TIE))
+    return int(firsts_least(values[None])[0])
+
+
+def firsts_least(values: FloatArray) -> IntArray:
+    """Return (r,) the first column of each row (r, c) whose value is the least but for rounding."""
+    least = values.min(axis=1)
+    finite = np.where(np.isfinite(least), least, 0.0)
+    columns: IntArray = (values <= (least + TIE * np.abs(finite))[:, None]).argmax(axis=1)
+    return columns
 
 
 @dataclass(eq=False)
@@ -59,7 +139,6 @@ class DenseModel:
         limits: of the curvatures.
         least: (m,) bound of the curvature at each candidate, the limit or above.
         best: by number of cones.
-        most: (m,) the upper bounds; None for the limit.
     """
 
     gram: FloatArray
@@ -70,43 +149,140 @@ class DenseModel:
     limits: Limits
     least: FloatArray
     best: BestSets[ConeSet] = field(default_factory=BestSets)
-    most: FloatArray | None = None
-
-    @property
-    def _energies(self) -> Energies:
-        most = np.full(len(self.slope), self.limits.most) if self.most is None else self.most
-        return Energies(self.gram, self.slope, float(self.constant), self.least, most, self.limits.total)
-
-    @property
-    def _choice(self) -> Choice:
-        return Choice(len(self.fixed), self.usable, self._kind(), FITTED)
-
-    def _kind(self) -> BoolArray:
-        """Return (m,) the kind of each candidate: swaps keep what is what."""
-        return np.zeros(len(self.slope), dtype=bool)
 
     def fit(self, members: IntArray) -> Fit:
         """Return the best curvatures of a set."""
-        return Fit(*fit_set(self._energies, members))
+        gram, slope = self.gram[members[:, None], members], self.slope[members]
+        most = np.full(len(members), self.limits.most)
+        fitted = fit_curvatures(gram, slope, self.least[members], most, self.limits.total)
+        curvatures, _, feasible = fitted
+        energy = float(self.constant + (2 * slope + gram @ curvatures) @ curvatures) if feasible else math.inf
+        return Fit(*fitted, above_rounding(energy))
 
     def energy(self, members: IntArray) -> float:
         """Return E^2 of a set, infinite where bounds leave no curvatures."""
         return self.fit(members).energy
 
-    def grown(self, members: IntArray, usable: BoolArray | None = None) -> IntArray | None:
+    def additions(self, members: IntArray) -> FloatArray:
+        """Return (m,) by how much E^2 changes if a candidate joins the members (0 or less), bounds of others aside."""
+        limits, diagonal = self.limits, self.gram.diagonal()
+        if limits.has_sum and not len(members):
+            return (2 * self.slope + diagonal * limits.total) * limits.total
+        fitted = self.fit(members)
+        # Where the bounds do not allow the sum, none is at one.
+        free = members[self._inside(members, fitted)] if fitted.feasible else members
+        if limits.has_sum and not len(free):
+            free = members[:1]
+        remain, _, _ = self._project(free)
+        is_apart = remain > TIE * diagonal
+        gradient = self._gradient(members, fitted)
+        x = -gradient / np.where(is_apart, remain, 1.0)
+        if fitted.feasible:
+            x = np.clip(x, self.least, limits.most)
+        return np.where(is_apart, (2 * gradient + remain * x) * x, 0.0)
+
+    def swaps(self, members: IntArray, fitted: Fit) -> tuple[FloatArray, IntArray]:
+        """Return (s,) the change of E^2 by each member's best replacement, and which that is; infinite if not known.
+
+        Removing a member is a rank one change of the inverse, so all members against all candidates cost little more
+        than scoring the candidates once. Members at a bound, and the required, are left out.
+        """
+        change, which = np.full(len(members), np.inf), np.full(len(members), -1)
+        diagonal, places = self.gram.diagonal(), np.flatnonzero(self._inside(members, fitted))
+        remain, rows, kept = self._project(members[places])
+        is_moved = (places >= len(self.fixed)) & (kept * diagonal[members[places]] > 1e-10)
+        is_open = self.usable.copy()
+        is_open[members] = False
+        candidates = np.flatnonzero(is_open)
+        places = places[is_moved]
+        if not len(places) or not len(candidates):
+            return change, which
+        share, w = 1.0 / kept[is_moved, None], rows[is_moved][:, candidates]
+        k = fitted.curvatures[places, None]
+        h = remain[candidates] + w * w * share
+        g = self._gradient(members, fitted)[candidates] - w * k * share
+        is_apart = h > TIE * diagonal[candidates]
+        x = np.clip(-g / np.where(is_apart, h, 1.0), self.least[candidates], self.limits.most)
+        values = np.where(is_apart, k * k * share + (2 * g + h * x) * x, np.inf)
+        best = firsts_least(values)
+        change[places], which[places] = values[np.arange(len(places)), best], candidates[best]
+        return change, which
+
+    def _inside(self, members: IntArray, fitted: Fit) -> BoolArray:
+        """Return (s,) which members' curvatures no bound holds."""
+        k = fitted.curvatures
+        span = TIE * (1.0 + np.abs(k))
+        inside: BoolArray = (self.least[members] + span < k) & (k < self.limits.most - span)
+        return inside
+
+    def _gradient(self, members: IntArray, fitted: Fit) -> FloatArray:
+        """Return (m,) half the derivative of E^2, and of what keeps the sum, by the curvature of each candidate."""
+        return self.slope + fitted.multiplier + fitted.curvatures @ self.gram[members]
+
+    def _project(self, free: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Project candidates off the free members, and off the sum if there is one.
+
+        Returns:
+            (m,) what remains of the diagonal of the Gram matrix, (f, m) the coefficients of the projection, and (f,)
+            the diagonal of the inverse of the members' own.
+        """
+        has_sum = self.limits.has_sum and len(free) > 0
+        right = self.gram[free]
+        inverse = inverse_with_sum(right[:, free], has_sum)
+        if has_sum:
+            right = np.append(right, np.ones((1, len(self.slope))), axis=0)
+        rows = inverse @ right
+        remain = self.gram.diagonal() - np.einsum("ij,ij->j", right, rows)
+        return remain, rows[: len(free)], inverse.diagonal()[: len(free)]
+
+    def grown(self, members: IntArray) -> IntArray | None:
         """Return the members and the usable candidate that scores best; None if there is none left."""
-        chosen = best_addition(self._energies, members, self.usable if usable is None else usable)
-        return None if chosen < 0 else np.append(members, chosen)
+        is_open = self.usable.copy()
+        is_open[members] = False
+        if not is_open.any():
+            return None
+        missing = self.limits.total - self.least[members].sum()
+        if missing < 0:  # too few to carry the total: one that can carry what is missing, or some of it
+            for bound in (missing, 0.0):
+                can_carry = is_open & (self.least <= bound) & (self.least < 0)
+                if can_carry.any():
+                    is_open = can_carry
+                    break
+        candidates = np.flatnonzero(is_open)
+        return np.append(members, candidates[first_least(self.additions(members)[candidates])])
 
     def shrunk(self, members: IntArray) -> IntArray | None:
-        """Return the members without the one that is missed least; None if none can go."""
-        place = least_missed(self._energies, members, self._choice)
-        return None if place < 0 else np.delete(members, place)
+        """Return the members without the one that is missed least; None if none can go.
+
+        The one whose removal costs least while the others are refitted freely.
+        """
+        fixed = len(self.fixed)
+        if len(members) <= fixed:
+            return None
+        _, _, kept = self._project(members)
+        loss = self.fit(members).curvatures ** 2 / np.maximum(kept, 1e-300)
+        rest = np.delete(members, fixed + first_least(loss[fixed:]))
+        return rest if self.energy(rest) < math.inf else None
 
     def exchanged(self, members: IntArray) -> ConeSet:
         """Return the set after members, one at a time, were replaced as long as E^2 falls. The required ones stay."""
-        members = members.copy()
-        return ConeSet(exchange(self._energies, members, self._choice), members)
+        fitted = self.fit(members)
+        improved = fitted.feasible
+        while improved:
+            improved = False
+            change, which = self.swaps(members, fitted)
+            for _ in range(len(members)):
+                place = first_least(change)
+                if not change[place] <= -GAIN * fitted.energy:
+                    break
+                change[place] = np.inf
+                tried = members.copy()
+                tried[place] = which[place]
+                found = self.fit(tried)
+                if found.energy < fitted.energy * (1 - GAIN):
+                    members, fitted, improved = tried, found, True
+                    break
+        return ConeSet(fitted.energy, members)
 
     def climb(self, bound: float, most: int, start: int | None = None) -> None:
         """Add cones, to the best set of the size `start` if it is given, until E^2 <= bound, or there are `most`."""
@@ -129,25 +305,3 @@ class DenseModel:
             shrunk = self.shrunk(self.best[size].members) if size in self.best else None
             if shrunk is not None:
                 self.best.offer(self.exchanged(shrunk))
-
-    def shake(self, size: int, tries: int, seed: int = 0) -> bool:
-        """Take two or three cones of the best set of a size away and refill, over and over; tell if it got better."""
-        if size - len(self.fixed) < 2:
-            return False
-        start = self.best[size]
-        members = start.members.copy()
-        out = taken_out(size - len(self.fixed), tries, seed)
-        energy, found = shake(self._energies, members, start.energy, self._choice, out)
-        return found and self.best.offer(ConeSet(energy, members))
-
-
-@lru_cache
-def taken_out(count: int, tries: int, seed: int) -> IntArray:
-    """Return (t, 3) which two or three of so many cones are taken away at each try, sorted; -1 fills up two."""
-    random = np.random.default_rng(seed)
-    out = np.full((tries, 3), -1)
-    for i in range(tries):
-        size = min(2 + i % 2, count)
-        out[i, :size] = random.choice(count, size, replace=False)
-    out.sort(axis=1)
-    return out

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..._arrays import BoolArray, IntArray
+from ...base.arrays import BoolArray, IntArray
+from ...base.text import plural
 from ...errors import CurvatureError, OptionError
-from ...text import plural
 from ..solution import FULL_TURN
 
 # More cones than these, beside the required ones, are not searched for: a seam through them all is no use.
@@ -97,8 +97,8 @@ class Limits:
         if self.fewest > MOST_CONES + len(required):
             raise CurvatureError(
                 f"a total curvature of {self.total / np.pi:.4g} pi needs {self.fewest:,} cones or more within these "
-                f"bounds, and the pursuit finds {MOST_CONES} at most: allow other angles, or choose the greedy search "
-                "(--cones greedy), which has no bounds"
+                f"bounds, and the sparse search finds {MOST_CONES} at most: allow other angles, or choose the greedy "
+                "search (--cones greedy), which has no bounds"
             )
         available = np.count_nonzero(usable) + np.count_nonzero(~usable[required])
         if available < self.fewest:

@@ -7,9 +7,10 @@ from functools import cached_property, partial
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ..._arrays import BoolArray, FloatArray, IntArray
-from ...threads import meanwhile
-from ..solution import ConeSolution, LaplacianInverse, target_from_log_scale
+from ...base.arrays import BoolArray, FloatArray, IntArray
+from ...base.threads import concurrently
+from ...stages import ConeSolution, LaplacianInverse
+from ..solution import target_from_log_scale
 from .coarse_model import CoarseModel, coarse_model
 from .green import GreenOperator
 
@@ -81,7 +82,8 @@ class LinearModel:
         operator = self.operator
         size = min(max(len(operator.vertices) // VERTICES_PER_UNKNOWN, LEAST_SIZE), MOST_SIZE)
         modelled = partial(coarse_model, operator, self.inner, size)
-        with meanwhile(modelled, 2 * len(operator.vertices)) as modelling:
+        # Beside the factorization: 10 to 13% of the time of 29,000 to 97,000 triangles on two threads.
+        with concurrently(modelled, 2 * len(operator.vertices)) as modelling:
             constant = float(self.log_scale @ operator.weighted(self.log_scale))
             return modelling.result().scaled_to(constant)
 

@@ -19,32 +19,25 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ..._arrays import BoolArray, FloatArray, IntArray
+from ...base.arrays import BoolArray, FloatArray, IntArray
+from ...base.defaults import DISTORTION, MAX_CONE_ANGLE, MIN_CONE_ANGLE
+from ...base.text import list_some, plural
 from ...errors import CurvatureError, OptionError
 from ...geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths, mollify
 from ...geometry.operators import vertex_areas, weighted_areas
-from ...geometry.ties import tie_key as key_of_shape
-from ...mesh import TriangleMesh
-from ...text import list_some, plural
-from ...threads import meanwhile
-from ..solution import FULL_TURN, ConeSolution
-from .best_sets import ConeSet
+from ...mesh.connectivity import TriangleMesh
+from ...mesh.ties import tie_key as key_of_shape
+from ...stages import ConeSolution
+from ..solution import FULL_TURN, TIE
 from .coarse_model import candidates
-from .dense_model import DenseModel
+from .dense_model import ConeSet, DenseModel
 from .exact_model import ExactModel
 from .limits import MOST_CONES, Limits
 from .linear_model import LinearModel
 
-# How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself.
+# How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself, as are
+# those of a size whose best misses by less.
 COARSE_DOUBT = 1.35
-# Where the best set of a size misses by less than this factor of E^2, by what the coarse model tells of it or on the
-# mesh, more is tried.
-NEAR = 1.15
-# Perturbations of a set of cones at a time, fewer where it is large and each takes long; and how often on the mesh,
-# where next to nothing is missing.
-SHAKES, MANY, SEEDS = 20, 40, 4
-# An E^2 that is lower by less is not.
-NOTHING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -102,8 +95,8 @@ class ConeSearch:
         euler_characteristic: float,
         *,
         tie_key: FloatArray | None = None,
-        min_cone_angle: float = math.pi / 2,
-        max_cone_angle: float | None = 4 * math.pi,
+        min_cone_angle: float = MIN_CONE_ANGLE,
+        max_cone_angle: float | None = MAX_CONE_ANGLE,
         positive_only: bool = False,
         weights: FloatArray | None = None,
         required: Iterable[int] = (),
@@ -128,9 +121,7 @@ class ConeSearch:
             self._least = np.maximum(self._least, np.minimum(FULL_TURN - room[vertices], 0.0))
         self._required = self.unknowns_of(cones)
         self.exact = ExactModel(linear, self._required, limits, self._least)
-        # The exact model needs the score next, the coarse one does not.
-        with meanwhile(lambda: linear.score, 2 * len(vertices)):
-            self.restrict(usable)
+        self.restrict(usable)
 
     @classmethod
     def from_mesh(cls, mesh: TriangleMesh, lengths: FloatArray | None = None, **options: Any) -> ConeSearch:
@@ -191,7 +182,7 @@ class ConeSearch:
         most = min(MOST_CONES + len(self._required), len(self.places))
         return most if self.limits.largest is None else min(most, self.limits.largest)
 
-    def fewest(self, distortion: float = 0.2, most: int | None = None) -> SparseCones:
+    def fewest(self, distortion: float = DISTORTION, most: int | None = None) -> SparseCones:
         """Return the fewest cones found with E <= distortion; where they are more than `most`, the best of so many.
 
         Raises:
@@ -219,10 +210,9 @@ class ConeSearch:
         self.limits.check_count(count, len(self._required))
         count = min(count, self.most_cones)
         self._climb(0.0, count + 1, count)
-        self._improve(count - 2, count + 1)
+        self.coarse.descend(count - 2, count + 1)
         for size in [size for size in self.coarse.best.sizes if size <= count][-2:]:
             self._on_mesh(size)
-            self._shaken(size)
         return self._cones(self.exact.best.fewest(-1.0, count))
 
     def curve(self, most: int) -> list[SparseCones]:
@@ -236,7 +226,7 @@ class ConeSearch:
         found: list[SparseCones] = []
         for count in self.exact.best.sizes:
             cones = self._cones(self.exact.best[count])
-            if count <= most and (not found or cones.distortion < found[-1].distortion - NOTHING):
+            if count <= most and (not found or cones.distortion < found[-1].distortion - TIE):
                 found.append(cones)
         return found
 
@@ -244,7 +234,7 @@ class ConeSearch:
         """Find good sets of all sizes up to the one that is needed, and a little on, on the coarse model; return it."""
         self._climb(goal / COARSE_DOUBT, most, most)
         count = len(self.coarse.best.fewest(goal, most))
-        self._improve(count - 3, count + 1, goal)
+        self.coarse.descend(count - 3, count + 1)
         return len(self.coarse.best.fewest(goal, most))
 
     def _reach(self, count: int, goal: float, most: int) -> int:
@@ -266,13 +256,12 @@ class ConeSearch:
         return count
 
     def _reduce(self, count: int, goal: float, most: int) -> None:
-        """Try one cone less, with all means, as long as it does and may do; one more if need be."""
+        """Try one cone more if need be, and one less as long as it does and may do."""
         most = min(most, max(self.coarse.best.sizes))
-        while (
-            self.exact.best.energy(count) > goal and self._with_all_means(count, goal) > goal and count < most
-        ):
+        while self.exact.best.energy(count) > goal and count < most:
             count += 1
-        while self._may_do(count - 1, goal) and self._with_all_means(count - 1, goal) <= goal:
+            self._on_mesh(count)
+        while self._may_do(count - 1, goal) and self._on_mesh(count - 1) <= goal:
             count -= 1
 
     def _may_do(self, count: int, goal: float) -> bool:
@@ -281,7 +270,9 @@ class ConeSearch:
             return False
         coarse, exact = self.coarse.best, self.exact.best
         expected = exact.energy(count + 1) * coarse.energy(count)
-        return exact.energy(count) <= NEAR * goal or expected <= NEAR * goal * coarse.energy(count + 1)
+        return exact.energy(count) <= COARSE_DOUBT * goal or expected <= COARSE_DOUBT * goal * coarse.energy(
+            count + 1
+        )
 
     def _climb(self, bound: float, most: int, count: int) -> None:
         """Find sets on the coarse model, of at most `most` cones; it is an error if none has `count` or fewer."""
@@ -292,19 +283,6 @@ class ConeSearch:
                 "within their bounds: allow more of them or other angles, or choose the greedy search "
                 "(--cones greedy), which has no bounds"
             )
-
-    def _improve(self, least: int, most: int, goal: float | None = None) -> None:
-        """Make the coarse model's sets of some sizes better, of those near the goal at least: they decide."""
-        model = self.coarse
-        model.descend(least, most)
-        for size in range(most, least - 1, -1):
-            if size in model.best and (
-                goal is None or goal / COARSE_DOUBT < model.best.energy(size) < goal * COARSE_DOUBT
-            ):
-                model.shake(size, self._tries(size))
-
-    def _tries(self, size: int) -> int:
-        return max(4, SHAKES * MANY // max(size, MANY))
 
     def _on_mesh(self, count: int) -> float:
         """Return E^2 of the best set of a size on the mesh, infinite if there is none.
@@ -322,27 +300,12 @@ class ConeSearch:
             exact.polish(min(starts, key=exact.energy))
         return exact.best.energy(count)
 
-    def _with_all_means(self, count: int, goal: float) -> float:
-        """Return E^2 of the best set of a size on the mesh, which is shaken if it misses the goal by little."""
-        energy = self._on_mesh(count)
-        for seed in range(SEEDS):
-            if goal < energy <= NEAR * goal:
-                energy = self._shaken(count, seed)
-        return energy
-
-    def _shaken(self, count: int, seed: int = 0) -> float:
-        """Return E^2 of the best set of a size on the mesh after perturbations of it."""
-        exact = self.exact
-        if count in exact.best and exact.shake(count, self._tries(count), seed):
-            exact.polish(exact.best[count].members)
-        return exact.best.energy(count)
-
     def _cones(self, found: ConeSet) -> SparseCones:
         """Return the cones of a set on the mesh, those of no curvature left out unless they are required."""
         unknowns, required = self.exact.unknowns, len(self._required)
         members = found.members[self.exact.in_order(found.members)]
         curvatures = self.exact.fit(members).curvatures
-        keep = np.abs(curvatures) > 1e-9
+        keep = np.abs(curvatures) > TIE
         keep[:required] = True
         kept = curvatures[keep]
         if self.limits.has_sum and len(kept):

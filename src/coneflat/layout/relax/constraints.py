@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import FloatArray, IntArray
+from ...base.arrays import FloatArray, IntArray
+from ...base.text import plural
 from ...errors import OptionError
-from ...text import plural
 
 
 @dataclass(frozen=True)

@@ -13,17 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ..._arrays import BoolArray, ComplexArray, FloatArray, Int32Array, IntArray, has_any
-from ...compiled import compiled
+from ...base.arrays import BoolArray, ComplexArray, FloatArray, Int32Array, IntArray, has_any
+from ...base.compiled import compiled
 from ...geometry.planar import map_factors
-from ...mesh import label_components
+from ...mesh.connectivity import label_components
 from .energies import Energy
 from .motions import Motions
 
 # Part of the step to where a triangle would have no area that is taken at most (Smith and Schaefer 2015).
 SHORT_OF_FLAT = 0.9
-# Part of each diagonal entry that is added to it: what nothing holds may turn and shift as a whole.
-RIDGE = 1e-11
+# Part of diagonal entries that is added to them: what nothing holds may turn and shift as a whole.
+RIDGE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,15 +8,13 @@ import numpy as np
 from scipy.linalg import lapack
 from scipy.sparse import csr_matrix
 
-from ..._arrays import FloatArray, IntArray
-from ...mesh import label_components
+from ...base.arrays import FloatArray, IntArray
+from ...mesh.connectivity import label_components
 
-# Relative size below which what elimination leaves of an equation is rounding.
+# Relative size below which what elimination leaves of an equation, or of a coefficient of integers, is rounding.
 ROUNDING = 1e-10
 # Coefficients of an orthogonal basis below this are none; what is taken for none is missed by the sides of seams.
 TINY = 1e-15
-# Coefficients below this are rounding where turns are quarter turns, and they are whole.
-NOT_WHOLE = 1e-9
 # Part of the largest coefficient of an equation that a pivot has at least.
 PIVOT = 0.5
 # Columns that LAPACK turns together.
@@ -43,7 +41,7 @@ def sparse_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, F
     is_open = np.ones(len(work), dtype=bool)
     solved: list[tuple[int, int]] = []
     while True:
-        filled = np.abs(work[:, :count]) > NOT_WHOLE
+        filled = np.abs(work[:, :count]) > ROUNDING
         sizes = np.where(is_open, filled.sum(axis=1), count + 1)
         sizes[is_open & (sizes == 0)] = count + 1
         row = int(np.argmin(sizes))
@@ -66,7 +64,7 @@ def sparse_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, F
     basis[free, np.arange(len(free))] = 1.0
     basis[pivots, :-1] = -work[np.ix_(at, free)]
     basis[pivots, -1] = work[at, count]
-    basis[np.abs(basis) < NOT_WHOLE * max(1.0, float(np.abs(basis).max(initial=0.0)))] = 0.0
+    basis[np.abs(basis) < ROUNDING * max(1.0, float(np.abs(basis).max(initial=0.0)))] = 0.0
     return csr_matrix(basis), work[is_open, count]
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..._arrays import FloatArray
+from ...base.arrays import FloatArray
 from ...errors import OptionError
 
 

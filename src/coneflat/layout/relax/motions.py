@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_matrix, eye, vstack
 
-from ..._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ...base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import OptionError
-from ...geometry.charts import point_vertices
 from ...geometry.planar import as_complex
-from ...mesh import TriangleMesh
+from ...mesh.charts import point_vertices
+from ...mesh.connectivity import TriangleMesh
 from .constraints import CheckedConstraints
 from .elimination import ROUNDING, orthogonal_solutions, sparse_solutions
 from .seam_chains import SeamChains, constrained_chains

@@ -7,24 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..._arrays import ComplexArray, FloatArray
+from ...base.arrays import ComplexArray, FloatArray
 from ...errors import MetricError
-from ...solver import Factor, factorize
+from ...linalg import Factor, factorize
+from ...linalg.newton import ARMIJO, HALVINGS
 from .elements import SHORT_OF_FLAT, Elements
 from .energies import Energy
 from .motions import Motions
 
-# Part of the slope that a step must gain at least, and halvings after which a part is stuck.
-ARMIJO, HALVINGS = 1e-4, 30
-# Part of the energy that is lost in its sum.
-ROUNDING = 1e-14
-# What is left of the way to where the constraints hold counts as none below this, and as out of reach after a step that
-# goes less than this part of it.
-ARRIVED, STUCK = 1e-12, 1e-3
+# Part of the energy, and of the way to where the constraints hold, that is lost in a sum.
+ROUNDING = 1e-12
+# Where the constraints hold is out of reach after a step that goes less than this part of the way.
+STUCK = 1e-3
 # Part of the way that a step goes at most where seams and sides have to turn: on a longer one, sides fold over.
 TURNING_STRIDE = 0.1
-# Steps on the way there at most: what is reached takes ten or twenty.
-ON_THE_WAY = 60
 # Once less than this part of the unknowns is in parts that are not at their least, these go on alone.
 FEW = 0.6
 
@@ -92,7 +88,7 @@ def descend(
     active = np.ones(parts, dtype=bool)
     factor: Factor | None = None
     taken = 0
-    while taken < steps and ((elements.count and active.any()) or remaining > ARRIVED):
+    while taken < steps and ((elements.count and active.any()) or remaining > ROUNDING):
         if not together and elements.count and active[unknown_part].mean() < FEW:
             done += float(here[~active].sum())
             elements, of_chosen = elements.of_parts(active)
@@ -100,7 +96,7 @@ def descend(
             part, parts, unknown_part = elements.part, elements.parts, elements.unknown_part
             maps, active, factor = elements.maps(places), np.ones(parts, dtype=bool), None
         gradient, pull, matrix = elements.newton_system(energy, maps, remaining)
-        factor = factorize(matrix, used_up=factor, is_noted=False, whole=len(points))
+        factor = factorize(matrix, used_up=factor, whole=len(points))
         step = np.append(factor.solve(-gradient - pull), remaining)
         if not np.isfinite(step).all():
             raise MetricError(f"relaxation found no finite step of {elements.count:,} unknowns")
@@ -134,8 +130,8 @@ def descend(
         here = sums(elements.energies(energy, maps))
         if remaining:
             remaining = 1.0 - float(total[-1])
-            remaining = remaining if remaining > ARRIVED else 0.0
-            if length[0] < STUCK or taken >= ON_THE_WAY:
+            remaining = remaining if remaining > ROUNDING else 0.0
+            if length[0] < STUCK:
                 break
         if tell is not None and tell(taken, done + float(here.sum())):
             break

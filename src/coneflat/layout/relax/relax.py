@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import (
+from ...base.arrays import (
     BoolArray,
     ComplexArray,
     FloatArray,
@@ -18,13 +18,13 @@ from ..._arrays import (
     require_finite,
     rows_of,
 )
+from ...base.text import plural
 from ...errors import ArrayShapeError, ConvergenceError, OptionError
 from ...geometry import double_areas, edge_lengths
 from ...geometry.lengths import check_lengths
 from ...geometry.planar import as_complex, as_pairs, signed_double_areas
 from ...geometry.straight import place_triangles
-from ...mesh import TriangleMesh
-from ...text import plural
+from ...mesh.connectivity import TriangleMesh
 from .constraints import PointConstraints, check_constraints
 from .elements import Elements
 from .energies import Energy, StretchEnergy

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..._arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ...base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import SeamError
-from ...geometry.charts import both_sides, point_seams
-from ...mesh import TriangleMesh, label_components
+from ...mesh.charts import both_sides, point_seams
+from ...mesh.connectivity import TriangleMesh, label_components
 from .constraints import CheckedConstraints
 
 # Radians by which the rotation between the sides of a seam may change at a vertex without it being a cone. Cones have

@@ -42,11 +42,9 @@ class Panel {
     this.slider("distortion", (value) => ({do: "set", name: "distortion", value: Number((10 ** value).toPrecision(3))}));
     this.slider("stretch", (value) => ({do: "set", name: "stretch", value}));
     this.slider("hide", (value) => ({do: "set", name: "hide_seams", value}));
-    this.slider("creases", (value) => ({do: "set", name: "creases", value}));
-    for (const name of ["boundary", "charts", "symmetric"]) this.part(name).addEventListener("change", (event) => set(name, event.target.value));
+    for (const name of ["boundary", "charts"]) this.part(name).addEventListener("change", (event) => set(name, event.target.value));
     this.part("boundary").addEventListener("change", (event) => event.target.value === "rectangle" && studio.setTool("corner"));
     for (const name of ["resolution", "padding"]) this.part(name).addEventListener("change", (event) => set(name, Number(event.target.value)));
-    this.part("mirrored").addEventListener("change", (event) => set("mirrored", event.target.checked ? "overlap" : "apart"));
     this.part("own-seams").addEventListener("change", (event) => set("seams", event.target.checked ? "input" : null));
     this.part("follow").addEventListener("change", (event) => studio.setFollowing(event.target.checked));
     this.part("save-quads").addEventListener("click", () => studio.saveQuads(this.part("quad-count").value));
@@ -116,14 +114,9 @@ class Panel {
     this.value("sharp", options.sharp_angle == null ? "" : Number(((options.sharp_angle * 180) / Math.PI).toFixed(2)));
     this.value("hide", options.hide_seams ?? 0);
     this.part("hide-value").textContent = options.hide_seams ?? 0;
-    this.value("creases", options.creases ?? 0);
-    this.part("creases-value").textContent = options.creases ?? 0;
     this.part("own-seams").checked = options.seams === "input";
     this.value("boundary", options.boundary ?? "free");
     this.part("boundary").closest("label").hidden = this.part("tool-corner").hidden = !this.studio.hasBoundary();
-    this.value("symmetric", options.symmetric ?? "off");
-    this.part("mirrored").checked = options.mirrored === "overlap";
-    this.part("mirrored").closest("label").hidden = (options.symmetric ?? "off") === "off";
     this.value("resolution", options.resolution ?? 1024);
     this.value("padding", options.padding ?? 2);
     this.value("stretch", options.stretch ?? 0);

@@ -1,0 +1,87 @@
+"""Flattening by the methods that the package is compared with, and by its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from ... import Flattening
+from ...flatten import flatten_source
+from ...io import as_input
+from ...metric import find_metric
+from ...options import Choice, Options, option, read_options
+from ...source import Source
+from ...stages import ConeSolution, FlatMetric, MetricSpec, Surface
+from .angle_based import angle_based, linear_angles, nearest_angles
+from .bff import boundary_first
+from .circle_patterns import circle_patterns
+from .disk_maps import least_squares_conformal, map_cut_mesh, spectral_conformal
+from .ricci import ricci_flow
+
+#: The methods to compare with; each takes a connected mesh, its (m, 3) side lengths, and cones with their curvatures.
+PEERS: Mapping[str, Callable[..., FlatMetric]] = {
+    "circle-patterns": circle_patterns,
+    "circle-patterns/fixed": partial(circle_patterns, delaunay=False),
+    "ricci": ricci_flow,
+    "linear-abf": partial(angle_based, solve=linear_angles),
+    "linear-abf/free": partial(angle_based, solve=linear_angles, is_free=True),
+    "abf++": partial(angle_based, solve=nearest_angles),
+    "lscm": partial(map_cut_mesh, name="LSCM", place=least_squares_conformal),
+    "spectral": partial(map_cut_mesh, name="the spectral method", place=spectral_conformal),
+    "bff": boundary_first,
+}
+#: Those that need not converge, and take `best_effort`.
+ITERATIVE = ("circle-patterns", "circle-patterns/fixed", "ricci", "abf++")
+#: All methods of `flatten_by`. Those with a / are as used in 2008: circle patterns without flips, and angles that
+#: prescribe nothing at cones.
+METHODS = ("exact", "linear", *PEERS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeerOptions(Options):
+    """Options of `coneflat.flatten` with all methods.
+
+    Attributes:
+        method: The method.
+    """
+
+    method: str = option("exact", Choice(METHODS))
+
+
+def flatten_by(
+    name: str,
+    mesh: Any,
+    faces: ArrayLike | None = None,
+    *,
+    best_effort: bool = False,
+    **options: Any,
+) -> Flattening:
+    """Flatten a triangle mesh by a method, in one chart per component by default, which all methods can make.
+
+    Args:
+        name: one of `METHODS`.
+        mesh, faces: as for `coneflat.flatten`.
+        best_effort: return a result, with a note, of a method to compare with that did not converge.
+        options: those of `coneflat.flatten`, but for the method. What only the exact method has is refused for others.
+
+    Returns:
+        What `coneflat.flatten` returns.
+
+    Raises:
+        OptionError: there is no such method, or an option makes no sense.
+        ConvergenceError: the method did not converge.
+        ConeflatError: another of the errors of `coneflat.flatten`.
+    """
+    read = read_options({"charts": "one", **options, "method": name}, PeerOptions)
+
+    def find(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> FlatMetric:
+        if name not in PEERS:
+            return find_metric(surface, solution, spec)
+        given: dict[str, bool] = {"best_effort": best_effort} if name in ITERATIVE else {}
+        return PEERS[name](surface.mesh, surface.lengths, solution, **given)
+
+    return flatten_source(Source(as_input(mesh, faces)), read, find_metric=find)

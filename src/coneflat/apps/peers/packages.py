@@ -1,0 +1,132 @@
+"""Other packages that flatten meshes, where they are installed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from ... import Flattening, TriangleMesh, measure
+from ...base import FloatArray, IntArray
+from ...errors import MetricError
+from ...geometry import double_areas, edge_lengths, signed_double_areas
+from ...mesh import uv_seams
+
+
+@dataclass(frozen=True)
+class Peer:
+    """Another package's method.
+
+    Attributes:
+        module: what is imported.
+        run: takes one of our flattenings, of which it may use the cut, and returns (m, 3, 2) UVs.
+        note: what it does not do as we do.
+    """
+
+    module: str
+    run: Callable[[Flattening], FloatArray]
+    note: str
+
+
+def installed_peers() -> tuple[str, ...]:
+    """Return the names of the peers that are installed."""
+    return tuple(name for name, peer in PEERS.items() if find_spec(peer.module) is not None)
+
+
+def run_peer(name: str, base: Flattening) -> tuple[Flattening, float]:
+    """Return what a peer makes of the mesh of a flattening, and how many seconds it takes.
+
+    Raises:
+        MetricError: it fails, or what it returns is no map of the mesh.
+    """
+    peer = PEERS[name]
+    try:
+        import_module(peer.module)
+        start = time.perf_counter()
+        corner_uv = peer.run(base)
+    except Exception as error:  # whatever others raise
+        raise MetricError(f"{name} failed: {type(error).__name__}: {error}") from error
+    seconds = time.perf_counter() - start
+    if corner_uv.shape != (len(base.faces), 3, 2) or not np.isfinite(corner_uv).all():
+        raise MetricError(f"{name} returned no map of the mesh's {len(base.faces):,} triangles")
+    return with_uv(base, corner_uv), seconds
+
+
+def with_uv(base: Flattening, corner_uv: FloatArray) -> Flattening:
+    """Return the same mesh with other UVs, which has no cones."""
+    low = corner_uv.min(axis=(0, 1))
+    unit = (corner_uv - low) / max(float((corner_uv.max(axis=(0, 1)) - low).max()), np.finfo(np.float64).tiny)
+    at_vertex = np.column_stack([base.faces.ravel(), unit.reshape(-1, 2)])
+    rows, index = np.unique(at_vertex, axis=0, return_inverse=True)
+    mesh = TriangleMesh(base.vertices, base.faces)
+    return replace(
+        base,
+        uv=rows[:, 1:],
+        uv_faces=index.reshape(-1, 3),
+        uv_scale=float("nan"),
+        cones=base.cones[:0],
+        curvatures=base.curvatures[:0],
+        log_scale=np.full(len(base.vertices), np.nan),
+        curvature_residual=np.full(len(base.vertices), np.nan),
+        seams=mesh.edges[uv_seams(mesh, unit)],
+        packing_efficiency=_covered(unit),
+        distortion=measure(mesh, unit),
+        notes=(),
+        rotations=None,
+    )
+
+
+def _covered(corner_uv: FloatArray) -> float:
+    """Return the area of the triangles in the plane, overlaps counted as often as they are covered."""
+    return float(np.abs(signed_double_areas(corner_uv)).sum() / 2)
+
+
+def libigl_lscm(base: Flattening) -> FloatArray:
+    """LSCM of each of our charts, two points far apart pinned; charts at their own areas, side by side."""
+    import igl
+
+    points = np.empty((len(base.uv), 3))
+    points[base.uv_faces] = base.vertices[base.faces]
+    corner_uv, right = np.empty((len(base.faces), 3, 2)), 0.0
+    for chart, _, faces in TriangleMesh(points, base.uv_faces).split_components():
+        pins = np.array([0, int(np.argmax(((chart.vertices - chart.vertices[0]) ** 2).sum(axis=1)))])
+        found: Any = igl.lscm(chart.vertices, chart.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
+        uv = np.asarray(found[0] if isinstance(found, tuple) else found, dtype=np.float64)[chart.faces]
+        space = float(double_areas(edge_lengths(chart.vertices, chart.faces)).sum()) / 2
+        uv *= np.sqrt(space / _covered(uv))
+        corner_uv[faces] = uv + np.array([right - uv[..., 0].min(), 0.0])
+        right += float(np.ptp(uv[..., 0]))
+    return corner_uv
+
+
+def xatlas_charts(base: Flattening) -> FloatArray:
+    """At a size at which its absolute tolerances do not matter: an area of 10,000."""
+    import xatlas
+
+    sides = base.vertices[base.faces[:, 1:]] - base.vertices[base.faces[:, :1]]
+    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum() / 2
+    _, corners, uv = xatlas.parametrize(base.vertices * (100 / np.sqrt(area)), base.faces)
+    return np.asarray(uv, dtype=np.float64)[np.asarray(corners, dtype=np.int64)]
+
+
+def uvunwrap_charts(base: Flattening) -> FloatArray:
+    """With its defaults."""
+    import uvunwrap
+
+    corners: IntArray = base.faces
+    mesh = uvunwrap.Mesh(base.vertices.ravel().tolist(), corners.ravel().tolist())
+    found = uvunwrap.generate([mesh]).meshes[0]
+    return np.array(found.corner_uvs, dtype=np.float64).reshape(-1, 3, 2)
+
+
+#: By name.
+PEERS = {
+    "libigl LSCM": Peer("igl", libigl_lscm, "our cut; prescribes no cones"),
+    "xatlas": Peer("xatlas", xatlas_charts, "charts of its own"),
+    "uvunwrap": Peer("uvunwrap", uvunwrap_charts, "charts of its own"),
+}

@@ -1,0 +1,295 @@
+"""Section 5 of the paper, on given meshes: its tables and figures, with the paper's numbers beside."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ... import PAPER, ConeflatError, read_mesh
+from ...base import Progress, plural
+from ...errors import MeshError
+from ...io import find_meshes
+from .run import Comparison, compare_methods, known_methods
+from .table import as_csv, markdown, notes, written
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ... import Flattening
+    from ..view.figures.compose import Panel, Row
+    from ..view.quantity import Quantity
+    from .pictures import Sight
+
+
+@dataclass(frozen=True)
+class Published:
+    """A model's row in the paper's tables.
+
+    Attributes:
+        thousands: of triangles.
+        curvature_error: ||K_target - K|| / n over pi, of the paper's method.
+        qc: mean QC distortion, by method, where it is given.
+        seconds: running time, by method, likewise.
+    """
+
+    thousands: float
+    curvature_error: float
+    qc: Mapping[str, float]
+    seconds: Mapping[str, float]
+
+    def has_as_many(self, triangles: int) -> bool:
+        """Whether a mesh has the resolution of the paper's: as many triangles, to the thousand, or within 3 %."""
+        return abs(triangles / 1000 - self.thousands) <= max(0.03 * self.thousands, 0.5)
+
+
+#: The paper's names of the methods, by ours. Its circle patterns ran on the triangles as they are, and its
+#: linear ABF left cones free.
+NAMES = {"circle-patterns/fixed": "CP", "linear-abf/free": "LABF", "linear": "CF"}
+
+
+def _last(*numbers: float) -> dict[str, float]:
+    """Return the numbers of CP, LABF and CF, or of the last so many of them, by method."""
+    return dict(zip(list(NAMES)[-len(numbers) :], numbers, strict=True))
+
+
+#: By model, in the paper's order.
+MODELS = {
+    "fandisk": Published(13, 4.6e-6, _last(1.013, 1.007, 1.012), _last(20, 0.9, 0.5)),
+    "rockerarm": Published(20, 1.4e-5, _last(1.045, 1.027, 1.028), _last(21, 1.5, 0.4)),
+    "foot": Published(20, 2.7e-5, _last(1.029, 1.016, 1.020), _last(29, 1.4, 0.6)),
+    "gargoyle": Published(20, 2.9e-5, _last(1.213, 1.032, 1.037), _last(29, 1.6, 0.7)),
+    "elephant": Published(40, 1.6e-5, _last(1.028, 1.022, 1.027), _last(44, 4.8, 1.1)),
+    "horse": Published(40, 1.8e-5, _last(1.035, 1.017, 1.077), _last(62, 4.1, 1.3)),
+    "hand": Published(106, 3.2e-6, _last(1.009, 1.008, 1.009), _last(903, 26, 3.8)),
+    "torso": Published(284, 1.4e-6, _last(1.004, 1.005), _last(86, 24)),
+    "isi-horse": Published(358, 8.4e-7, _last(1.009), _last(32)),
+}
+
+
+def model_of(path: Path) -> str | None:
+    """Return the name of the paper's model that a file has; None if it has none of them."""
+    stem = re.sub(r"[^a-z0-9]", "", path.stem.lower())
+    return next((name for name in MODELS if name.replace("-", "") == stem), None)
+
+
+#: What the paper compares; then what it had not: flips before circle patterns, cones in linear ABF, the exact metric.
+METHODS = (*NAMES, "circle-patterns", "linear-abf", "exact")
+TABLE_1 = ("model", "triangles", "paper's", "cones", "curvature error, pi", "paper's error", "error ratio")
+TABLE_2 = ("model", "method", "QC mean", "paper's QC", "QC ratio", "time, s", "paper's time", "time ratio")
+# How their numbers are written.
+FORMS_1 = ("", ",d", "", "d", ".2e", ".2e", ".2f")
+FORMS_2 = ("", "", ".4f", ".3f", ".3f", ".2f", ".3g", ".3f")
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A mesh and what the methods made of it.
+
+    Attributes:
+        name: the paper's where it has the model, else the file's.
+        published: the paper's numbers; None where it has none.
+        comparison: of the methods.
+    """
+
+    name: str
+    published: Published | None
+    comparison: Comparison
+
+    @property
+    def is_same(self) -> bool:
+        """Whether the mesh has the resolution of the paper's."""
+        return self.published is not None and self.published.has_as_many(self.comparison.triangles)
+
+    @property
+    def linear(self) -> Flattening:
+        """By the paper's method, which found the cones."""
+        result = self.comparison["linear"].result
+        assert result is not None
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """The paper's experiments.
+
+    Attributes:
+        models: one or more, in the paper's order, then others.
+        failed: file and what was wrong with it.
+    """
+
+    models: tuple[Model, ...]
+    failed: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """The paper's models that were not given."""
+        found = {model.name for model in self.models}
+        return tuple(name for name in MODELS if name not in found)
+
+    def table_1(self) -> list[list[object]]:
+        """Return the rows of Table 1, curvature errors."""
+        rows: list[list[object]] = []
+        for model in self.models:
+            here, there = model.linear.distortion.curvature_error, math.nan
+            thousands: float | str = ""
+            if model.published is not None:
+                there, thousands = model.published.curvature_error, f"{model.published.thousands:g}K"
+            cones = len(model.linear.cones)
+            rows.append([model.name, model.comparison.triangles, thousands, cones, here, there, here / there])
+        return rows
+
+    def table_2(self) -> list[list[object]]:
+        """Return the rows of Table 2, quasi-conformal distortion and time."""
+        rows: list[list[object]] = []
+        for model in self.models:
+            for entry in model.comparison.entries:
+                qc = math.nan if entry.result is None else entry.result.distortion.qc_mean
+                theirs, seconds = math.nan, math.nan
+                if model.published is not None:
+                    theirs = model.published.qc.get(entry.method, math.nan)
+                    seconds = model.published.seconds.get(entry.method, math.nan)
+                name = f"{entry.method} ({NAMES[entry.method]})" if entry.method in NAMES else entry.method
+                numbers = [qc, theirs, qc / theirs, entry.seconds, seconds, entry.seconds / seconds]
+                rows.append([model.name, name, *numbers])
+        return rows
+
+    def markdown(self) -> str:
+        """Return both tables, what is to be known of them, and the figures."""
+        figures = [f"![{title}]({name})\n\n{title}\n" for name, title in FIGURES.items()]
+        return "\n".join([self.tables(), *figures])
+
+    def tables(self) -> str:
+        """Return both tables, and what is to be known of them."""
+        lines = ["# Section 5 of the paper", ""]
+        lines += [
+            "Ben-Chen, Gotsman and Bunin, Conformal flattening by curvature prescription and metric scaling, 2008. "
+            "The greedy search finds the cones (epsilon 1); these and one cut are given to every method. Times are "
+            "from there to the layout; the paper's are of a processor of 1.4 GHz.",
+            "",
+        ]
+        other = [model for model in self.models if model.published is not None and not model.is_same]
+        if other:
+            listed = ", ".join(f"{m.name} ({m.comparison.triangles:,})" for m in other)
+            lines += [f"In another resolution than the paper's, so that numbers differ: {listed}.", ""]
+        if self.missing:
+            lines += [f"Not among the files: {', '.join(self.missing)}.", ""]
+        lines += [f"Could not be flattened: {name}: {why}\n" for name, why in self.failed]
+        for title, headings, rows, forms in (
+            ("Table 1: curvature error", TABLE_1, self.table_1(), FORMS_1),
+            ("Table 2: quasi-conformal distortion", TABLE_2, self.table_2(), FORMS_2),
+        ):
+            lines += [f"## {title}", "", markdown(headings, _written(rows, forms))]
+        lines += [notes([replace(model.comparison, name=model.name) for model in self.models])]
+        return "\n".join(lines)
+
+    def texts(self) -> dict[str, str]:
+        """Return the tables as Markdown, and as comma separated values, by file name."""
+        one, two = as_csv(TABLE_1, self.table_1()), as_csv(TABLE_2, self.table_2())
+        return dict(zip(TEXTS, (self.markdown(), one, two), strict=True))
+
+    def figures(self, sight: Sight) -> dict[str, Figure]:
+        """Return the paper's figures, by file name."""
+        from . import pictures
+
+        cones = [pictures.cone_panel(m.linear, sight, f"{m.name}: {_cones(m.linear)}") for m in self.models]
+        quality, layouts, textures = [], [], []
+        for model in self.models:
+            shown = model.comparison.drawn
+            scale = pictures.same_scale(shown)
+            quality.append(_row(pictures.quality_panels(shown, scale, sight), scale))
+            pairs = zip(shown, pictures.turned_alike(shown), strict=True)
+            layouts.append(
+                _row([pictures.layout_panel(result, f"{model.name}, {one.method}") for one, result in pairs])
+            )
+            linear = [entry for entry in shown if entry.method == "linear"]
+            own = pictures.same_scale(linear)
+            texture = pictures.texture_panel(model.linear, sight, model.name)
+            textures.append(_row([texture, *pictures.quality_panels(linear, own, sight)], own))
+        rows = (pictures.in_rows(cones), quality, layouts, textures)
+        marks = (self.models[0].linear, None, None, None)
+        return {
+            name: pictures.figure_of(each, marks_of=marked)
+            for name, each, marked in zip(FIGURES, rows, marks, strict=True)
+        }
+
+
+TEXTS = ("paper.md", "table1.csv", "table2.csv")
+#: File and caption of each figure, numbered as in the paper.
+FIGURES = {
+    "figure2.png": "Figure 2: cones, red where their curvature is positive, black where it is negative, and seams",
+    "figure3.png": "Figure 3: quasi-conformal distortion by each method; the number is its mean",
+    "figure4.png": "Figure 4: layouts by each method, with the same cones and cut",
+    "figure5.png": "Figure 5: a checkerboard, and the distortion, by the paper's method",
+}
+#: All that is written.
+FILES = (*TEXTS, *FIGURES)
+
+
+def reproduce(
+    paths: Sequence[Path], *, methods: Sequence[str] = METHODS, progress: Progress | None = None
+) -> Reproduction:
+    """Run the paper's experiments on mesh files, and on those in folders.
+
+    Args:
+        paths: files, folders of files, or patterns; those named after the paper's models come first.
+        methods: to compare; the paper's own, "linear", is among them in any case.
+        progress: called with what is done and the fraction done.
+
+    Raises:
+        OptionError: a method is unknown, or a path names no mesh.
+        MeshError: none of the meshes can be flattened.
+    """
+    files = sorted({Path(file) for path in paths for file in find_meshes(str(path))}, key=_place)
+    methods = known_methods(methods if "linear" in methods else ("linear", *methods))
+    models, failed = [], []
+    for number, file in enumerate(files):
+
+        def tell(what: str, fraction: float, number: int = number, name: str = file.stem) -> None:
+            if progress is not None:
+                progress(f"{name}: {what}", (number + fraction) / len(files))
+
+        tell("read", 0.0)
+        try:
+            compared = compare_methods(read_mesh(file), methods=methods, peers=(), progress=tell, **PAPER)
+        except ConeflatError as error:
+            failed.append((file.name, " ".join(str(error).split())))
+            continue
+        name = model_of(file)
+        models.append(Model(name or file.stem, MODELS[name] if name else None, compared))
+    if not models:
+        why = "; ".join(f"{name}: {reason}" for name, reason in failed)
+        raise MeshError(f"no mesh could be flattened: {why}")
+    return Reproduction(tuple(models), tuple(failed))
+
+
+def _place(path: Path) -> tuple[int, str, str]:
+    name = model_of(path)
+    return (len(MODELS) if name is None else list(MODELS).index(name), path.stem, str(path))
+
+
+def _row(panels: Sequence[Panel], quantities: Sequence[Quantity] = ()) -> Row:
+    """Return panels in a row, wide enough for their labels."""
+    from ..view.figures.compose import Row
+    from .pictures import with_room
+
+    inches = 2.2  # of height
+    return Row([with_room(panel, inches) for panel in panels], quantities[:1], tallest=inches)
+
+
+def _cones(result: Flattening) -> str:
+    return plural(len(result.cones), "cone")
+
+
+def _written(rows: Sequence[Sequence[object]], forms: Sequence[str]) -> list[list[str]]:
+    """Return cells as they stand in a table."""
+    return [
+        [
+            str(value) if isinstance(value, str) else written(value, form)  # type: ignore[arg-type]
+            for value, form in zip(row, forms, strict=True)
+        ]
+        for row in rows
+    ]

@@ -1,0 +1,207 @@
+"""Comparisons as pictures: side by side, in the same colours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base import FloatArray, IntArray
+from ...geometry import signed_double_areas
+from ...io import atomic_write, check_target, make_folder
+from ...mesh import label_faces
+from ..view import draw_checker, draw_cones, draw_layout, new_figure, save_figure
+from ..view.figures.camera import Eye, eye_direction, view_aspect
+from ..view.figures.compose import Panel, Row, compose, text_width
+from ..view.figures.cone_marks import mark_handles
+from ..view.figures.model import draw_quantity
+from ..view.figures.uv_layout import fill_layout, layout_aspect
+from ..view.quantity import Quantity, conformal_distortion
+from .run import Comparison, Entry
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ... import Flattening
+
+DPI = 200.0
+# Inches.
+WIDTH, TALLEST = 10.0, 2.4
+IN_A_ROW = 5
+
+
+@dataclass(frozen=True)
+class Sight:
+    """From where models are looked at.
+
+    Attributes:
+        eye: direction to the eye, as in `draw_checker`.
+        up: the models' upward axis, "x", "y" or "z".
+
+    Raises:
+        OptionError: there is no such direction or axis.
+    """
+
+    eye: Eye = "front-right"
+    up: str = "y"
+
+    def __post_init__(self) -> None:
+        eye_direction(self.eye, self.up)
+
+    def panel(self, result: Flattening, draw: Callable[..., object], label: str, **more: Any) -> Panel:
+        """Return a panel in which a function of axes, a result and a look draws the model."""
+        aspect = view_aspect(result.vertices[np.unique(result.faces)], self.eye, self.up)
+        look = {"result": result, "eye": self.eye, "up": self.up, "dpi": DPI, **more}
+        return Panel(aspect, lambda axes: draw(axes=axes, **look), label)
+
+
+def draw_layouts(comparison: Comparison) -> Figure:
+    """Return the layouts of all methods, coloured by quasi-conformal distortion, on one scale.
+
+    Beside them stands how often it is which by the first method.
+    """
+    shown = comparison.drawn
+    quantities = same_scale(shown)
+    panels = [
+        Panel(
+            layout_aspect(result, crop=True), partial(_fill, result, quantity), labelled(entry.method, result)
+        )
+        for entry, quantity, result in zip(shown, quantities, turned_alike(shown), strict=True)
+    ]
+    return _grid(panels, quantities[:1])
+
+
+def draw_qualities(comparison: Comparison, sight: Sight) -> Figure:
+    """Return the model with the quasi-conformal distortion of all methods, on one scale."""
+    quantities = same_scale(comparison.drawn)
+    panels = quality_panels(comparison.drawn, quantities, sight)
+    return _grid(panels, quantities[:1])
+
+
+def quality_panels(entries: Sequence[Entry], quantities: Sequence[Quantity], sight: Sight) -> list[Panel]:
+    """Return a panel of the model with a quantity for each method."""
+    return [
+        sight.panel(result, draw_quantity, labelled(entry.method, result), quantity=quantity)
+        for entry, quantity in zip(entries, quantities, strict=True)
+        if (result := entry.result) is not None
+    ]
+
+
+def turned_alike(entries: Sequence[Entry]) -> list[Flattening]:
+    """Return the results of entries, each turned as a whole so that the first one's largest chart lies alike in it.
+
+    Those of other charts stay as they are.
+    """
+    results = [entry.result for entry in entries if entry.result is not None]
+    return [_turned_like(result, results[0]) for result in results]
+
+
+def _turned_like(result: Flattening, model: Flattening) -> Flattening:
+    same = np.array_equal(result.faces, model.faces) and result.distortion.charts == model.distortion.charts
+    if result is model or not same:
+        return result
+    largest = _largest_chart(model)
+    one, other = (_centred(each.corner_uv[largest]) for each in (result, model))
+    product = np.vdot(one, other)
+    if product == 0:
+        return result
+    turned = (result.uv @ np.array([1, 1j])) * (product / abs(product))
+    return replace(result, uv=np.stack([turned.real, turned.imag], axis=1))
+
+
+def _largest_chart(result: Flattening) -> IntArray:
+    """Return the triangles of the chart of most area."""
+    count, chart = label_faces(result.uv_faces, len(result.uv))
+    areas = np.bincount(chart, np.abs(signed_double_areas(result.corner_uv)), count)
+    return np.flatnonzero(chart == areas.argmax())
+
+
+def _centred(corner_uv: FloatArray) -> NDArray[np.complex128]:
+    """Return the corners of triangles in the plane, as complex numbers around their mean."""
+    corners = (corner_uv @ np.array([1, 1j])).ravel()
+    return np.asarray(corners - corners.mean())
+
+
+def labelled(method: str, result: Flattening) -> str:
+    """Return a method and what it reached."""
+    return f"{method}: {result.distortion.qc_mean:.4f}"
+
+
+def same_scale(entries: Sequence[Entry]) -> list[Quantity]:
+    """Return the quasi-conformal distortion by each method, in colours that mean the same."""
+    quantities = [conformal_distortion(entry.result) for entry in entries if entry.result is not None]
+    if not quantities:
+        return []
+    # Colours end at the distortion of the method in the middle, as most are far better than the worst.
+    by_distortion = sorted((quantity.scale for quantity in quantities), key=lambda scale: scale.high)
+    scale = by_distortion[(len(quantities) - 1) // 2]
+    names = [f"QC, {entry.method}" for entry in entries if entry.result is not None]
+    return [replace(one, scale=scale, label=name) for one, name in zip(quantities, names, strict=True)]
+
+
+def cone_panel(result: Flattening, sight: Sight, label: str) -> Panel:
+    """Return a panel of the model with its cones and seams."""
+    return sight.panel(result, draw_cones, label)
+
+
+def texture_panel(result: Flattening, sight: Sight, label: str) -> Panel:
+    """Return a panel of the model with a checkerboard."""
+    return sight.panel(result, draw_checker, label)
+
+
+def layout_panel(result: Flattening, label: str) -> Panel:
+    """Return a panel of the charts."""
+    return Panel(layout_aspect(result, crop=True), partial(draw_layout, result, crop=True), label)
+
+
+def figure_of(rows: Sequence[Row], *, marks_of: Flattening | None = None) -> Figure:
+    """Return rows of panels as wide as a page."""
+    return compose(rows, marks=[] if marks_of is None else mark_handles(marks_of), dpi=DPI, width=WIDTH)
+
+
+def in_rows(panels: Sequence[Panel], quantities: Sequence[Quantity] = ()) -> list[Row]:
+    """Return panels in rows of `IN_A_ROW`."""
+    wide = [with_room(panel, TALLEST) for panel in panels]
+    return [Row(wide[k : k + IN_A_ROW], quantities, tallest=TALLEST) for k in range(0, len(wide), IN_A_ROW)]
+
+
+def with_room(panel: Panel, height: float) -> Panel:
+    """Return a panel that is wide enough for its label, if it is of a height in inches."""
+    return replace(panel, aspect=max(panel.aspect, text_width(panel.label) / height))
+
+
+def _grid(panels: Sequence[Panel], quantities: Sequence[Quantity]) -> Figure:
+    return figure_of(in_rows(panels, quantities))
+
+
+def _fill(result: Flattening, quantity: Quantity, axes: object) -> None:
+    fill_layout(axes, result, quantity, DPI)  # type: ignore[arg-type]
+
+
+def open_folder(folder: Path, names: Iterable[str]) -> None:
+    """Make a folder if it is missing, for files of some names; worth doing before long work.
+
+    Raises:
+        OptionError: matplotlib, which draws the pictures, is not installed.
+        MeshFileError: the folder cannot be made, or a file not be written there.
+    """
+    new_figure(1, 1)
+    make_folder(folder)
+    for name in names:
+        check_target(folder / name)
+
+
+def write_folder(folder: Path, contents: Mapping[str, str | Figure]) -> list[Path]:
+    """Write texts and figures by their names, and return the paths."""
+    for name, content in contents.items():
+        if isinstance(content, str):
+            with atomic_write(folder / name, "w") as file:
+                file.write(content)
+        else:
+            save_figure(content, folder / name)
+    return [folder / name for name in contents]

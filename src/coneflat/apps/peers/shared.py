@@ -1,0 +1,101 @@
+"""What the methods to compare with share: layouts and metrics at the area of the mesh, and what is told of failures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ... import TriangleMesh
+from ...base import FloatArray, IntArray, off_by, plural
+from ...errors import ConvergenceError
+from ...geometry import IntrinsicTriangulation, angle_defect, corner_angles, double_areas, straight_triangles
+from ...stages import ConeSolution, Cut, Embedding, FlatMetric, SolveStatistics
+
+
+def failure_notes(what: str, steps: int, residual: float, unit: str, accepted: bool) -> tuple[str, ...]:
+    """Return the note on a solve that did not converge, if its result is accepted.
+
+    Args:
+        what: a clause, of what was not found.
+        steps: Newton steps.
+        residual, unit: of the quantity that the clause names last.
+        accepted: whether what there is will do.
+
+    Raises:
+        ConvergenceError: it will not.
+    """
+    failure = f"{what} {off_by(residual, unit)} after {plural(steps, 'step')}"
+    if not accepted or not np.isfinite(residual):
+        raise ConvergenceError(f"{failure}; method 'exact', other cones, a repair or remeshing may help")
+    return (f"{failure[0].upper()}{failure[1:]}.",)
+
+
+def flat_metric(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    solution: ConeSolution,
+    triangulation: IntrinsicTriangulation,
+    flat: FloatArray,
+    log_scale: FloatArray,
+    flips: IntArray,
+    steps: int,
+) -> FlatMetric:
+    """Return a metric on a flipped triangulation, at the area of the mesh; its boundary is free.
+
+    Args:
+        mesh: connected.
+        lengths: (m, 3) its side lengths.
+        solution: its cones and their curvatures.
+        triangulation: gets the flat lengths.
+        flat: (3m,) lengths found.
+        log_scale: (n,) phi, up to a constant.
+        flips: half-edges flipped, in order.
+        steps: Newton steps.
+    """
+    border, faces = mesh.is_boundary_vertex, triangulation.faces
+    curvature = angle_defect(faces, corner_angles(flat.reshape(-1, 3)), border)
+    error = np.where(border, 0.0, np.abs(curvature - solution.target))
+    triangulation.length = flat
+    return FlatMetric(
+        mesh=mesh,
+        lengths=lengths,
+        cones=solution.cones,
+        target=np.where(border, curvature, solution.target),
+        log_scale=log_scale,
+        is_open=border,
+        is_held=np.zeros(len(border), dtype=bool),
+        statistics=SolveStatistics(
+            newton_steps=steps, euclidean_flips=len(flips), residual=float(error.max())
+        ),
+        triangles=straight_triangles(triangulation, flips, len(mesh.faces)),
+    ).scaled(float(np.sqrt(double_areas(lengths).sum() / double_areas(flat.reshape(-1, 3)).sum())))
+
+
+def embedding_metric(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    solution: ConeSolution,
+    embed: Callable[[Cut], Embedding],
+    holds_cones: bool = True,
+) -> FlatMetric:
+    """Return what stands for a metric where a method maps the cut mesh itself; its boundary is free.
+
+    Args:
+        mesh: connected.
+        lengths: (m, 3) side lengths.
+        solution: the cones and what was asked of them.
+        embed: maps the cut mesh.
+        holds_cones: whether the method prescribes the cones' curvatures.
+    """
+    return FlatMetric(
+        mesh=mesh,
+        lengths=lengths,
+        cones=solution.cones,
+        target=solution.target,
+        log_scale=solution.log_scale,
+        is_open=mesh.is_boundary_vertex,
+        is_held=np.zeros(len(mesh.vertices), dtype=bool),
+        embed=embed,
+        holds_cones=holds_cones,
+    )

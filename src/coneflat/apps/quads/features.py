@@ -1,0 +1,272 @@
+"""Sharp edges of a surface, what lies between them, and meshes refined for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ... import TriangleMesh
+from ...base import BoolArray, FloatArray, IntArray
+from ...geometry import corner_angles, dihedral_angles
+from ...mesh import CutMesh, label_components, open_along, tie_key
+
+
+def sharp_edges(mesh: TriangleMesh, angle: float) -> IntArray:
+    """Return the inner edges that bend by more than an angle, radians."""
+    return np.flatnonzero(np.abs(dihedral_angles(mesh)) > angle)
+
+
+def lengths_along(mesh: TriangleMesh, edges: IntArray) -> FloatArray:
+    """Return (k,) the lengths of edges."""
+    return np.linalg.norm(np.diff(mesh.vertices[mesh.edges[edges]], axis=1)[:, 0], axis=1)
+
+
+def without_stubs(mesh: TriangleMesh, edges: IntArray, least: float) -> IntArray:
+    """Return which of some edges (k,) are kept when stubs are dropped.
+
+    A stub ends where no other one goes on, in less than two edges or before it is as long as is asked.
+    """
+    kept = np.arange(len(edges))
+    lengths = lengths_along(mesh, edges)
+    while True:
+        chain, ends = feature_chains(mesh, edges[kept])
+        count = int(chain.max(initial=-1)) + 1
+        is_stub = np.zeros(count, dtype=bool)
+        is_stub[chain[(ends == 1).any(axis=1)]] = True
+        is_stub &= (np.bincount(chain, minlength=count) < 2) | (
+            np.bincount(chain, lengths[kept], count) < least
+        )
+        if not is_stub.any():
+            return kept
+        kept = kept[~is_stub[chain]]
+
+
+def patches_of(mesh: TriangleMesh, edges: IntArray) -> tuple[int, IntArray]:
+    """Return into how many patches edges part a mesh, and (m,) that of each triangle."""
+    glued = ~mesh.is_boundary_edge
+    glued[edges] = False
+    pairs = mesh.edge_faces[glued]
+    return label_components(len(mesh.faces), pairs[:, 0], pairs[:, 1])
+
+
+def dangling(mesh: TriangleMesh, edges: IntArray) -> IntArray:
+    """Return which of some edges (k,) have the same patch on both sides."""
+    _, patch = patches_of(mesh, edges)
+    one, two = patch[mesh.edge_faces[edges]].T
+    return np.flatnonzero(one == two)
+
+
+def border_of(mesh: TriangleMesh, edges: IntArray, number: int) -> IntArray:
+    """Return which of some edges (k,) part one patch from another one, those of the chain that does so the longest.
+
+    Where none does, those that lie in it; empty if it has none of either.
+    """
+    _, patch = patches_of(mesh, edges)
+    one, two = patch[mesh.edge_faces[edges]].T
+    beside = (one == number) | (two == number)
+    parting = np.flatnonzero(beside & (one != two))
+    if not len(parting):
+        return np.flatnonzero(beside)
+    chain, _ = feature_chains(mesh, edges)
+    lengths = lengths_along(mesh, edges)
+    longest = int(np.argmax(np.bincount(chain[parting], lengths[parting])))
+    return parting[chain[parting] == longest]
+
+
+def feature_chains(mesh: TriangleMesh, edges: IntArray) -> tuple[IntArray, IntArray]:
+    """Return (k,) the chain of each edge, between where other than two meet, and (k, 2) how many do at its ends.
+
+    The boundary counts as three edges more.
+    """
+    ends = mesh.edges[edges]
+    degree = np.bincount(ends.ravel(), minlength=len(mesh.vertices)) + 3 * mesh.is_boundary_vertex
+    inner = degree[ends.ravel()] == 2
+    order = np.argsort(ends.ravel()[inner], kind="stable")
+    pairs = np.arange(len(edges)).repeat(2)[inner][order].reshape(-1, 2)
+    _, chain = label_components(len(edges), pairs[:, 0], pairs[:, 1])
+    return chain, degree[ends]
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A mesh cut open along its features.
+
+    Attributes:
+        mesh: the mesh.
+        edges: (k,) the features, inner edges.
+        cut: the mesh cut open along them, with the vertex that each of its own comes from.
+        quarters: (c,) the quarter turns that the angle at each vertex on the boundary of the open mesh is to have: at
+            least one, two where it is straight; 0 inside.
+    """
+
+    mesh: TriangleMesh
+    edges: IntArray
+    cut: CutMesh
+    quarters: IntArray
+
+    @property
+    def nodes(self) -> IntArray:
+        """Vertices on features or the boundary that are to lie on grid points: where these meet, end or turn."""
+        border = np.flatnonzero(self.quarters > 0)
+        turns = np.zeros(len(self.mesh.vertices), dtype=bool)
+        turns[self.cut.origin[border[self.quarters[border] != 2]]] = True
+        copies = np.bincount(self.cut.origin[border], minlength=len(turns))
+        inside = ~self.mesh.is_boundary_vertex
+        turns |= np.where(inside, (copies != 2) & (copies > 0), copies > 1)
+        return np.flatnonzero(turns)
+
+    @property
+    def irregular(self) -> IntArray:
+        """The inner ones of them whose angles sum to other than four quarter turns."""
+        total = np.bincount(self.cut.origin, self.quarters, len(self.mesh.vertices)).astype(np.int64)
+        return np.flatnonzero((total > 0) & (total != 4) & ~self.mesh.is_boundary_vertex)
+
+    @property
+    def is_feature(self) -> BoolArray:
+        """(e,) True for edges of the mesh that are features."""
+        mask = np.zeros(len(self.mesh.edges), dtype=bool)
+        mask[self.edges] = True
+        return mask
+
+
+def opened(mesh: TriangleMesh, edges: IntArray, lengths: FloatArray) -> Opened:
+    """Return a mesh cut open along edges (k,), with angles rounded to quarter turns; lengths are (m, 3)."""
+    cut = open_along(mesh, edges)
+    angles = corner_angles(lengths)
+    sums = np.bincount(cut.mesh.faces.ravel(), angles.ravel(), len(cut.origin)) / (np.pi / 2)
+    rounded = np.maximum(np.rint(sums), 1).astype(np.int64)
+    # Corners of an octagon, in the middle between one and two, are none, whatever rounding says.
+    rounded[(rounded == 1) & (sums > 1.45)] = 2
+    return Opened(mesh, edges, cut, np.where(cut.mesh.is_boundary_vertex, rounded, 0))
+
+
+def split_for_features(
+    vertices: FloatArray, faces: IntArray, features: IntArray, longest: float
+) -> tuple[TriangleMesh, IntArray, IntArray]:
+    """Return a finer mesh of the same surface, its features as edges, and the one of those given that each is part of.
+
+    Edges are split until none is longer than wanted, nor than a part of the patch between features that it lies in; and
+    those that join vertices on features or the boundary without being such, so that straight sides leave every triangle
+    room. Of triangles whose edges are too long the longest is always split before others (M.-C. Rivara, "Algorithms for
+    refining triangular grids suitable for adaptive and multigrid techniques", 1984), so that angles do not become ever
+    smaller.
+
+    Args:
+        vertices, faces: (n, 3), (m, 3) the mesh; its vertices remain the first ones.
+        features: (k, 2) pairs of vertices.
+        longest: what no edge is to exceed.
+    """
+    mesh = TriangleMesh(vertices, faces)
+    edges, origin = edge_indices(mesh, features), np.arange(len(features))
+    for _ in range(30):  # each halves edges
+        marked = _too_long(mesh, edges, longest)
+        if not marked.any():
+            break
+        mesh, edges, origin = _split(mesh, edges, origin, _closed(mesh, marked))
+    return _split(mesh, edges, origin, _chords(mesh, edges))
+
+
+def split_faces(
+    mesh: TriangleMesh, edges: IntArray, origin: IntArray, faces: IntArray
+) -> tuple[TriangleMesh, IntArray, IntArray]:
+    """Return a mesh in which all sides of some faces are split, its features (k,) and the origin of each of these."""
+    marked = np.zeros(len(mesh.edges), dtype=bool)
+    marked[mesh.halfedge_edges.reshape(-1, 3)[faces]] = True
+    mesh, edges, origin = _split(mesh, edges, origin, _closed(mesh, marked))
+    return _split(mesh, edges, origin, _chords(mesh, edges))
+
+
+def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
+    """Return (k,) the edges of pairs of vertices (k, 2)."""
+    n = len(mesh.vertices)
+    keys = mesh.edges[:, 0] * n + mesh.edges[:, 1]
+    low, high = pairs.min(axis=1, initial=n), pairs.max(axis=1, initial=0)
+    order = np.argsort(keys)
+    found: IntArray = order[np.searchsorted(keys[order], low * n + high)]
+    return found
+
+
+def _too_long(mesh: TriangleMesh, edges: IntArray, longest: float) -> BoolArray:
+    """Return (e,) the edges longer than what their patches allow."""
+    count, patch = patches_of(mesh, edges)
+    corners = mesh.vertices[mesh.faces]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    allowed = np.minimum(longest, np.sqrt(np.bincount(patch, areas, count)) / 4)[patch]
+    lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
+    one, two = mesh.edge_faces.T
+    too_long: BoolArray = lengths > np.minimum(allowed[one], np.where(two < 0, np.inf, allowed[two]))
+    return too_long
+
+
+def _chords(mesh: TriangleMesh, edges: IntArray) -> BoolArray:
+    """Return (e,) the edges that join vertices on features or the boundary and are none themselves."""
+    is_fixed = mesh.is_boundary_edge.copy()
+    is_fixed[edges] = True
+    on = np.zeros(len(mesh.vertices), dtype=bool)
+    on[mesh.edges[is_fixed]] = True
+    return on[mesh.edges].all(axis=1) & ~is_fixed
+
+
+def _closed(mesh: TriangleMesh, marked: BoolArray) -> BoolArray:
+    """Return marks with the longest side of every triangle that has one."""
+    marked, longest = marked.copy(), _longest_sides(mesh, np.ones(len(marked), dtype=bool))
+    sides = mesh.halfedge_edges.reshape(-1, 3)
+    while True:
+        more = longest[marked[sides].any(axis=1)]
+        more = more[~marked[more]]
+        if not len(more):
+            return marked
+        marked[more] = True
+
+
+def _longest_sides(mesh: TriangleMesh, among: BoolArray) -> IntArray:
+    """Return (m,) the longest edge of each triangle among some (e,), if it has any.
+
+    Of equal ones it is the same, whatever the numbering.
+    """
+    lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
+    key = tie_key(mesh.vertices)[mesh.edges].sum(axis=1)
+    rounded = np.round(lengths / lengths.max(initial=1e-300), 9)
+    rank = np.empty(len(lengths), dtype=np.int64)
+    rank[np.lexsort((key, rounded))] = np.arange(len(lengths))
+    rank[~among] = -1
+    sides = mesh.halfedge_edges.reshape(-1, 3)
+    longest: IntArray = sides[np.arange(len(sides)), np.argmax(rank[sides], axis=1)]
+    return longest
+
+
+def _split(
+    mesh: TriangleMesh, edges: IntArray, origin: IntArray, marked: BoolArray
+) -> tuple[TriangleMesh, IntArray, IntArray]:
+    """Return a mesh with marked edges split in the middle, its features (k,) and the origin of each of these."""
+    n = len(mesh.vertices)
+    middle = np.full(len(marked), -1)
+    middle[marked] = n + np.arange(int(marked.sum()))
+    points = np.concatenate([mesh.vertices, mesh.vertices[mesh.edges[marked]].mean(axis=1)])
+    sides = mesh.halfedge_edges.reshape(-1, 3)
+    first = np.argmax(sides == _longest_sides(mesh, marked)[:, None], axis=1)
+    turn = (first[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(mesh.faces, turn, axis=1).T
+    bc, ca, ab = middle[np.take_along_axis(sides, turn, axis=1)].T
+    whole, on_ab, on_ca = bc < 0, ab >= 0, ca >= 0
+    halved = ~whole
+
+    def triangles(chosen: BoolArray, *corners: IntArray) -> IntArray:
+        return np.stack([corner[chosen] for corner in corners], axis=1)
+
+    parts = [
+        triangles(whole, a, b, c),
+        triangles(halved & ~on_ab, a, b, bc),
+        triangles(halved & on_ab, a, ab, bc),
+        triangles(halved & on_ab, ab, b, bc),
+        triangles(halved & ~on_ca, a, bc, c),
+        triangles(halved & on_ca, a, bc, ca),
+        triangles(halved & on_ca, ca, bc, c),
+    ]
+    finer = TriangleMesh(points, np.concatenate(parts))
+    pairs, at = mesh.edges[edges], middle[edges]
+    is_cut = at >= 0
+    halves = [np.stack([pairs[is_cut, end], at[is_cut]], axis=1) for end in range(2)]
+    features = edge_indices(finer, np.concatenate([pairs[~is_cut], *halves]))
+    return finer, features, np.concatenate([origin[~is_cut], origin[is_cut], origin[is_cut]])

@@ -1,0 +1,90 @@
+"""Quads in pictures: their edges, and the vertices where other than four meet."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..view.figures.camera import Eye
+from ..view.figures.cone_marks import DOT_REACH, mark_scale
+from ..view.figures.model import DOTS_PER_INCH, show_mesh
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .quad_mesh import QuadMesh
+
+#: Of vertices with fewer quads, and with more: told apart with any colour vision, and by how dark they are.
+FEWER_COLOR, MORE_COLOR = "#0072b2", "#e69f00"
+
+
+def draw_quads(
+    quads: QuadMesh,
+    axes: Axes,
+    *,
+    eye: Eye = "front-right",
+    up: str = "y",
+    irregular: bool = True,
+    dpi: float = DOTS_PER_INCH,
+) -> None:
+    """Draw a mesh of quads with its edges, and dots where other than four meet inside: blue fewer, orange more.
+
+    Args:
+        quads: the mesh.
+        axes: matplotlib axes to draw in; their own lines and ticks are turned off.
+        irregular: draw the dots.
+        eye, up, dpi: as of `draw_checker`.
+
+    Raises:
+        OptionError: an option makes no sense.
+    """
+    from matplotlib.collections import LineCollection
+
+    colors = np.broadcast_to(np.array([0.94, 0.94, 0.95]), quads.triangles.shape)
+    picture = show_mesh(axes, quads.vertices, quads.triangles, eye, up, dpi, colors=colors)
+    camera = picture.camera
+    ends = quads.vertices[quads.edges]
+    pieces, visible = picture.split_segments(ends[:, 0], ends[:, 1])
+    length = float(np.median(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1))) * camera.scale * 72.0 / dpi
+    lines = LineCollection(list(pieces[visible]), colors="#30343b", linewidths=min(0.45, 0.07 * length))
+    lines.set(zorder=4, gid="edges", capstyle="round")
+    axes.add_collection(lines)
+    if not irregular:
+        return
+    places = quads.vertices[quads.irregular]
+    seen = picture.visible_points(places, DOT_REACH * max(camera.width, camera.height))
+    points, valences = camera.project(places)[:, :2], quads.valences[quads.irregular]
+    for name, color, chosen in (
+        ("fewer", FEWER_COLOR, seen & (valences < 4)),
+        ("more", MORE_COLOR, seen & (valences > 4)),
+    ):
+        axes.scatter(
+            points[chosen, 0],
+            points[chosen, 1],
+            s=42.0 * mark_scale(axes),
+            c=color,
+            edgecolors="black",
+            linewidths=0.6 * np.sqrt(mark_scale(axes)),
+            zorder=6,
+            clip_on=False,
+            gid=name,
+        )
+
+
+def irregular_handles(quads: QuadMesh) -> list[Any]:
+    """Return what a legend of matplotlib takes to name the dots, with how many there are."""
+    from matplotlib.lines import Line2D
+
+    dot: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 5.5, "markeredgecolor": "black"}
+    valences = quads.valences[quads.irregular]
+    marks: list[Any] = []
+    for color, chosen in ((FEWER_COLOR, valences[valences < 4]), (MORE_COLOR, valences[valences > 4])):
+        if len(chosen):
+            which = " and ".join(map(str, np.unique(chosen).tolist()))
+            marks.append(
+                Line2D(
+                    [], [], color=color, label=f"valence {which}: {len(chosen)}", markeredgewidth=0.6, **dot
+                )
+            )
+    return marks

@@ -1,0 +1,216 @@
+"""Integer linear algebra: equations in whole numbers, and the lattice points nearest to a given one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+
+from ...base import FloatArray, IntArray, compiled
+from ...errors import GridError
+
+# Entries above this are near what 64 bits hold; those of seams stay below a hundred.
+LARGEST = 2**40
+# Places of the search tree that are visited in all, at most.
+VISITS = 200_000
+
+
+class WholeSolutions(NamedTuple):
+    """All whole solutions of equations: one of them (n,), and a basis (n, d) of what may be added to it."""
+
+    one: IntArray
+    basis: IntArray
+
+
+def whole_solutions(rows: IntArray, right: IntArray) -> WholeSolutions | None:
+    """Return the whole x with rows x = right; None if there is none.
+
+    Args:
+        rows: (r, n), dependent ones among them are no harm.
+        right: (r,).
+
+    Notes:
+        Unimodular column operations make the rows a staircase (the Hermite normal form; Cohen, "A course in
+        computational algebraic number theory", 1993, Section 2.4). Pivots are the smallest entries, and of these those
+        in the sparsest columns, so that entries stay small.
+    """
+    count = rows.shape[1]
+    work = np.concatenate([rows.astype(np.int64), np.eye(count, dtype=np.int64)])
+    open_columns = np.ones(count, dtype=bool)
+    one = np.zeros(count, dtype=np.int64)
+    for i in range(len(rows)):
+        pivot = _eliminate(work, i, open_columns)
+        missing = int(right[i]) - int(rows[i] @ one)
+        if pivot is None:
+            if missing:
+                return None
+            continue
+        quotient, rest = divmod(missing, int(work[i, pivot]))
+        if rest:
+            return None
+        # The column is zero in all rows before, so that what held goes on to hold.
+        one += quotient * work[len(rows) :, pivot]
+        open_columns[pivot] = False
+    return WholeSolutions(one, work[len(rows) :, open_columns].copy())
+
+
+def _eliminate(work: IntArray, row: int, open_columns: IntArray) -> int | None:
+    """Make all entries of a row in open columns 0 but one, by operations on columns; return the column of that."""
+    columns = np.flatnonzero(open_columns)
+    while True:
+        entries = np.abs(work[row, columns])
+        filled = np.flatnonzero(entries)
+        if not len(filled):
+            return None
+        least = filled[entries[filled] == entries[filled].min()]
+        pivot = columns[least[np.argmin(np.count_nonzero(work[:, columns[least]], axis=0))]]
+        if len(filled) == 1:
+            return int(pivot)
+        others = columns[filled][columns[filled] != pivot]
+        times = np.rint(work[row, others] / work[row, pivot]).astype(np.int64)
+        work[:, others] -= work[:, [pivot]] * times
+        if np.abs(work[:, others]).max() > LARGEST:
+            raise GridError(f"the equations between {work.shape[1]} translations of seams overflow")
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """The whole vectors one + basis y, and how far they are from each other.
+
+    Attributes:
+        one: (d,) one of them.
+        basis: (d, k) whole numbers.
+        gram: (d, d) scalar products of all vectors.
+    """
+
+    one: IntArray
+    basis: IntArray
+    gram: FloatArray
+
+    def where(self, row: IntArray, value: int) -> Lattice | None:
+        """Return the part where (d,) row times the vector is a whole number; None where there is none."""
+        within = whole_solutions((row @ self.basis)[None], np.array([value - int(row @ self.one)]))
+        if within is None:
+            return None
+        return replace(self, one=self.one + self.basis @ within.one, basis=self.basis @ within.basis)
+
+    def reduced(self) -> Lattice:
+        """Return the same lattice by a basis that is nearly orthogonal."""
+        return replace(self, basis=self.basis @ self._reduction()[1])
+
+    def nearest(self, place: FloatArray, count: int, visits: int = VISITS) -> IntArray:
+        """Return (k, d) the vectors nearest to a real one (d,), the nearest first.
+
+        The first k = count found are exact if the search ends by itself; it begins at Babai's point and ends after so
+        many visits of places in any case.
+
+        Notes:
+            C. P. Schnorr, M. Euchner, "Lattice basis reduction: improved practical algorithms", 1994.
+        """
+        size = self.basis.shape[1]
+        if not size:
+            return self.one[None]
+        root, change = self._reduction()
+        basis = self.basis @ change
+        products = basis.T @ self.gram
+        target = np.linalg.solve(products @ basis, products @ (place - self.one))
+        found = np.zeros((count, size), dtype=np.int64)
+        squares: FloatArray = np.full(count, np.inf)
+        number = enumerate_points(root, target, found, squares, visits)
+        order = np.argsort(squares[:number], kind="stable")
+        nearest: IntArray = self.one + found[order] @ basis.T
+        return nearest
+
+    def _reduction(self) -> tuple[FloatArray, IntArray]:
+        """Return an upper triangular root of the reduced basis' scalar products, and (k, k) what reduces it."""
+        change = np.eye(self.basis.shape[1], dtype=np.int64)
+        root = np.ascontiguousarray(scipy.linalg.cholesky(self.basis.T @ self.gram @ self.basis))
+        reduce_basis(root, change)
+        return root, change
+
+
+@compiled
+def reduce_basis(root: FloatArray, basis: IntArray) -> None:
+    """Reduce the columns of an upper triangular matrix in place, and those of `basis` likewise (LLL)."""
+    size = len(root)
+    k, steps = 1, 0
+    # Where rounding exchanges two for ever, less than reduced will do.
+    while k < size and steps < 200 * size:
+        steps += 1
+        for j in range(k - 1, -1, -1):
+            times = round(root[j, k] / root[j, j])
+            if times != 0:
+                for i in range(j + 1):
+                    root[i, k] -= times * root[i, j]
+                for i in range(size):
+                    basis[i, k] -= int(times) * basis[i, j]
+        above, below = root[k - 1, k], root[k, k]
+        if 0.99 * root[k - 1, k - 1] ** 2 <= above * above + below * below:
+            k += 1
+            continue
+        for i in range(size):
+            root[i, k - 1], root[i, k] = root[i, k], root[i, k - 1]
+            basis[i, k - 1], basis[i, k] = basis[i, k], basis[i, k - 1]
+        # A rotation of two rows makes the matrix triangular again.
+        norm = np.sqrt(above * above + below * below)
+        c, s = above / norm, below / norm
+        for i in range(k - 1, size):
+            one, two = root[k - 1, i], root[k, i]
+            root[k - 1, i] = c * one + s * two
+            root[k, i] = c * two - s * one
+        root[k, k - 1] = 0.0
+        k = max(k - 1, 1)
+
+
+@compiled
+def enumerate_points(
+    root: FloatArray, target: FloatArray, found: IntArray, squares: FloatArray, visits: int
+) -> int:
+    """Fill the whole vectors nearest to a target, in any order, and their squared distances; return how many.
+
+    Depth first from the last coordinate; at each depth whole numbers by their distance, so that the first leaf is
+    Babai's point.
+    """
+    size, most = len(target), len(squares)
+    here = np.zeros(size, dtype=np.int64)
+    step = np.zeros(size, dtype=np.int64)
+    centre = np.zeros(size)
+    beyond = np.zeros(size + 1)  # squared distance in the coordinates from this one on
+    number, bound, depth, visited, worst = 0, np.inf, size - 1, 0, 0
+    centre[depth] = target[depth]
+    here[depth] = int(np.rint(centre[depth]))
+    step[depth] = 1 if centre[depth] >= here[depth] else -1
+    while depth < size:
+        visited += 1
+        if visited > visits:
+            break
+        off = (here[depth] - centre[depth]) * root[depth, depth]
+        total = beyond[depth + 1] + off * off
+        if total < bound:
+            beyond[depth] = total
+            if depth > 0:
+                depth -= 1
+                pull = 0.0
+                for j in range(depth + 1, size):
+                    pull += root[depth, j] * (here[j] - target[j])
+                centre[depth] = target[depth] - pull / root[depth, depth]
+                here[depth] = int(np.rint(centre[depth]))
+                step[depth] = 1 if centre[depth] >= here[depth] else -1
+                continue
+            place = number if number < most else worst
+            found[place] = here
+            squares[place] = total
+            number = min(number + 1, most)
+            if number == most:
+                worst = int(np.argmax(squares))
+                bound = squares[worst]
+        else:
+            depth += 1
+            if depth == size:
+                break
+        # The next nearest whole number: to the other side, one further.
+        here[depth] += step[depth]
+        step[depth] = -step[depth] - (1 if step[depth] > 0 else -1)
+    return number

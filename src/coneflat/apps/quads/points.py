@@ -1,0 +1,222 @@
+"""The points of an integer grid on a surface, each once, and the directions in which grid lines leave them.
+
+A point lies inside a triangle, within an edge or at a vertex; which, exact signs decide (H.-C. Ebke, D. Bommes, M.
+Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base import BoolArray, FloatArray, IntArray, compiled, dots
+from ...geometry import fill_orientations
+from .exact_grid import ExactGrid, turned
+
+# Where in its triangle a point lies: within side 0, 1 or 2, at corner 0, 1 or 2, or inside.
+CORNER, INSIDE = 3, 6
+# The directions of ports.
+AXES = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+
+
+@dataclass(frozen=True, eq=False)
+class GridPoints:
+    """The grid points of a surface.
+
+    Attributes:
+        start: (m + 1,) triangle f, with its boundary, holds the entries from start[f] to start[f + 1].
+        places: (e, 2) their coordinates in the triangle, sorted by the second, then by the first.
+        points: (e,) the point of each entry; those on edges and at vertices have several.
+        entry: (p,) the entry that a point is known by.
+        faces: (p,) the triangle of that entry.
+        sides: (p,) where in that triangle the point lies: within side 0 to 2, at corner 3 to 5, or inside, 6.
+    """
+
+    start: IntArray
+    places: FloatArray
+    points: IntArray
+    entry: IntArray
+    faces: IntArray
+    sides: IntArray
+
+    @property
+    def own_places(self) -> FloatArray:
+        """(p, 2) coordinates of each point in its own triangle."""
+        return self.places[self.entry]
+
+
+@dataclass(frozen=True, eq=False)
+class Ports:
+    """The directions in which grid lines leave grid points, counterclockwise around each.
+
+    Attributes:
+        start: (p + 1,) point v has the ports from start[v] to start[v + 1].
+        faces: (k,) the triangle that a port leads into, or along whose side it leads.
+        directions: (k,) 0 to 3, quarter turns from the first axis of that triangle's coordinates.
+        places: (k, 2) the coordinates of the point in that triangle.
+        is_boundary: (p,) whether the point is on the boundary, where the first port has none clockwise of it.
+    """
+
+    start: IntArray
+    faces: IntArray
+    directions: IntArray
+    places: FloatArray
+    is_boundary: BoolArray
+
+    @property
+    def points(self) -> IntArray:
+        """(k,) the point of each port."""
+        return np.repeat(np.arange(len(self.start) - 1), np.diff(self.start))
+
+
+def find_points(exact: ExactGrid) -> GridPoints:
+    """Return the grid points of a surface."""
+    faces, places = _candidates(exact.corners)
+    corners = exact.corners[faces]
+    each = np.broadcast_to(places[:, None], corners.shape)
+    rows = np.concatenate([corners[:, [1, 2, 0]], corners[:, [2, 0, 1]], each], axis=2)
+    found = np.empty(3 * len(rows), dtype=np.int64)
+    fill_orientations(rows.reshape(-1, 6), np.empty(12), found)
+    signs = found.reshape(-1, 3)
+    within = (signs >= 0).all(axis=1)
+    faces, places, on = faces[within], places[within], signs[within] == 0
+    # The corner that two sides have is opposite the third.
+    sides = np.choose(on.sum(axis=1), [INSIDE, on.argmax(axis=1), CORNER + on.argmin(axis=1)])
+    label = _same_point(exact, faces, places, sides)
+    _, entry, points = np.unique(label, return_index=True, return_inverse=True)
+    # In the order in which triangles have them.
+    rank = np.argsort(entry)
+    number = np.empty(len(rank), dtype=np.int64)
+    number[rank] = np.arange(len(rank))
+    entry = entry[rank]
+    start = np.concatenate([[0], np.cumsum(np.bincount(faces, minlength=len(exact.corners)))])
+    return GridPoints(start, places, number[points.ravel()], entry, faces[entry], sides[entry])
+
+
+def _candidates(corners: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return (k,) triangles and (k, 2) grid points, row by row, all those in them among few others."""
+    low, high = np.ceil(corners[..., 1].min(axis=1)), np.floor(corners[..., 1].max(axis=1))
+    faces, y = _ranges(low, high)
+    least, most = np.full(len(y), np.inf), np.full(len(y), -np.inf)
+    for i in range(3):
+        one, two = corners[faces, i], corners[faces, (i + 1) % 3]
+        along = two - one
+        meets = (along[:, 1] != 0) & (np.minimum(one[:, 1], two[:, 1]) <= y)
+        meets &= y <= np.maximum(one[:, 1], two[:, 1])
+        x = one[meets, 0] + (y - one[:, 1])[meets] / along[meets, 1] * along[meets, 0]
+        least[meets], most[meets] = np.minimum(least[meets], x), np.maximum(most[meets], x)
+    rows, x = _ranges(np.floor(least), np.ceil(most))
+    return faces[rows], np.stack([x, y[rows]], axis=1)
+
+
+def _ranges(low: FloatArray, high: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return the numbers from each low to its high one, one after the other: whose, and what."""
+    counts = np.maximum(high - low + 1, 0).astype(np.int64)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    return owner, low[owner] + np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def _same_point(exact: ExactGrid, faces: IntArray, places: FloatArray, sides: IntArray) -> IntArray:
+    """Return a number for each place in a triangle, the same for those of one point."""
+    at_vertex = (sides >= CORNER) & (sides < INSIDE)
+    on_edge = sides < CORNER
+    label = np.arange(len(faces)) + len(exact.mesh.vertices)
+    label[at_vertex] = exact.mesh.faces[faces[at_vertex], sides[at_vertex] - CORNER]
+    half = 3 * faces[on_edge] + sides[on_edge]
+    there, place = half.copy(), places[on_edge]
+    seen = np.flatnonzero((exact.twin[half] >= 0) & (exact.twin[half] < half))
+    there[seen] = exact.twin[half[seen]]
+    place[seen] = turned(exact.turns[half[seen]], place[seen]) + exact.shifts[half[seen]]
+    keys = np.concatenate([there[:, None], place.astype(np.int64)], axis=1)
+    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    label[on_edge] = label[on_edge][first][which.ravel()]
+    return label
+
+
+@compiled
+def find_entry(start: IntArray, places: FloatArray, face: int, x: float, y: float) -> int:
+    """Return the entry of a triangle at a place, -1 where there is none."""
+    low, high = start[face], start[face + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if places[middle, 1] < y or (places[middle, 1] == y and places[middle, 0] < x):
+            low = middle + 1
+        else:
+            high = middle
+    if low < start[face + 1] and places[low, 0] == x and places[low, 1] == y:
+        return low
+    return -1
+
+
+def find_ports(exact: ExactGrid, found: GridPoints) -> Ports:
+    """Return the directions in which grid lines leave the grid points."""
+    corners, flat = exact.corners, exact.mesh.faces.ravel()
+    inside = np.flatnonzero(found.sides == INSIDE)
+    every = np.broadcast_to(np.arange(4), (len(inside), 4))
+    parts = [
+        (inside, found.faces[inside], found.own_places[inside], every, np.zeros(len(inside), dtype=bool))
+    ]
+
+    def add(
+        points: IntArray,
+        corner: IntArray,
+        ends: tuple[FloatArray, FloatArray],
+        places: FloatArray,
+        closed: BoolArray,
+    ) -> None:
+        parts.append((points, corner // 3, places, _directions(*ends, closed), closed))
+
+    on_edge = np.flatnonzero(found.sides < CORNER)
+    half, places = 3 * found.faces[on_edge] + found.sides[on_edge], found.own_places[on_edge]
+    for _ in range(2):
+        faces, i = half // 3, half % 3
+        side = corners[faces, (i + 2) % 3] - corners[faces, (i + 1) % 3]
+        add(on_edge, half, (side, -side), places, exact.twin[half] < 0)
+        inner = exact.twin[half] >= 0
+        places = (turned(exact.turns[half], places) + exact.shifts[half])[inner]
+        on_edge, half = on_edge[inner], exact.twin[half[inner]]
+    at_vertex = np.flatnonzero((found.sides >= CORNER) & (found.sides < INSIDE))
+    point = np.full(len(exact.mesh.vertices), -1)
+    point[flat[3 * found.faces[at_vertex] + found.sides[at_vertex] - CORNER]] = at_vertex
+    for fan in exact.fans:
+        fan = fan[point[flat[fan]] >= 0]
+        faces, i = fan // 3, fan % 3
+        own = corners[faces, i]
+        ends = corners[faces, (i + 1) % 3] - own, corners[faces, (i + 2) % 3] - own
+        add(point[flat[fan]], fan, ends, own, exact.twin[3 * faces + (i + 1) % 3] < 0)
+    points, faces, places, directions, closed = (np.concatenate(each) for each in zip(*parts, strict=True))
+    order = np.argsort(points, kind="stable")
+    wedge, which = np.nonzero(directions[order] >= 0)
+    wedge = order[wedge]
+    is_boundary = np.zeros(len(found.entry), dtype=bool)
+    is_boundary[points[closed]] = True
+    start = np.concatenate([[0], np.cumsum(np.bincount(points[wedge], minlength=len(found.entry)))])
+    return Ports(start, faces[wedge], directions[wedge, which], places[wedge], is_boundary)
+
+
+def _directions(start: FloatArray, end: FloatArray, closed: BoolArray) -> IntArray:
+    """Return (w, 4) the directions from (w, 2) counterclockwise up to others, which count if closed; then -1.
+
+    The angle between is at most half a turn. Signs of differences and comparisons are exact.
+    """
+    x, y = start.T
+    d = np.select([(x > 0) & (y >= 0), y > 0, x < 0], [0, 1, 2], 3)
+    # One of x and y is not multiplied by 0, so the products are exact.
+    d = (d + (_cross(start, AXES[d]) != 0)) % 4
+    found = np.full((len(d), 4), -1)
+    goes_on = np.ones(len(d), dtype=bool)
+    for k in range(3):
+        along = AXES[d]
+        since, left = _cross(start, along), _cross(along, end)
+        is_last = closed & (left == 0)
+        goes_on &= np.where(
+            since > 0, (left > 0) | is_last, (since == 0) & ((dots(start, along) > 0) | is_last)
+        )
+        found[goes_on, k] = d[goes_on]
+        d = (d + 1) % 4
+    return found
+
+
+def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
+    return one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]

@@ -1,0 +1,181 @@
+"""A mesh of quads on a triangle mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import TriangleMesh
+from ...base import BoolArray, FloatArray, IntArray, dots, list_some, plural
+from ...errors import GridError
+from ...mesh import sort_pairs
+
+if TYPE_CHECKING:
+    from ..view.figures.compose import Row
+    from ..view.figures.kinds import Look
+
+
+@dataclass(frozen=True, eq=False)
+class QuadMesh:
+    """A manifold mesh of quads whose vertices lie on a triangle mesh.
+
+    Attributes:
+        vertices: (q, 3) positions, on the surface.
+        quads: (p, 4) vertex indices, oriented as the surface is.
+        faces: (q,) the triangle of the surface that each vertex lies in.
+        barycentric: (q, 3) where in it.
+        left_out: squares of the grid that were left out, as the boundary of the surface cuts them.
+        area_left_out: of the grid on the surface that is under no quad, in squares: beside boundaries that are not
+            on grid lines; negative, should a quad lie over a hole.
+        surface: the triangle mesh.
+        notes: what was done, and what falls short, one sentence each.
+        seconds: wall time of each stage; files do not keep it.
+    """
+
+    vertices: FloatArray
+    quads: IntArray
+    faces: IntArray
+    barycentric: FloatArray
+    left_out: int
+    area_left_out: float
+    surface: TriangleMesh
+    notes: tuple[str, ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def _edges(self) -> tuple[IntArray, IntArray]:
+        """Edges as vertex pairs (e, 2), the smaller index first, and the number of quads beside each (e,)."""
+        tails, heads = self.quads.ravel(), np.roll(self.quads, -1, axis=1).ravel()
+        order, first = sort_pairs(tails, heads, len(self.vertices))
+        pairs = np.sort(np.stack([tails, heads], axis=1)[order[first]], axis=1)
+        return pairs, np.diff(np.flatnonzero(np.append(first, True)))
+
+    @property
+    def edges(self) -> IntArray:
+        """(e, 2) vertex pairs, the smaller index first."""
+        return self._edges[0]
+
+    @property
+    def is_boundary_edge(self) -> BoolArray:
+        """(e,) True for edges with one quad."""
+        return self._edges[1] == 1
+
+    @cached_property
+    def is_boundary_vertex(self) -> BoolArray:
+        """(q,) True for vertices on the boundary."""
+        mask = np.zeros(len(self.vertices), dtype=bool)
+        mask[self.edges[self.is_boundary_edge]] = True
+        return mask
+
+    @cached_property
+    def triangle_corners(self) -> IntArray:
+        """(2p, 3) corners of quads, 4 q + i, of the two triangles on either side of each quad's shorter diagonal."""
+        corners = self.vertices[self.quads]
+        one, two = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+        turn = np.where(dots(one, one) <= dots(two, two), 0, 1)
+        rolled = 4 * np.arange(len(self.quads))[:, None] + (np.arange(4) + turn[:, None]) % 4
+        return rolled[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+
+    @property
+    def triangles(self) -> IntArray:
+        """(2p, 3) vertex indices of these triangles, those of each quad one after the other."""
+        return self.quads.ravel()[self.triangle_corners]
+
+    @cached_property
+    def valences(self) -> IntArray:
+        """(q,) the number of edges at each vertex."""
+        return np.bincount(self.edges.ravel(), minlength=len(self.vertices))
+
+    @property
+    def irregular(self) -> IntArray:
+        """(s,) the inner vertices whose valence is not 4."""
+        return np.flatnonzero((self.valences != 4) & ~self.is_boundary_vertex)
+
+    @property
+    def euler_characteristic(self) -> int:
+        """Vertices minus edges plus quads."""
+        return len(self.vertices) - len(self.edges) + len(self.quads)
+
+    @property
+    def surface_euler(self) -> int:
+        """That of the surface, which is the same unless squares were left out; vertices without a face do not count."""
+        return used_euler(self.surface)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the mesh as .obj, .ply, .glb or .npz, in full or not at all, and return the path; see `write_quads`.
+
+        Raises:
+            UnknownFormatError: the ending is another.
+            MeshFileError: the file cannot be written.
+        """
+        from .files import write_quads
+
+        return write_quads(path, self)
+
+    def figure_rows(self, look: Look) -> tuple[list[Row], list[Any]]:
+        """Return the rows of a figure of the kind "quads" by `make_figure`, and what its legend names."""
+        from ..view.figures.compose import Row
+        from .figure import draw_quads, irregular_handles
+
+        return [Row(look.views(self, draw_quads, faces=self.quads))], irregular_handles(self)
+
+    @staticmethod
+    def load(path: str | PathLike[str]) -> QuadMesh:
+        """Return a mesh that was saved as .npz, with the surface that it lies on.
+
+        Raises:
+            UnknownFormatError: the ending is another.
+            MeshFileError: the file is not there, may not be read, or holds no mesh of quads.
+        """
+        from .files import read_quads
+
+        return read_quads(path)
+
+
+def used_euler(mesh: TriangleMesh) -> int:
+    """Return the Euler characteristic of a mesh without the vertices that no face has."""
+    unused = len(mesh.vertices) - len(np.unique(mesh.faces))
+    return mesh.euler_characteristic - unused
+
+
+def require_manifold(quads: IntArray, vertex_count: int, edge_count: int) -> None:
+    """Raise GridError unless all quads have four vertices, and all edges a pair of vertices of their own.
+
+    Args:
+        quads: (p, 4) vertex indices.
+        vertex_count, edge_count: how many there are on the surface.
+    """
+    again = np.flatnonzero((np.diff(np.sort(quads, axis=1), axis=1) == 0).any(axis=1))
+    if len(again):
+        raise GridError(
+            f"{plural(len(again), 'quad')} of {len(quads):,} with a vertex twice ({list_some(again)}): the grid is too "
+            "coarse; ask for more quads"
+        )
+    _, first = sort_pairs(quads.ravel(), np.roll(quads, -1, axis=1).ravel(), vertex_count)
+    missing = edge_count - int(first.sum())
+    if missing:
+        raise GridError(
+            f"{plural(missing, 'edge')} of {edge_count:,} between vertices that have one already: the grid is too "
+            "coarse; ask for more quads"
+        )
+
+
+def least_jacobians(points: FloatArray, quads: IntArray) -> FloatArray:
+    """Return (p,) the least scaled Jacobian of each quad: sines of its angles, seen along the normal.
+
+    The normal is that of the two diagonals; 1 is a rectangle's, and below 0 a quad is turned over at a corner.
+    """
+    corners = points[quads]
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    normal /= np.maximum(np.sqrt(dots(normal, normal)), np.finfo(float).tiny)[:, None]
+    least = np.full(len(quads), np.inf)
+    for i in range(4):
+        a, b = corners[:, i - 1] - corners[:, i], corners[:, (i + 1) % 4] - corners[:, i]
+        scale = np.maximum(np.sqrt(dots(a, a) * dots(b, b)), np.finfo(float).tiny)
+        least = np.minimum(least, dots(np.cross(b, a), normal) / scale)
+    return least

@@ -1,0 +1,172 @@
+"""How good a quad mesh is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ... import TriangleMesh
+from ...base import FloatArray, dots
+from ...geometry import edge_lengths, surface_distances
+from .quad_mesh import QuadMesh, least_jacobians
+
+
+@dataclass(frozen=True)
+class QuadMeasures:
+    """Measures of a quad mesh.
+
+    Attributes:
+        vertices, quads: how many.
+        irregular: inner vertices whose valence is not 4.
+        irregular_valences: how many of each valence.
+        euler_characteristic: vertices minus edges plus quads.
+        surface_euler: that of the surface, which it is unless squares were left out.
+        boundary_edges: edges with one quad.
+        angle_mean, angle_p95, angle_max: of all corner angles, degrees off 90.
+        edge_mean, edge_cv: of edge lengths, the mean, and the standard deviation over it.
+        jacobian_mean, jacobian_min: of the least scaled Jacobian of each quad, 1 for rectangles; below 0 a quad is
+            turned over at a corner.
+        to_surface, from_surface: the largest distance from the quads to the surface and back, model units; see
+            `surface_gaps`.
+        hausdorff: the larger of both.
+        left_out, area_left_out: see `QuadMesh`.
+    """
+
+    vertices: int
+    quads: int
+    irregular: int
+    irregular_valences: dict[int, int]
+    euler_characteristic: int
+    surface_euler: int
+    boundary_edges: int
+    angle_mean: float
+    angle_p95: float
+    angle_max: float
+    edge_mean: float
+    edge_cv: float
+    jacobian_mean: float
+    jacobian_min: float
+    to_surface: float
+    from_surface: float
+    hausdorff: float
+    left_out: int
+    area_left_out: float
+
+    def report(self) -> dict[str, Any]:
+        """Return the measures by name, as JSON takes them."""
+        return asdict(self)
+
+    def rows(self) -> Iterator[tuple[str, str, str]]:
+        """Yield what people are told: measure, value, meaning."""
+        valences = ", ".join(f"{count:,} of {valence}" for valence, count in self.irregular_valences.items())
+        apart = self.hausdorff / self.edge_mean
+        holds = self.euler_characteristic == self.surface_euler
+        yield (
+            "quads",
+            f"{self.quads:,}",
+            f"Euler characteristic {self.euler_characteristic}, "
+            + ("as the surface" if holds else f"not {self.surface_euler} as the surface"),
+        )
+        yield (
+            "irregular",
+            f"{self.irregular:,}",
+            f"inner vertices of other valence than 4: {valences or 'none'}",
+        )
+        yield (
+            "off 90 deg",
+            f"{self.angle_mean:.2f}",
+            f"mean; 95% below {self.angle_p95:.1f}, worst {self.angle_max:.1f}",
+        )
+        yield (
+            "edge cv",
+            f"{self.edge_cv:.3f}",
+            f"standard deviation of edge lengths over their mean, {self.edge_mean:.4g}",
+        )
+        yield (
+            "Jacobian",
+            f"{self.jacobian_mean:.3f}",
+            f"scaled, mean of each quad's least; least {self.jacobian_min:.3f}",
+        )
+        yield (
+            "distance",
+            f"{self.hausdorff:.3g}",
+            f"from the surface and back, the largest of samples; {apart:.2f} edges",
+        )
+
+
+def measure_quads(quads: QuadMesh) -> QuadMeasures:
+    """Return the measures of a quad mesh on a surface."""
+    points = quads.vertices
+    off = np.abs(corner_angles_of(quads) - 90.0)
+    length = np.linalg.norm(points[quads.edges[:, 0]] - points[quads.edges[:, 1]], axis=1)
+    least = least_jacobians(points, quads.quads)
+    which, many = np.unique(quads.valences[quads.irregular], return_counts=True)
+    there, back = surface_gaps(quads)
+    return QuadMeasures(
+        vertices=len(points),
+        quads=len(quads.quads),
+        irregular=len(quads.irregular),
+        irregular_valences=dict(zip(which.tolist(), many.tolist(), strict=True)),
+        euler_characteristic=quads.euler_characteristic,
+        surface_euler=quads.surface_euler,
+        boundary_edges=int(quads.is_boundary_edge.sum()),
+        angle_mean=float(off.mean()),
+        angle_p95=float(np.percentile(off, 95)),
+        angle_max=float(off.max()),
+        edge_mean=float(length.mean()),
+        edge_cv=float(length.std() / length.mean()),
+        jacobian_mean=float(least.mean()),
+        jacobian_min=float(least.min()),
+        to_surface=there,
+        from_surface=back,
+        hausdorff=max(there, back),
+        left_out=quads.left_out,
+        area_left_out=quads.area_left_out,
+    )
+
+
+def corner_angles_of(quads: QuadMesh) -> FloatArray:
+    """Return (p, 4) the angles between the sides of quads, degrees."""
+    corners = quads.vertices[quads.quads]
+    one, two = np.roll(corners, 1, axis=1) - corners, np.roll(corners, -1, axis=1) - corners
+    scale = np.maximum(np.sqrt(dots(one, one) * dots(two, two)), np.finfo(float).tiny)
+    return np.degrees(np.arccos(np.clip(dots(one, two) / scale, -1.0, 1.0)))
+
+
+def surface_gaps(quads: QuadMesh) -> tuple[float, float]:
+    """Return the largest distances found from the quads to the surface, and from the surface to the quads.
+
+    Distances are exact, but measured at samples: at 5 x 5 points of the bilinear patch of each quad, and at points of
+    each triangle whose distances are half the mean edge of the quads at most. Distances to quads are those to their two
+    triangles on either side of the diagonal that is shorter.
+    """
+    mesh, corners = quads.surface, quads.vertices[quads.quads]
+    t = np.linspace(0.0, 1.0, 5)
+    u, v = (x.ravel() for x in np.meshgrid(t, t, indexing="ij"))
+    patch = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
+    # Corners are the same for several quads.
+    inner = np.einsum("si,pix->psx", patch[patch.max(axis=1) < 1], corners).reshape(-1, 3)
+    there = surface_distances(mesh.vertices, mesh.faces, np.concatenate([quads.vertices, inner]))
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    back = surface_distances(quads.vertices, quads.triangles, _samples(mesh, float(sides.mean()) / 2))
+    return float(there.max()), float(back.max())
+
+
+def _samples(mesh: TriangleMesh, apart: float, most: int = 64) -> FloatArray:
+    """Return (s, 3) points of triangles, those of each in rows so far apart at most, and their vertices.
+
+    most: rows in a triangle.
+    """
+    parts = [mesh.vertices[np.unique(mesh.faces)]]
+    longest = edge_lengths(mesh.vertices, mesh.faces).max(axis=1)
+    rows = np.minimum(np.ceil(longest / apart), most).astype(np.int64)
+    for count in np.unique(rows):
+        i, j = (x.ravel() for x in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
+        # Middles of the small triangles that stand upright.
+        u, v = ((x[i + j < count] + 1 / 3) / count for x in (i, j))
+        corners = mesh.vertices[mesh.faces[rows == count]]
+        parts.append(np.einsum("si,fix->fsx", np.stack([1 - u - v, u, v], axis=1), corners).reshape(-1, 3))
+    return np.concatenate(parts)

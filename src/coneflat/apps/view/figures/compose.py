@@ -1,0 +1,268 @@
+"""Figures of several panels in rows, each row with a card that explains its colours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ....errors import OptionError
+from ..quantity import Quantity
+from .cone_marks import check_dpi
+from .figure import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+class Inches:
+    """Lengths in figures."""
+
+    WIDTH = 7.0  # two columns of a journal
+    MARGIN, GAP = 0.08, 0.12
+    CARD, CARD_HEIGHT = 1.35, 1.4
+    TITLE, LABEL, LEGEND = 0.3, 0.22, 0.28
+    TICKS, LINE = 0.28, 0.135
+    SCALE_LEFT, SCALE_BELOW = 0.55, 0.42  # for the ticks and labels of a graph
+
+
+class Points:
+    """Sizes of text."""
+
+    TITLE, LABEL, SMALL = 10.0, 8.5, 7.5
+
+
+TEXT_COLOR = "#333333"
+
+MOST_PIXELS = 30e6
+"""Four samples to the pixel and 16 bytes to the sample are held for pictures: 2 GB."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A picture.
+
+    Attributes:
+        aspect: its width over its height.
+        draw: draws it.
+        label: to be written above it.
+        is_graph: whether it needs room for ticks and labels.
+    """
+
+    aspect: float
+    draw: Callable[[Axes], object]
+    label: str = ""
+    is_graph: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """Panels of one height, at most `tallest` inches, and the quantities that their colours show."""
+
+    panels: Sequence[Panel]
+    quantities: Sequence[Quantity] = ()
+    tallest: float = 4.5
+
+
+def compose(
+    rows: Sequence[Row],
+    *,
+    title: str = "",
+    marks: Sequence[Any] = (),
+    size: tuple[float, float] | None = None,
+    dpi: float = 300.0,
+    width: float = Inches.WIDTH,
+) -> Figure:
+    """Return a figure of rows of panels.
+
+    Args:
+        rows: from the top.
+        title: to be written at the top.
+        marks: what a legend of matplotlib takes, to be named at the bottom.
+        size: width and height in inches; None for what the panels need.
+        dpi: dots per inch.
+        width: the largest width in inches if the size is left open.
+
+    Raises:
+        OptionError: the size leaves no room for the panels or has too many pixels, or matplotlib is not installed.
+    """
+    above = [Inches.LABEL * any(panel.label for panel in row.panels) for row in rows]
+    fixed = (
+        Inches.TITLE * bool(title)
+        + Inches.LEGEND * bool(marks)
+        + sum(above)
+        + Inches.GAP * (len(rows) - 1)
+        + 2 * Inches.MARGIN
+    )
+    least = [max(Inches.CARD_HEIGHT * len(row.quantities), 0.3) for row in rows]
+    if size is None:
+        natural = [min(_room(row, width) / _aspect(row), row.tallest) for row in rows]
+        spare = min(_room(row, width) - h * _aspect(row) for row, h in zip(rows, natural, strict=True))
+        width = max(width - spare, _legend_width(marks))
+        heights = np.maximum(natural, least).tolist()
+        size = width, sum(heights) + fixed
+    else:
+        heights = [(size[1] - fixed) / len(rows)] * len(rows)
+        if heights[0] < max(least) or min(_room(row, size[0]) for row in rows) < 0.3:
+            raise OptionError(f"{size[0]:g} by {size[1]:g} inches leave no room for the pictures")
+    check_pixels(size, dpi)
+    figure = new_figure(*size, dpi=dpi)
+    from matplotlib import rc_context
+
+    _write(
+        figure,
+        Inches.MARGIN,
+        size[1] - Inches.TITLE / 2 - Inches.MARGIN / 2,
+        title,
+        room=size[0] - 2 * Inches.MARGIN,
+        size=Points.TITLE,
+        weight="bold",
+        va="center",
+    )
+    top = size[1] - Inches.MARGIN - Inches.TITLE * bool(title)
+    with rc_context({"font.size": Points.LABEL}):
+        for row, height, label in zip(rows, heights, above, strict=True):
+            top -= label + height
+            _draw_row(figure, row, top, height)
+            top -= Inches.GAP
+    if marks:
+        _draw_legend(figure, marks)
+    return figure
+
+
+def check_pixels(size: tuple[float, float], dpi: float) -> None:
+    """Raise OptionError if a figure of this size in inches cannot be drawn at this resolution."""
+    check_dpi(dpi)
+    pixels = size[0] * size[1] * dpi**2
+    if not 0 < min(size) <= pixels <= MOST_PIXELS:
+        raise OptionError(
+            f"{size[0]:g} by {size[1]:g} inches at {dpi:g} dots per inch are {pixels / 1e6:.0f} million pixels, of at "
+            f"most {MOST_PIXELS / 1e6:g} million: choose another size or fewer dots"
+        )
+
+
+def _room(row: Row, width: float) -> float:
+    """Return the width left for panels."""
+    return (
+        width
+        - 2 * Inches.MARGIN
+        - Inches.GAP * (len(row.panels) - 1)
+        - (Inches.CARD + Inches.GAP) * bool(row.quantities)
+    )
+
+
+def _aspect(row: Row) -> float:
+    return sum(panel.aspect for panel in row.panels)
+
+
+def _draw_row(figure: Figure, row: Row, floor: float, height: float) -> None:
+    width = figure.get_figwidth()
+    unit = _room(row, width) / _aspect(row)
+    left = Inches.MARGIN
+    for panel in row.panels:
+        room = unit * panel.aspect
+        _write(figure, left, floor + height + 0.05, panel.label, room=room, size=Points.LABEL, va="bottom")
+        x, y = (Inches.SCALE_LEFT, Inches.SCALE_BELOW) if panel.is_graph else (0.0, 0.0)
+        panel.draw(_add_axes(figure, left + x, floor + y, unit * panel.aspect - x, height - y))
+        left += unit * panel.aspect + Inches.GAP
+    share = height / max(len(row.quantities), 1)
+    for k, quantity in enumerate(row.quantities):
+        _draw_card(figure, quantity, left, floor + height - (k + 1) * share, share)
+
+
+def _draw_card(figure: Figure, quantity: Quantity, left: float, floor: float, height: float) -> None:
+    """Draw a quantity's colours, how often they are, and its percentiles."""
+    lines = [("median", 50), ("95% below", 95), ("99% below", 99), ("largest", 100)]
+    used = Inches.LABEL + Inches.TICKS + (len(lines) + 0.7) * Inches.LINE
+    graph = min(max(height - used, 0.25), 0.7)
+    top = floor + min(height, (height + used + graph) / 2)
+    _write(figure, left, top, quantity.label, room=Inches.CARD - 0.05, size=Points.LABEL, va="top")
+    draw_histogram(
+        _add_axes(figure, left + 0.05, top - Inches.LABEL - graph, Inches.CARD - 0.15, graph), quantity
+    )
+    for k, (name, percent) in enumerate(lines):
+        y = top - Inches.LABEL - graph - Inches.TICKS - k * Inches.LINE
+        _write(figure, left, y, name, size=Points.SMALL, va="top")
+        _write(
+            figure,
+            left + Inches.CARD - 0.05,
+            y,
+            quantity.text(percent),
+            size=Points.SMALL,
+            va="top",
+            ha="right",
+        )
+
+
+def draw_histogram(axes: Axes, quantity: Quantity) -> None:
+    """Draw how often a quantity has which value over its colour bar; what is beyond its ends counts there."""
+    from matplotlib import colormaps
+
+    values, weights = quantity.counted()
+    position = quantity.scale.position(values)
+    place = np.minimum((position * 36).astype(np.int64), 35)
+    share = np.bincount(place, weights, 36)
+    colors = colormaps[quantity.scale.colors](np.linspace(0.0, 1.0, 256))
+    axes.bar(
+        np.arange(36) / 36,
+        share / (share.max() or 1.0),
+        1.0 / 36,
+        align="edge",
+        color="#8d95a1",
+        zorder=1,
+    )
+    axes.imshow(colors[None], extent=(0.0, 1.0, -0.22, -0.04), aspect="auto", zorder=2)
+    axes.set(xlim=(0.0, 1.0), ylim=(-0.22, 1.02))
+    axes.set_yticks([])
+    at = quantity.scale.position(np.array([value for value, _ in quantity.scale.ticks]))
+    axes.set_xticks(at.tolist(), [text for _, text in quantity.scale.ticks])
+    axes.tick_params(labelsize=Points.SMALL, width=0.5, length=2.0, pad=1.5, colors=TEXT_COLOR)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+
+
+def _draw_legend(figure: Figure, marks: Sequence[Any]) -> None:
+    figure.legend(
+        handles=list(marks),
+        loc="lower left",
+        bbox_to_anchor=(0.0, 0.0),
+        ncols=len(marks),
+        frameon=False,
+        fontsize=Points.SMALL,
+        labelcolor=TEXT_COLOR,
+        handletextpad=0.4,
+        columnspacing=1.4,
+        borderpad=0.4,
+    )
+
+
+def _add_axes(figure: Figure, left: float, floor: float, width: float, height: float) -> Axes:
+    """Return axes in a box given in inches."""
+    wide, tall = figure.get_size_inches()
+    return figure.add_axes((left / wide, floor / tall, width / wide, height / tall))
+
+
+def _write(figure: Figure, x: float, y: float, text: str, room: float | None = None, **look: Any) -> None:
+    """Write text at a place given in inches, smaller where the room, inches, too, is too narrow for it."""
+    wide, tall = figure.get_size_inches()
+    if not text:
+        return
+    written = figure.text(
+        x / wide, y / tall, text, parse_math=False, **{"ha": "left", "color": TEXT_COLOR, **look}
+    )
+    if room is not None:
+        needed = written.get_window_extent().width / figure.dpi
+        written.set_fontsize(float(look["size"]) * min(1.0, room / needed))
+
+
+def text_width(text: str, size: float = Points.LABEL) -> float:
+    """Return about how wide a text is, inches; size: of the font, points."""
+    return len(text) * 0.6 * size / 72.0
+
+
+def _legend_width(marks: Sequence[Any]) -> float:
+    """Return about how wide a legend of marks is, inches."""
+    return sum(0.45 + text_width(str(mark.get_label()), Points.SMALL) for mark in marks)

@@ -1,0 +1,134 @@
+"""Cones and seams in pictures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ....base import FloatArray
+from ....errors import OptionError
+from .projection import MeshPicture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .... import Flattening
+
+SEAM_COLOR = "#1a1a1a"
+BOUNDARY_COLOR = "#7f8a99"
+HIDDEN_SEAM_COLOR = "#a9aeb6"
+POSITIVE_COLOR = "#d62222"
+NEGATIVE_COLOR = "#000000"
+HIDDEN_COLORS = {POSITIVE_COLOR: "#e6b3b4", NEGATIVE_COLOR: "#a3a5a9"}
+"""What cones look like through the model."""
+
+DOT_REACH = 0.01
+"""About the radius of a dot, as a share of the picture's longer side."""
+
+SEAM_WIDTH = 1.2
+"""Points."""
+
+
+def mark_scale(axes: Axes) -> float:
+    """Return the factor of line widths and dot areas that fits the axes' size, 1 in 360 points."""
+    box = axes.get_window_extent()
+    side = float(np.sqrt(box.width * box.height)) * 72.0 / axes.figure.dpi
+    return float(np.clip(side / 360.0, 0.15, 1.5))
+
+
+def cone_area(curvatures: FloatArray) -> FloatArray:
+    """Return the area of cones' dots in square points; small cones stay visible, large ones in bounds."""
+    return np.clip(60.0 * np.abs(curvatures) / (np.pi / 2), 15.0, 150.0)
+
+
+def draw_dots(
+    axes: Axes, points: FloatArray, curvatures: FloatArray, *, hidden: bool = False, share: float = 1.0
+) -> None:
+    """Draw cones as dots, red or black by the sign of their curvature and as large as its amount.
+
+    Args:
+        points: (k, 2) where, in the axes' coordinates.
+        curvatures: (k,) radians.
+        hidden: whether they are seen through the model.
+        share: factor of the dots' area.
+    """
+    if not len(points):
+        return
+    colors = [POSITIVE_COLOR if curvature > 0.0 else NEGATIVE_COLOR for curvature in curvatures.tolist()]
+    factor = share * mark_scale(axes)
+    axes.scatter(
+        points[:, 0],
+        points[:, 1],
+        s=factor * cone_area(curvatures),
+        c=[HIDDEN_COLORS[color] for color in colors] if hidden else colors,
+        edgecolors="none" if hidden else "white",
+        linewidths=0.7 * np.sqrt(factor),
+        zorder=3 if hidden else 6,
+        clip_on=False,
+        gid="hidden-cones" if hidden else "cones",
+    )
+
+
+def draw_seams_on_model(
+    axes: Axes, picture: MeshPicture, result: Flattening, *, through: bool = False
+) -> None:
+    """Draw the visible parts of the seams on a picture of the model; `through` it the others, too, but faintly."""
+    from matplotlib.collections import LineCollection
+
+    pieces, visible = picture.split_segments(*np.moveaxis(result.vertices[result.seams], 1, 0))
+    width = SEAM_WIDTH * np.sqrt(mark_scale(axes))
+    if through:
+        hidden = LineCollection(list(pieces[~visible]), colors=HIDDEN_SEAM_COLOR, linewidths=0.6 * width)
+        hidden.set(zorder=2, gid="hidden-seams", capstyle="round")
+        axes.add_collection(hidden)
+    lines = LineCollection(list(pieces[visible]), colors=SEAM_COLOR, linewidths=width)
+    lines.set(zorder=4, gid="seams", capstyle="round")
+    axes.add_collection(lines)
+
+
+def draw_cones_on_model(
+    axes: Axes, picture: MeshPicture, result: Flattening, *, through: bool = False
+) -> None:
+    """Draw the visible cones on a picture of the model; `through` it the others, too, but faintly."""
+    places, curvatures = result.vertices[result.cones], result.curvatures
+    points = picture.camera.project(places)[:, :2]
+    # A dot that reaches beyond an outline is not hidden.
+    visible = picture.visible_points(places, DOT_REACH * max(picture.camera.width, picture.camera.height))
+    if through:
+        draw_dots(axes, points[~visible], curvatures[~visible], hidden=True)
+    draw_dots(axes, points[visible], curvatures[visible])
+
+
+def mark_handles(result: Flattening, *, cones: bool = True, seams: bool = True) -> list[Any]:
+    """Return what a legend of matplotlib takes to name the marks that a result has."""
+    from matplotlib.lines import Line2D
+
+    diameter = float(np.sqrt(cone_area(np.array([np.pi / 2]))[0]))
+    dot: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": diameter, "markeredgecolor": "white"}
+    marks: list[Any] = []
+    if seams and len(result.seams):
+        marks.append(Line2D([], [], color=SEAM_COLOR, linewidth=SEAM_WIDTH, label="seam"))
+    if cones and np.any(result.curvatures > 0.0):
+        marks.append(Line2D([], [], color=POSITIVE_COLOR, label="positive cone", **dot))
+    if cones and np.any(result.curvatures < 0.0):
+        marks.append(Line2D([], [], color=NEGATIVE_COLOR, label="negative cone", **dot))
+    return marks
+
+
+def pixels_of(axes: Axes, dpi: float) -> tuple[int, int]:
+    """Return the width and height of the axes in pixels, at so many to the inch.
+
+    Raises:
+        OptionError: `dpi` is not between 10 and 2400.
+    """
+    check_dpi(dpi)
+    box = axes.get_window_extent()
+    factor = dpi / axes.figure.dpi
+    return max(round(box.width * factor), 1), max(round(box.height * factor), 1)
+
+
+def check_dpi(dpi: float) -> None:
+    """Raise OptionError if this is no resolution."""
+    if not 10 <= dpi <= 2400:
+        raise OptionError(f"the resolution must be between 10 and 2400 dots per inch, not {dpi:g}")

@@ -1,0 +1,260 @@
+"""Figures of a flattening, by kind, and the one that shows it at a glance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+import numpy as np
+
+from .... import ConeCurve
+from ....base import DISTORTION, IntArray, plural
+from ....base import shown as as_shown
+from ....errors import OptionError
+from ....io import CELLS, check_cells
+from ..from_uv import is_own
+from ..quantity import Quantity, check_color_map, conformal_distortion, curvature, stretch
+from .camera import Eye, eye_direction, view_aspect
+from .compose import Panel, Row, check_pixels, compose
+from .cone_marks import mark_handles
+from .model import (
+    DOTS_PER_INCH,
+    draw_checker,
+    draw_cone_curve,
+    draw_cones,
+    draw_curvature,
+    draw_quality,
+    draw_quantity,
+)
+from .uv_layout import draw_layout, fill_layout, layout_aspect
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .... import Flattening
+
+
+@dataclass(frozen=True)
+class Look:
+    """How to draw a figure.
+
+    Attributes:
+        size: width and height in inches; None for what the pictures need.
+        dpi: dots per inch of the pictures.
+        eyes: directions from the model to the eye, one for each view, see `draw_checker`.
+        up: the model's upward axis, "x", "y" or "z".
+        colors: a colour map of matplotlib for quality, color and curvature; None for their own.
+        cells: of the checkerboard, in a row that is as long as the root of the area.
+        color_charts: give the charts of the layout different colours.
+        own: numbers to be shown as colours, of the kind "color".
+        distortion: of the curve: the area distortion that is wanted.
+        title: to be written above all.
+
+    Raises:
+        OptionError: one of them makes no sense.
+    """
+
+    size: tuple[float, float] | None = None
+    dpi: float = DOTS_PER_INCH
+    eyes: Sequence[Eye] = ("front-right",)
+    up: str = "y"
+    colors: str | None = None
+    cells: float = CELLS
+    color_charts: bool = False
+    own: Quantity | None = None
+    distortion: float = DISTORTION
+    title: str = ""
+
+    def __post_init__(self) -> None:
+        if isinstance(self.eyes, str):
+            object.__setattr__(self, "eyes", (self.eyes,))
+        if not len(self.eyes):
+            raise OptionError("a figure of the model needs an eye to see it from")
+        for eye in self.eyes:
+            eye_direction(eye, self.up)
+        check_pixels((1.0, 1.0) if self.size is None else self.size, self.dpi)
+        check_cells(self.cells)
+        if self.colors is not None:
+            check_color_map(self.colors)
+
+    def views(
+        self,
+        result: Any,
+        draw: Callable[..., object],
+        label: str = "",
+        faces: IntArray | None = None,
+        **options: Any,
+    ) -> list[Panel]:
+        """Return a panel for each eye, in which a function draws the model; faces: if they are not its triangles."""
+        options |= {"up": self.up, "dpi": self.dpi}
+        vertices = result.vertices[np.unique(result.faces if faces is None else faces)]
+        return [
+            Panel(
+                view_aspect(vertices, eye, self.up),
+                partial(draw, result, eye=eye, **options),
+                label * (k == 0),
+            )
+            for k, eye in enumerate(self.eyes)
+        ]
+
+
+_Rows: TypeAlias = "tuple[list[Row], list[Any]]"
+
+
+class Quads(Protocol):
+    """A mesh that knows its figure of the kind "quads", as `QuadMesh` does."""
+
+    def figure_rows(self, look: Look) -> _Rows:
+        """Return the rows of the figure, and what its legend names."""
+
+
+def make_figure(shown: Flattening | ConeCurve | Quads, kind: str, **look: Any) -> Figure:
+    """Return a figure for print, which `save_figure` writes.
+
+    Args:
+        shown: the flattening; of the kind "curve" a `ConeCurve`, of the kind "quads" a `QuadMesh`.
+        kind: "layout": the charts in the unit square with cones. "checker": the model with a checkerboard through
+            its UVs. "quality": distortion of angles and of scale on the model and in the layout. "color": `own` numbers
+            there. "cones": the model with cones and seams. "curvature": angles missing around vertices, before and
+            after. "curve": area distortion against the number of cones. "quads": the edges of quads, and their
+            irregular vertices.
+        look: `size` in inches, `dpi`, `eyes` to see the model from and its axis `up`, `colors`, `cells` of the
+            checkerboard, `color_charts`, `own` numbers, `distortion` wanted, `title`: the attributes of
+            `coneflat.apps.view.Look`.
+
+    Raises:
+        OptionError: an option makes no sense, or matplotlib is not installed.
+    """
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise OptionError(f"unknown kind of figure {as_shown(kind)}: choose from {', '.join(KINDS)}")
+    is_curve, is_quads = isinstance(shown, ConeCurve), hasattr(shown, "figure_rows")
+    for name, fits, maker in (("curve", is_curve, "cone_curve"), ("quads", is_quads, "quads")):
+        if fits != (kind == name):
+            raise OptionError(
+                f"figures of the kind {name!r}, and no others, show what `coneflat.{maker}` returns"
+            )
+    if kind not in ("curve", "quads") and not hasattr(shown, "uv_faces"):
+        raise OptionError(f"a figure shows what `coneflat.flatten` returns, not {as_shown(shown)}")
+    chosen = Look(**look)
+    rows, marks = _ROWS[kind](shown, chosen)
+    return compose(rows, title=chosen.title, marks=marks, size=chosen.size, dpi=chosen.dpi)
+
+
+def _layout(result: Flattening, look: Look) -> _Rows:
+    panel = Panel(
+        layout_aspect(result, crop=False), partial(draw_layout, result, color_charts=look.color_charts)
+    )
+    return [Row([panel])], mark_handles(result, seams=False)
+
+
+def _checker(result: Flattening, look: Look) -> _Rows:
+    return [Row(look.views(result, draw_checker, cells=look.cells))], mark_handles(result, cones=False)
+
+
+def _cones(result: Flattening, look: Look) -> _Rows:
+    return [Row(look.views(result, draw_cones))], mark_handles(result)
+
+
+def _quality(result: Flattening, look: Look) -> _Rows:
+    rows = []
+    for measure, find in (("qc", conformal_distortion), ("scale", stretch)):
+        options: dict[str, Any] = {"measure": measure, "colors": look.colors}
+        layout = partial(draw_quality, result, on="layout", dpi=look.dpi, **options)
+        panels = [
+            *look.views(result, draw_quality, **options),
+            Panel(layout_aspect(result, crop=True), layout),
+        ]
+        rows.append(Row(panels, [find(result).recolored(look.colors)]))
+    return rows, []
+
+
+def _color(result: Flattening, look: Look) -> _Rows:
+    if look.own is None:
+        raise OptionError("a figure of the kind 'color' shows numbers: give `own`")
+    own = look.own.recolored(look.colors)
+
+    def on_model(result: Flattening, axes: Axes, **more: Any) -> None:
+        draw_quantity(axes, result, own, **more)
+
+    def in_layout(axes: Axes) -> None:
+        fill_layout(axes, result, own, look.dpi)
+
+    layout = Panel(layout_aspect(result, crop=True), in_layout)
+    return [Row([*look.views(result, on_model), layout], [own])], []
+
+
+def _curvature(result: Flattening, look: Look) -> _Rows:
+    rows = []
+    for flat, label in ((False, "On the model"), (True, "After flattening")):
+        panels = look.views(result, draw_curvature, label, flat=flat, colors=look.colors)
+        rows.append(Row(panels, [curvature(result, flat).recolored(look.colors)]))
+    if len(look.eyes) == 1:
+        before, after = rows
+        rows = [Row([*before.panels, *after.panels], [*before.quantities, *after.quantities])]
+    return rows, mark_handles(result, seams=False)
+
+
+def _curve(curve: ConeCurve, look: Look) -> _Rows:
+    panel = Panel(1.6, partial(draw_cone_curve, curve, distortion=look.distortion), is_graph=True)
+    return [Row([panel], tallest=3.2)], []
+
+
+def _quads(quads: Quads, look: Look) -> _Rows:
+    return quads.figure_rows(look)
+
+
+_ROWS: dict[str, Callable[[Any, Look], _Rows]] = {
+    "layout": _layout,
+    "checker": _checker,
+    "quality": _quality,
+    "cones": _cones,
+    "curvature": _curvature,
+    "color": _color,
+    "curve": _curve,
+    "quads": _quads,
+}
+
+KINDS = tuple(_ROWS)
+
+
+def demo_figure(result: Flattening, *, up: str = "y", dpi: float = 220.0) -> Figure:
+    """Return a figure of a flattening: the textured model, its layout, its distortion from two sides.
+
+    Args:
+        result: the flattening.
+        up: the model's upward axis, "x", "y" or "z".
+        dpi: dots per inch.
+
+    Raises:
+        OptionError: matplotlib is not installed, or `up` names no axis.
+    """
+    front, back = "front-right", "back-left"
+    vertices = result.vertices[np.unique(result.faces)]
+    checker = partial(draw_checker, result, up=up, cones=True, dpi=dpi)
+    distortion = partial(draw_quality, result, up=up, dpi=dpi)
+    panels = [
+        Panel(view_aspect(vertices, front, up), checker, "Model, textured by its UVs"),
+        Panel(layout_aspect(result, crop=True), partial(draw_layout, result, crop=True), "UV layout"),
+        Panel(view_aspect(vertices, front, up), partial(distortion, eye=front), "Distortion, front and back"),
+        Panel(view_aspect(vertices, back, up), partial(distortion, eye=back)),
+    ]
+    rows = [Row(panels, [conformal_distortion(result)])]
+    return compose(rows, title=title(result), marks=mark_handles(result), dpi=dpi, width=10.0)
+
+
+def title(result: Flattening) -> str:
+    """Return the line of key numbers."""
+    measures = result.distortion
+    parts = [
+        plural(len(result.faces), "triangle"),
+        *([] if is_own(result) else [plural(len(result.cones), "cone")]),
+        f"QC mean {measures.qc_mean:.4f}",
+        f"{measures.flipped:,} flipped",
+        f"seam length {measures.seam_length:.2f} √area",
+    ]
+    source = getattr(result, "source", None)
+    name = [source.path.name] if source is not None else []
+    return "  ·  ".join(name + parts)

@@ -1,0 +1,230 @@
+"""Drawing the layout."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .... import TriangleMesh
+from ....base import FloatArray, IntArray
+from ....mesh import end_corners, label_components, label_faces
+from ..quantity import Quantity
+from .cone_marks import BOUNDARY_COLOR, SEAM_COLOR, draw_dots, mark_scale, pixels_of
+from .projection import render_mesh
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.path import Path
+
+    from .... import Flattening
+
+MOST_EDGES_DRAWN = 40_000
+"""Triangles above which a layout is filled without its inner edges: they would turn it grey."""
+
+CHART_COLOR = "#e3e9f1"
+CHART_COLORS = ("#cfe3f3", "#fbe3c4", "#cdeade", "#f6dbe9", "#fbf6c4", "#d8d4ea", "#f7d3c4", "#dddddd")
+"""Tints of the colours of Okabe and Ito, which are told apart without red or green."""
+EDGE_COLOR = "#9fadc0"
+FRAME_COLOR = "#b8bcc2"
+
+
+def draw_layout(
+    result: Flattening,
+    axes: Axes,
+    *,
+    color_charts: bool = False,
+    edges: bool = True,
+    cones: bool = True,
+    crop: bool = False,
+) -> None:
+    """Draw the charts in the unit square: filled polygons, their triangles' edges, and the cones.
+
+    Outlines and edges are lines and polygons, not pixels, in formats that have them; seams are black, and the model's
+    own boundary is grey. Above 40,000 triangles inner
+    edges are left out. Cones are red where their curvature is positive and black where it is negative, with a dot at
+    each of their points and an area that grows with the curvature.
+
+    Args:
+        result: the flattening.
+        axes: matplotlib axes to draw in; their own lines and ticks are turned off.
+        color_charts: give the charts different colours.
+        edges: draw the triangles' edges.
+        cones: mark the cones.
+        crop: show the charts alone, not all of the unit square, or of the tiles of several textures.
+    """
+    from matplotlib.patches import PathPatch
+
+    scale = np.sqrt(mark_scale(axes))
+    paths = chart_paths(result.uv, result.uv_faces)
+    for k, path in enumerate(paths):
+        fill = CHART_COLORS[k % len(CHART_COLORS)] if color_charts else CHART_COLOR
+        chart = PathPatch(path, facecolor=fill, edgecolor="none", zorder=0)
+        chart.set_gid(f"chart-{k + 1}")
+        axes.add_patch(chart)
+    if edges and len(result.faces) <= MOST_EDGES_DRAWN:
+        mesh = TriangleMesh(result.uv, result.uv_faces)
+        inner = result.uv[mesh.edges[~mesh.is_boundary_edge]]
+        _draw_segments(axes, inner, "edges", color=EDGE_COLOR, width=0.2 * scale, zorder=1)
+    draw_outlines(axes, result, paths, 0.8 * scale)
+    if not crop:
+        _draw_tiles(axes, layout_tiles(result))
+    if cones:
+        vertex, point = layout_cones(result)
+        curvature = dict(zip(result.cones.tolist(), result.curvatures.tolist(), strict=True))
+        values = np.array([curvature[v] for v in vertex.tolist()])
+        draw_dots(axes, result.uv[point], values, share=0.6)
+    frame_layout(axes, result, crop)
+
+
+def fill_layout(axes: Axes, result: Flattening, quantity: Quantity, dpi: float) -> None:
+    """Draw the layout coloured by a quantity, as a picture with outlines that are lines."""
+    flat = np.column_stack([result.uv, np.zeros(len(result.uv))])
+    picture = render_mesh(
+        flat,
+        result.uv_faces,
+        size=pixels_of(axes, dpi),
+        eye=(0.0, 0.0, 1.0),
+        colors=quantity.colors(),
+        contrast=0.0,
+    )
+    camera = picture.camera
+    width, height = camera.width / camera.scale / 2, camera.height / camera.scale / 2
+    x, y = camera.centre[:2]
+    axes.imshow(
+        picture.image, extent=(x - width, x + width, y - height, y + height), interpolation="antialiased"
+    )
+    paths = chart_paths(result.uv, result.uv_faces)
+    draw_outlines(axes, result, paths, 0.5 * np.sqrt(mark_scale(axes)))
+    frame_layout(axes, result, crop=True)
+
+
+def draw_outlines(axes: Axes, result: Flattening, paths: list[Path], width: float) -> None:
+    """Draw the borders of the charts, lines of so many points; where the model itself ends they are lighter."""
+    from matplotlib.patches import PathPatch
+
+    for path in paths:
+        line = PathPatch(path, fill=False, edgecolor=SEAM_COLOR, linewidth=width, joinstyle="round", zorder=2)
+        axes.add_patch(line)
+    model = TriangleMesh(result.vertices, result.faces)
+    ends = boundary_ends(result, model.edge_halfedges[model.is_boundary_edge, 0])
+    _draw_segments(axes, ends, "boundary", color=BOUNDARY_COLOR, width=1.2 * width, zorder=2.5)
+
+
+def boundary_ends(result: Flattening, sides: IntArray) -> FloatArray:
+    """Return the (k, 2, 2) end points in the layout of half-edges (k,) of the model."""
+    corners = result.uv_faces.ravel()
+    return result.uv[np.stack([corners[end] for end in end_corners(sides)], axis=1)]
+
+
+def frame_layout(axes: Axes, result: Flattening, crop: bool) -> None:
+    """Set the axes' limits: around the charts, or around the unit square, or its like for each texture."""
+    low, high = layout_box(result, crop)
+    margin = 0.02 * max(high - low)
+    axes.set_xlim(low[0] - margin, high[0] + margin)
+    axes.set_ylim(low[1] - margin, high[1] + margin)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
+def layout_tiles(result: Flattening) -> FloatArray:
+    """Return the (k, 2) lower left corners of the unit squares that hold charts: one, or those of several textures.
+
+    A chart may reach out of its square, if others made it.
+    """
+    count, chart = label_faces(result.uv_faces, len(result.uv))
+    size = np.maximum(np.bincount(chart, minlength=count), 1)
+    points = result.uv[result.uv_faces].mean(axis=1)
+    middles = [np.bincount(chart, points[:, k], minlength=count) / size for k in (0, 1)]
+    return np.unique(np.floor(np.stack(middles, axis=1)[chart]), axis=0)
+
+
+def layout_box(result: Flattening, crop: bool) -> tuple[FloatArray, FloatArray]:
+    """Return the (2,) lower left and upper right corners of the box around the charts, or around whole tiles, too."""
+    used = result.uv[np.unique(result.uv_faces)]
+    if not crop:
+        tiles = layout_tiles(result)
+        used = np.concatenate([tiles, tiles + 1, used])
+    return used.min(axis=0), used.max(axis=0)
+
+
+def layout_aspect(result: Flattening, crop: bool) -> float:
+    """Return the width of this box over its height, at least 1/4 and at most 4."""
+    low, high = layout_box(result, crop)
+    width, height = high - low
+    return float(np.clip(width / max(height, np.finfo(np.float64).tiny), 0.25, 4.0))
+
+
+def chart_paths(uv: FloatArray, uv_faces: IntArray) -> list[Path]:
+    """Return a path of matplotlib for each chart: its closed outline, and those of its holes."""
+    from matplotlib.path import Path
+
+    points = np.unique(uv_faces)
+    sides = np.concatenate([uv_faces[:, [0, 1]], uv_faces[:, [1, 2]]])
+    chart = label_components(len(uv), sides[:, 0], sides[:, 1])[1]
+    number = np.unique(chart[points], return_inverse=True)[1]
+    chart[points] = number.ravel()
+    outlines: list[list[Path]] = [[] for _ in range(int(number.max()) + 1)]
+    for loop in outline_loops(uv, uv_faces):
+        corners = uv[[*loop, loop[0]]]
+        outlines[chart[loop[0]]].append(Path(corners, closed=True))
+    return [Path.make_compound_path(*loops) for loops in outlines]
+
+
+def outline_loops(uv: FloatArray, uv_faces: IntArray) -> list[list[int]]:
+    """Return the points of every closed curve in which charts end, in order; a chart is to the left of its own."""
+    mesh = TriangleMesh(uv, uv_faces)
+    sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
+    tails, heads = mesh.tails[sides], mesh.heads[sides]
+    following = np.empty_like(sides)
+    # Where curves touch, as many sides arrive at a point as leave it, and any of these may come next.
+    following[np.argsort(heads, kind="stable")] = np.argsort(tails, kind="stable")
+    seen = np.zeros(len(sides), dtype=bool)
+    loops = []
+    for first in range(len(sides)):
+        loop, side = [], first
+        while not seen[side]:
+            seen[side] = True
+            loop.append(int(tails[side]))
+            side = int(following[side])
+        if loop:
+            loops.append(loop)
+    return loops
+
+
+def layout_cones(result: Flattening) -> tuple[IntArray, IntArray]:
+    """Return the cones' vertices and layout points, one pair for every point that a cone has there."""
+    at_cone = np.isin(result.faces, result.cones)
+    pairs = np.column_stack([result.faces[at_cone], result.uv_faces[at_cone]])
+    vertex, point = np.unique(pairs, axis=0).reshape(-1, 2).T
+    return vertex, point
+
+
+def _draw_tiles(axes: Axes, tiles: FloatArray) -> None:
+    """Draw the frames of textures, with their UDIM numbers if there are several."""
+    from matplotlib.patches import Rectangle
+
+    for u, v in tiles.tolist():
+        axes.add_patch(Rectangle((u, v), 1, 1, fill=False, edgecolor=FRAME_COLOR, linewidth=0.5, zorder=-1))
+        if len(tiles) > 1:
+            axes.text(
+                u + 0.02, v + 0.98, f"{1001 + u + 10 * v:.0f}", color=FRAME_COLOR, va="top", size="small"
+            )
+
+
+def _draw_segments(
+    axes: Axes, ends: FloatArray, name: str, *, color: str, width: float, zorder: float
+) -> None:
+    """Draw line segments (k, 2, 2), thousands as one path: a path each would make files several times as large."""
+    from matplotlib.collections import PathCollection
+    from matplotlib.path import Path
+
+    paths = []
+    for start in range(0, len(ends), 4000):
+        points = ends[start : start + 4000].reshape(-1, 2)
+        path = Path(points, np.tile(np.array([Path.MOVETO, Path.LINETO], dtype=np.uint8), len(points) // 2))
+        path.should_simplify = False
+        paths.append(path)
+    lines = PathCollection(paths, facecolors="none", edgecolors=color, linewidths=width, zorder=zorder)
+    lines.set(gid=name, capstyle="round")
+    axes.add_collection(lines)

@@ -1,0 +1,61 @@
+"""Arrays, compiled loops, threads, progress and messages: what every package uses.
+
+What needs NumPy or numba is imported on first use: the commands print their help without them.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from .defaults import DISTORTION, MAX_CONE_ANGLE, MIN_CONE_ANGLE, MOST_CONES
+from .progress import Progress, Stopwatch, asking
+from .text import list_some, off_by, plural, printable, shown
+from .threads import THREADS, using_threads
+
+if TYPE_CHECKING:
+    from .arrays import BoolArray, ComplexArray, FloatArray, IntArray, dots, unit_exponent
+    from .compiled import compiled
+
+__all__ = [
+    "unit_exponent",
+    "BoolArray",
+    "ComplexArray",
+    "DISTORTION",
+    "FloatArray",
+    "IntArray",
+    "MAX_CONE_ANGLE",
+    "MIN_CONE_ANGLE",
+    "MOST_CONES",
+    "Progress",
+    "Stopwatch",
+    "THREADS",
+    "asking",
+    "compiled",
+    "dots",
+    "list_some",
+    "off_by",
+    "plural",
+    "printable",
+    "shown",
+    "using_threads",
+]
+
+
+class _Package(ModuleType):
+    """The package: `coneflat.base.compiled` is the decorator also after the module of that name is imported."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name == "compiled" and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__:
+        return getattr(import_module("." + ("compiled" if name == "compiled" else "arrays"), __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

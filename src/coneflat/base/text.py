@@ -1,0 +1,48 @@
+"""Small helpers for messages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from itertools import islice
+
+# Elements of an array, and characters of anything, that a message shows.
+FEW_SHOWN, MOST_SHOWN = 4, 80
+MOST_LISTED = 5
+
+
+def plural(count: int, noun: str, nouns: str | None = None) -> str:
+    """Return "1 cone", "2 cones"."""
+    return f"{count:,} {noun if count == 1 else nouns or noun + 's'}"
+
+
+def list_some(items: Iterable[object], total: int | None = None) -> str:
+    """Return the first few items, and dots if there are more."""
+    shown = list(islice(iter(items), MOST_LISTED + 1))
+    more = len(shown) > MOST_LISTED or (total is not None and total > MOST_LISTED)
+    return ", ".join(str(item) for item in shown[:MOST_LISTED]) + (", ..." if more else "")
+
+
+def printable(text: str) -> str:
+    """Return a text that can be written as UTF-8: bytes of file names that cannot become \\udcff, say."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def shown(value: object) -> str:
+    """Return what a message says of a value of any kind: one short line."""
+    import numpy as np  # Commands that only print their help need none.
+
+    if isinstance(value, np.ndarray) and value.size > FEW_SHOWN:
+        return f"an array of shape {value.shape} and type {value.dtype}"
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # Whatever a foreign class does there.
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
+
+
+def off_by(residual: float, unit: str = " rad") -> str:
+    """Return the part of a message that says by how much something is missed."""
+    if not math.isfinite(residual):
+        return "off by more than double precision can hold"
+    return f"off by {residual:.2g}{unit}"

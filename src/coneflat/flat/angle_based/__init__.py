@@ -1,1 +1,0 @@
-"""Angle based flattening, linear and to the end."""

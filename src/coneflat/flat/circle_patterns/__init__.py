@@ -1,1 +1,0 @@
-"""Circle patterns: the flat metric of circles that meet at given angles."""

@@ -1,1 +1,0 @@
-"""The exact method: a discretely conformal metric of given curvatures, found by Newton's method with edge flips."""

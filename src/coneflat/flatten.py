@@ -1,0 +1,272 @@
+"""Flattening: cones, target curvatures, scaling, cutting, layout (Section 4 of the paper)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .atlas import separate_overlaps
+from .base.arrays import FloatArray, IntArray
+from .base.progress import Stopwatch
+from .base.text import plural
+from .base.threads import concurrently, using_threads
+from .cones import close_search, find_cones
+from .errors import CurvatureError, MetricError, SeamError
+from .evaluate import evaluate
+from .geometry.operators import weighted_areas
+from .geometry.overlap import NOT_LOOKED_FOR
+from .io.input_mesh import as_input
+from .layout import free_seams, lay_out, relax_layouts
+from .mesh.connectivity import TriangleMesh
+from .metric import find_metric, loop_rotations
+from .options import Options, read_options, takes
+from .result import Flattening
+from .seams import cut_to_disk, seam_costs
+from .source.copies import Copy, copied, find_copies
+from .source.parts import Part, Source
+from .stages import ConeSolution, ConeSpec, FlatMetric, Layout, MetricSpec, RelaxSpec, Surface
+
+#: Takes the first layout that there is.
+Early: TypeAlias = Callable[[Flattening], object]
+#: Returns a connected mesh with the operators of its (m, 3) lengths, on flips of edges if a metric may make them.
+SurfaceOf: TypeAlias = Callable[[TriangleMesh, FloatArray, bool], Surface]
+#: Returns the flat metric of a connected mesh for its cones.
+FindMetric: TypeAlias = Callable[[Surface, ConeSolution, MetricSpec], FlatMetric]
+
+# Searches for cones at most, if some of them are too wide for the triangles around.
+MAX_SEARCHES = 4
+# Radians by which such a cone misses its angle: a full turn, less what rounding and untangled neighbours make.
+INFEASIBLE_ERROR = 1.0
+# A log scale that varies by less is constant: the surface is a polyhedron, which opens along its edges.
+CONSTANT_SCALE = 1e-9
+# Parts of at most so many triangles are relaxed together, as one mesh of about so many: 13% of the time of 60 spheres
+# of 320 triangles.
+SMALL_TRIANGLES, GROUP_TRIANGLES = 500, 40_000
+# Share of the work until there are layouts; the rest relaxes and separates them.
+LAYING_OUT, FINISHING = 0.8, 0.2
+
+
+@takes(Options)
+def flatten(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flattening:
+    """Flatten a triangle mesh of any topology conformally, one disk or a few charts per connected component.
+
+    Args:
+        mesh: vertices (n, 3) if `faces` is given; else a path, a `MeshFile`, a pair (vertices, faces), or
+            a mesh of trimesh, meshio or pyvista.
+        faces: (m, 3) vertex indices from 0. Options that name vertices name the input's.
+        options: see below.
+
+    Raises:
+        MeshError: the mesh cannot be flattened; see `coneflat.errors` for its kinds.
+        CurvatureError: no metric has the curvatures asked for.
+        OptionError: an option makes no sense.
+        SeamError: every set of seams needs forbidden edges.
+        MetricError: the computation found no finite result.
+        TooLargeError: it does not fit into the memory that is free.
+    """
+    return flatten_source(Source(as_input(mesh, faces)), read_options(options))
+
+
+@dataclass(frozen=True)
+class Method:
+    """How the parts of a mesh are flattened.
+
+    Attributes:
+        relax: which triangles are relaxed.
+        separates: overlaps are separated into charts.
+        quantum: seams turn by multiples of it, radians; None for any rotation.
+        watch: the stopwatch.
+        surface_of, find_metric: the two steps that callers may replace.
+    """
+
+    relax: RelaxSpec
+    separates: bool
+    quantum: float | None
+    watch: Stopwatch
+    surface_of: SurfaceOf
+    find_metric: FindMetric
+
+
+def flatten_source(
+    source: Source,
+    o: Options,
+    surface_of: SurfaceOf = Surface.of,
+    find_metric: FindMetric = find_metric,
+    early: Early | None = None,
+) -> Flattening:
+    """Flatten a mesh by options that have been parsed; see `flatten`.
+
+    Args:
+        source: the mesh.
+        o: the options.
+        surface_of: returns a part with the operators of its metric; they may be cached.
+        find_metric: returns the flat metric for the cones of a part.
+        early: called with the first layout: one chart for each part, before triangles are relaxed and overlaps are
+            separated; its overlaps are not measured.
+    """
+    watch = Stopwatch(o.progress)
+    with watch("check"):
+        prepared = source.prepared(o)
+    relax = RelaxSpec(o.relax if o.method == "exact" else "off", o.stretch)
+    method = Method(relax, o.charts == "atlas", o.quantise, watch, surface_of, find_metric)
+    with using_threads(o.threads):
+        copies = find_copies(prepared.parts)
+        own = {i: part for i, part in enumerate(prepared.parts) if copies[i] is None}
+        first = lay_out_parts(own, method)
+        if early is not None:
+            every = _with_copies(first, prepared.parts, copies)
+            early(evaluate(prepared, every, replace(o, charts="one"), Stopwatch(), NOT_LOOKED_FOR))
+        finished = finish_parts(own, first, method)
+        # Notes may name vertices, so that copies need their own.
+        told = {i: prepared.parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
+        finished |= finish_parts(told, lay_out_parts(told, method), method)
+    return evaluate(prepared, _with_copies(finished, prepared.parts, copies), o, watch)
+
+
+def lay_out_parts(parts: Mapping[int, Part], method: Method) -> dict[int, Layout]:
+    """Return each part laid out in one chart."""
+    layouts = {}
+    for i, part in parts.items():
+        with _at(part, parts, method.watch, LAYING_OUT):
+            layouts[i] = lay_out_part(part, method)
+    return layouts
+
+
+def lay_out_part(part: Part, method: Method) -> Layout:
+    """Return a part laid out in one chart.
+
+    Triangles may have no room for the angle of a cone, which is known after the layout. Then other cones are searched:
+    each search forbids the cones that were infeasible in those before. It may find more of them before it finds none,
+    so that the best layout is taken.
+    """
+    with method.watch("cones", 0.1):
+        surface = method.surface_of(part.mesh, part.lengths, part.may_flip)
+    best, wanted = None, part.cones
+    for _ in range(MAX_SEARCHES):
+        tried, was_searched = lay_out_once(surface, part, wanted, method)
+        best = tried if best is None or _shortfall(tried) < _shortfall(best) else best
+        infeasible = infeasible_cones(tried)
+        if not (was_searched and part.may_flip and len(infeasible)):
+            break
+        wanted = wanted.without(infeasible)
+    close_search(surface)
+    assert best is not None
+    return best
+
+
+def lay_out_once(surface: Surface, part: Part, wanted: ConeSpec, method: Method) -> tuple[Layout, bool]:
+    """Return a part laid out with the cones found for it, and whether they were searched."""
+    watch, mesh = method.watch, part.mesh
+    with watch("cones", 0.5):
+        holonomy = None if wanted.quantum is None else loop_rotations(surface, part.metric)
+        cones = find_cones(surface, wanted, watch, holonomy)
+        is_polyhedron = bool(np.ptp(cones.log_scale) < CONSTANT_SCALE)
+        costs = seam_costs(mesh, part.lengths, part.seams, is_polyhedron)
+    # The cut depends on the cones alone: 9% of the time of 97,000 triangles on two threads, 10% of 29,000.
+    cutting = partial(cut_to_disk, mesh, cones.cones, costs, part.seams)
+    with concurrently(cutting, len(mesh.faces)) as cut:
+        with watch("metric", 0.8):
+            metric = method.find_metric(surface, cones, part.metric)
+        with watch("cut", 0.9):
+            disk = cut.result()
+    with watch("layout", 1.0):
+        areas = weighted_areas(surface.areas, part.cones.weights)
+        layout = lay_out(metric, disk).with_area_distortion(cones.log_scale, areas)
+    return layout.with_notes(*cones.notes), cones.is_searched
+
+
+def finish_parts(
+    parts: Mapping[int, Part], layouts: Mapping[int, Layout], method: Method
+) -> dict[int, Layout]:
+    """Return layouts relaxed, without inverted triangles, and without overlaps if charts are to have none."""
+    watch, finished = method.watch, dict[int, Layout]()
+    for group in _groups(parts, method.relax):
+        watch.share = 0.0
+        with watch("relax"):
+            weights = [parts[i].cones.weights for i in group]
+            relaxed = relax_layouts([layouts[i] for i in group], weights, method.relax, watch.tell)
+        for i, layout in zip(group, relaxed, strict=True):
+            with _at(parts[i], parts, watch, FINISHING):
+                finished[i] = finish_part(parts[i], layout, method)
+    return finished
+
+
+def finish_part(part: Part, layout: Layout, method: Method) -> Layout:
+    """Return a relaxed layout without inverted triangles, and without overlaps if charts are to have none."""
+    if part.may_flip:
+        with method.watch("relax", 0.2):
+            names, stretch = part.cones.names, method.relax.stretch
+            layout = free_seams(layout, part.cones.weights, names, stretch, method.quantum)
+        layout = layout.with_notes(*_infeasible_notes(layout, part))
+    if method.separates:
+        with method.watch("atlas", 1.0):
+            layout = separate_overlaps(layout, seam_costs(part.mesh, part.lengths, part.seams), part.seams)
+    return layout
+
+
+def infeasible_cones(layout: Layout) -> IntArray:
+    """Return the cones that the triangles around them have no room for, each having an angle below pi."""
+    error = (layout.target - layout.curvature)[layout.cones]
+    return layout.cones[np.abs(error) > INFEASIBLE_ERROR]
+
+
+def _shortfall(layout: Layout) -> tuple[int, int]:
+    """Return how many wishes are unmet, and how many cones are infeasible."""
+    return len(layout.notes), len(infeasible_cones(layout))
+
+
+def _infeasible_notes(layout: Layout, part: Part) -> Iterator[str]:
+    infeasible = infeasible_cones(layout)
+    if len(infeasible):
+        angle = 2 - layout.target[infeasible[0]] / np.pi
+        yield (
+            f"{plural(len(infeasible), 'cone')} too wide for the triangles around: that at vertex "
+            f"{part.cones.names[infeasible[0]]} has an angle of {angle:.3g} pi. Choose others, or refine the mesh."
+        )
+
+
+def _with_copies(
+    known: Mapping[int, Layout], parts: Sequence[Part], copies: Sequence[Copy | None]
+) -> list[Layout]:
+    """Return the layouts of all parts, those that are not known as copies."""
+    return [
+        copied(known[copy.first], parts[i], copy.scale) if copy and i not in known else known[i]
+        for i, copy in enumerate(copies)
+    ]
+
+
+def _groups(parts: Mapping[int, Part], relax: RelaxSpec) -> list[list[int]]:
+    """Return the numbers of the parts, those together that are relaxed at the same time: small ones."""
+    groups: list[list[int]] = []
+    small: list[int] = []
+    room = 0
+    for i, part in parts.items():
+        size = len(part.faces)
+        if relax.is_off or size > SMALL_TRIANGLES:
+            groups.append([i])
+            continue
+        if room < size:
+            groups.append(small := [])
+            room = GROUP_TRIANGLES
+        small.append(i)
+        room -= size
+    return groups
+
+
+@contextmanager
+def _at(part: Part, parts: Mapping[int, Part], watch: Stopwatch, portion: float) -> Iterator[None]:
+    """Do a portion of the work on a part inside; errors say which part it is, if there are several."""
+    watch.share = portion * len(part.faces) / sum(len(each.faces) for each in parts.values())
+    try:
+        yield
+    except (CurvatureError, MetricError, SeamError) as error:
+        if len(parts) == 1:
+            raise
+        raise type(error)(f"{part.where}: {error}") from error
+    watch.end_part()

@@ -1,1 +1,0 @@
-"""What comes in: meshes, what must hold for them, and what is asked of their vertices and edges."""

@@ -1,0 +1,78 @@
+"""Reading meshes from files, and writing flattened meshes to them."""
+
+from .archive import CheckedArrays, number, read_archive
+from .atomic import (
+    as_path,
+    atomic_write,
+    check_target,
+    checked_target,
+    known_ending,
+    make_folder,
+    remove_unfinished,
+)
+from .checker import CELLS, DARK_CELL, LIGHT_CELL, cell_side, check_cells
+from .gltf.glb import FOR_INDICES, FOR_VERTICES, MATERIAL, Glb, bounds
+from .input_mesh import as_input
+from .join import Joined
+from .mapped import Mapped, as_mapped, has_uv, of_file
+from .normals import shading_normals
+from .npz import read_flattening
+from .obj import parse_obj
+from .obj_write import lines_of
+from .ply_write import write_parts
+from .raw import PIPE, read_bytes
+from .read import INPUT_FORMATS, find_meshes, read_joined, read_mesh, read_mesh_from
+from .texture import Texture, read_picture
+from .uv_split import split_at_seams
+from .write import OUTPUT_FORMATS, check_output, write_flattening, write_measured, write_stream
+from .written import as_written
+
+__all__ = [
+    "of_file",
+    "CELLS",
+    "CheckedArrays",
+    "DARK_CELL",
+    "FOR_INDICES",
+    "FOR_VERTICES",
+    "Glb",
+    "INPUT_FORMATS",
+    "Joined",
+    "LIGHT_CELL",
+    "MATERIAL",
+    "Mapped",
+    "OUTPUT_FORMATS",
+    "PIPE",
+    "Texture",
+    "as_input",
+    "as_mapped",
+    "as_path",
+    "as_written",
+    "atomic_write",
+    "bounds",
+    "cell_side",
+    "check_cells",
+    "check_output",
+    "check_target",
+    "checked_target",
+    "find_meshes",
+    "has_uv",
+    "known_ending",
+    "lines_of",
+    "make_folder",
+    "number",
+    "parse_obj",
+    "read_archive",
+    "read_bytes",
+    "read_flattening",
+    "read_joined",
+    "read_mesh",
+    "read_mesh_from",
+    "read_picture",
+    "remove_unfinished",
+    "shading_normals",
+    "split_at_seams",
+    "write_flattening",
+    "write_measured",
+    "write_parts",
+    "write_stream",
+]

@@ -1,0 +1,309 @@
+"""The JSON and the arrays of glTF 2.0 files, every reference checked before anything is allocated.
+
+An own reader, because no library keeps all of what a GLB that is written has to reproduce, nor looks at what a file
+asks for before it is given. Names and numbers are those of the specification (Khronos, glTF 2.0, Sections 3.6, 4.4).
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import math
+import struct
+from pathlib import Path
+from typing import Any, NamedTuple, NoReturn
+from urllib.parse import unquote, unquote_to_bytes
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.arrays import FloatArray, IntArray
+from ...errors import ConeflatError, MeshFileError
+from ..raw import read_bytes
+
+COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+#: Rows and columns of an element.
+SHAPES = {
+    "SCALAR": (1, 1), "VEC2": (2, 1), "VEC3": (3, 1), "VEC4": (4, 1), "MAT2": (2, 2), "MAT3": (3, 3), "MAT4": (4, 4),
+}  # fmt: skip
+COMPRESSED = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+_HEADER = struct.Struct("<4sII")
+_CHUNK = struct.Struct("<I4s")
+
+
+class Accessor(NamedTuple):
+    """What the JSON says of an array, checked but for its place."""
+
+    kind: np.dtype[Any]
+    rows: int
+    columns: int
+    length: int
+
+    @property
+    def item_bytes(self) -> int:
+        """Bytes of an element; columns of matrices begin at multiples of four."""
+        column = self.rows * self.kind.itemsize
+        return column if self.columns == 1 else self.columns * (column + -column % 4)
+
+
+class GltfData:
+    """The tree of a glTF file, and the arrays that it names.
+
+    Attributes:
+        path: of the file.
+        tree: the JSON.
+    """
+
+    def __init__(self, path: Path, content: bytes) -> None:
+        """Open a .gltf or .glb file.
+
+        Raises:
+            MeshFileError: it is none, is cut short, or names a buffer that is not there.
+        """
+        self.path = path
+        text, binary = _chunks(path, content) if content[:4] == b"glTF" else (content, None)
+        try:
+            tree = json.loads(text.decode("utf-8-sig"))
+        except RecursionError as error:
+            raise MeshFileError(f"{path}: its JSON is nested too deeply") from error
+        except ValueError as error:
+            raise MeshFileError(f"{path} is not a readable glTF file: its JSON is broken: {error}") from error
+        if not isinstance(tree, dict):
+            raise MeshFileError(f"{path} is not a glTF file: its JSON is no object")
+        self.tree: dict[str, Any] = tree
+        version = str(self.entry(tree, "asset", dict, {}).get("version", "2.0"))
+        if not version.startswith("2."):
+            raise MeshFileError(f"{path} is glTF of version {version[:20]}; convert it to version 2.0")
+        self._buffers = self._find_buffers(binary)
+        self.total_bytes = len(content) + sum(
+            map(len, {id(one): one for one in self._buffers if one is not None}.values())
+        )
+        self._refuse_compressed()
+        self._check_names()
+
+    def _check_names(self) -> None:
+        """Refuse names that are no text: a GLB written keeps them, and other programs stumble over them."""
+        for kind, items in self.tree.items():
+            for i, item in enumerate(items if isinstance(items, list) else ()):
+                if isinstance(item, dict) and not isinstance(item.get("name", ""), str):
+                    self.fail(f"the name of number {i} of its {kind[:40]} is {item['name']!r:.40}, no text")
+
+    def fail(self, reason: str) -> NoReturn:
+        """Say what is wrong with the file.
+
+        Raises:
+            MeshFileError: always.
+        """
+        raise MeshFileError(f"{self.path}: {reason}")
+
+    def entry(self, item: dict[str, Any], name: str, kind: type[Any], default: Any = None) -> Any:
+        """Return what an object has under a name, a list or an object; another kind of thing is refused."""
+        value = item.get(name, default) if isinstance(item, dict) else None
+        if not isinstance(value, kind):
+            self.fail(f"{name!r} is no {'list' if kind is list else 'object'} where there should be one")
+        return value
+
+    def item(self, name: str, index: Any) -> dict[str, Any]:
+        """Return an object of one of the tree's lists, such as "meshes"."""
+        every = self.tree.get(name, [])
+        if not isinstance(every, list):
+            self.fail(f"{name!r} is no list")
+        if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(every):
+            self.fail(f"{str(index)[:20]} is none of its {len(every)} {name}")
+        if not isinstance(every[index], dict):
+            self.fail(f"number {index} of its {name} is no object")
+        return dict[str, Any](every[index])
+
+    def view(self, index: Any) -> memoryview:
+        """Return the bytes of a buffer view."""
+        view = self.item("bufferViews", index)
+        buffer = self._buffers[self._buffer_index(view.get("buffer"))]
+        start, length = self.count(view, "byteOffset", 0), self.count(view, "byteLength")
+        if buffer is None:
+            self.fail(f"buffer view {index} has no data")
+        if start + length > len(buffer):
+            self.fail(
+                f"buffer view {index} ends at {start + length:,} of the {len(buffer):,} bytes of its buffer"
+            )
+        return memoryview(buffer)[start : start + length]
+
+    def accessor(self, index: Any) -> Accessor:
+        """Return what kind of array an accessor is."""
+        item = self.item("accessors", index)
+        kind = COMPONENTS.get(self.count(item, "componentType"))
+        shape = SHAPES.get(str(item.get("type")))
+        if kind is None or shape is None:
+            self.fail(f"accessor {index} has an unknown type")
+        return Accessor(np.dtype(kind), *shape, self.count(item, "count"))
+
+    def raw(self, index: Any) -> NDArray[np.uint8]:
+        """Return (count, b) the bytes of each element of an array.
+
+        Raises:
+            MeshFileError: it reaches beyond its buffer, or has more elements than the file has bytes.
+        """
+        item, form = self.item("accessors", index), self.accessor(index)
+        if form.length > self.total_bytes:
+            self.fail(f"accessor {index} has {form.length:,} elements, more than the file has bytes")
+        if item.get("bufferView") is None:
+            rows = np.zeros((form.length, form.item_bytes), np.uint8)
+        else:
+            stride = self.item("bufferViews", item["bufferView"]).get("byteStride")
+            rows = self._rows(index, item, form.length, form.item_bytes, stride)
+        sparse = item.get("sparse")
+        if sparse is not None:
+            rows = self._with_sparse(index, self.entry(item, "sparse", dict), rows, form.kind)
+        return rows
+
+    def values(self, index: Any, columns: int | None = None) -> FloatArray:
+        """Return (count, columns) an array of vectors as doubles; whole numbers that stand for fractions as these.
+
+        Raises:
+            MeshFileError: as of `raw`; or it has another number of columns.
+        """
+        form = self.accessor(index)
+        if form.columns != 1 or (columns is not None and form.rows != columns):
+            self.fail(f"accessor {index} has {form.rows * form.columns} numbers per element, not {columns}")
+        numbers = np.ascontiguousarray(self.raw(index)).view(form.kind).astype(np.float64)
+        if self.item("accessors", index).get("normalized") and form.kind.kind in "iu":
+            numbers = np.maximum(numbers / np.iinfo(form.kind).max, -1.0)
+        return numbers
+
+    def indices(self, index: Any) -> IntArray:
+        """Return (count,) an array of indices."""
+        form = self.accessor(index)
+        if form.kind.kind != "u" or form.rows * form.columns != 1:
+            self.fail(f"accessor {index} holds no indices")
+        return np.ascontiguousarray(self.raw(index)).view(form.kind).reshape(-1).astype(np.int64)
+
+    def count(self, item: dict[str, Any], name: str, default: int | None = None) -> int:
+        """Return a whole number, 0 and up, that an object has."""
+        value = item.get(name, default)
+        if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+            self.fail(f"{name!r} is {str(value)[:20]}, not a whole number")
+        return value
+
+    def beside(self, uri: str) -> Path:
+        """Return the file that a reference relative to this one means."""
+        return self.path.parent / unquote(uri)
+
+    def _rows(
+        self, index: Any, item: dict[str, Any], count: int, size: int, stride: int | None = None
+    ) -> NDArray[np.uint8]:
+        """Return (count, size) bytes of a buffer view that an accessor, or a part of it, names."""
+        data = self.view(item.get("bufferView"))
+        start = self.count(item, "byteOffset", 0)
+        step = size if stride is None else self.count({"byteStride": stride}, "byteStride")
+        if step < size:
+            self.fail(f"the elements of accessor {index} lie over each other: byteStride is {step}")
+        end = start + step * (count - 1) + size if count else start
+        if end > len(data):
+            self.fail(f"accessor {index} ends at {end:,} of the {len(data):,} bytes of its buffer view")
+        return np.ndarray((count, size), np.uint8, data, start, (step, 1))
+
+    def _with_sparse(
+        self, index: Any, sparse: dict[str, Any], rows: NDArray[np.uint8], kind: np.dtype[Any]
+    ) -> NDArray[np.uint8]:
+        """Return an array with those elements replaced that the accessor lists."""
+        count = self.count(sparse, "count")
+        where, new = self.entry(sparse, "indices", dict, {}), self.entry(sparse, "values", dict, {})
+        form = COMPONENTS.get(self.count(where, "componentType"))
+        if form is None or form[1] != "u":
+            self.fail(f"the sparse indices of accessor {index} have an unknown type")
+        width = np.dtype(form).itemsize
+        places = np.ascontiguousarray(self._rows(index, where, count, width)).view(form).reshape(-1)
+        if len(places) and places.max() >= len(rows):
+            self.fail(f"accessor {index} replaces element {places.max()} of {len(rows)}")
+        rows = rows.copy()
+        rows[places] = self._rows(index, new, count, rows.shape[1])
+        return rows
+
+    def _find_buffers(self, binary: bytes | None) -> list[bytes | None]:
+        """Return the content of each buffer; None of one that only stands for compressed data."""
+        known: dict[Path, bytes] = {}
+        buffers: list[bytes | None] = []
+        for i in range(len(self.entry(self.tree, "buffers", list, []))):
+            item = self.item("buffers", i)
+            uri, length = item.get("uri"), self.count(item, "byteLength")
+            if uri is None:
+                found = binary if i == 0 else None
+            elif not isinstance(uri, str):
+                self.fail(f"the address of buffer {i} is no text")
+            elif uri.startswith("data:"):
+                found = self.decoded(uri, f"buffer {i}")
+            elif "://" in uri:
+                self.fail(f"buffer {i} is at {uri[:60]!r}, and nothing is loaded from anywhere")
+            else:
+                path = self.beside(uri)
+                found = known[path] if path in known else known.setdefault(path, self._external(path, i))
+            if found is not None and len(found) < length:
+                self.fail(f"buffer {i} has {len(found):,} of the {length:,} bytes it should have")
+            buffers.append(found)
+        return buffers
+
+    def _external(self, path: Path, index: int) -> bytes:
+        try:
+            return read_bytes(path)
+        except ConeflatError as error:
+            raise MeshFileError(f"{self.path}: buffer {index} is not to be had: {error}") from error
+
+    def decoded(self, uri: str, what: str) -> bytes:
+        """Return what a data URI holds."""
+        head, comma, body = uri.partition(",")
+        try:
+            if not comma:
+                raise ValueError("no comma")
+            return base64.b64decode(unquote(body)) if head.endswith(";base64") else unquote_to_bytes(body)
+        except (binascii.Error, ValueError) as error:
+            raise MeshFileError(f"{self.path}: the data URI of {what} is broken: {error}") from error
+
+    def _buffer_index(self, index: Any) -> int:
+        self.item("buffers", index)
+        return int(index)
+
+    def _refuse_compressed(self) -> None:
+        """Refuse views of which there are compressed data only."""
+        for i in range(len(self.entry(self.tree, "bufferViews", list, []))):
+            view = self.item("bufferViews", i)
+            for name in COMPRESSED:
+                packed = self.entry(view, "extensions", dict, {}).get(name)
+                if packed is not None and self._buffers[self._buffer_index(view.get("buffer"))] is None:
+                    self.fail(f"its data are compressed ({name}); save it without compression")
+
+
+def numbers(data: GltfData, item: dict[str, Any], name: str, default: list[float]) -> FloatArray:
+    """Return a list of as many finite numbers as the default has."""
+    values = item.get(name, default)
+    if (
+        not isinstance(values, list)
+        or len(values) != len(default)
+        or not all(isinstance(value, (int, float)) and math.isfinite(value) for value in values)
+    ):
+        data.fail(f"the {name} of a node is not {len(default)} numbers")
+    return np.array(values, dtype=np.float64)
+
+
+def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes | None]:
+    """Return the JSON and the binary chunk of a GLB file."""
+    if len(content) < _HEADER.size + _CHUNK.size:
+        raise MeshFileError(f"{path} ends within its header")
+    _, version, total = _HEADER.unpack_from(content)
+    if version != 2:
+        raise MeshFileError(f"{path} is GLB of version {version}; convert it to version 2")
+    if total > len(content):
+        raise MeshFileError(
+            f"{path} ends early: it has {len(content):,} of the {total:,} bytes that its header promises"
+        )
+    found: dict[bytes, bytes] = {}
+    place = _HEADER.size
+    while place + _CHUNK.size <= total:
+        length, kind = _CHUNK.unpack_from(content, place)
+        place += _CHUNK.size
+        if place + length > total:
+            raise MeshFileError(f"{path} ends within one of its chunks")
+        found.setdefault(kind, content[place : place + length])
+        place += length
+    if b"JSON" not in found:
+        raise MeshFileError(f"{path} is not a readable GLB file: it has no JSON chunk")
+    return found[b"JSON"], found.get(b"BIN\0")

@@ -1,0 +1,132 @@
+"""Meshes with the UVs that they have, from files, results and arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces
+from ..errors import ArrayShapeError, MissingUVError
+from ..mesh.polygons import fan_corners
+from .input_mesh import as_input
+from .join import Joined
+from .mesh_file import MeshFile
+
+if TYPE_CHECKING:
+    from ..result import Flattening
+
+
+@dataclass(frozen=True, eq=False)
+class Mapped:
+    """Triangles with the UVs of their corners, of which some may be missing.
+
+    Attributes:
+        vertices: (n, 3) positions.
+        faces: (m, 3) triangles; of polygons their fans from the first corner, which other programs see.
+        corner_uv: (m, 3, 2) UVs, v upwards; NaN where there is none.
+        polygons: how many they are parts of.
+        without, not_finite: how many corners of polygons have no UV, or one that is NaN or infinite.
+        notes: what was done on reading, one sentence each.
+        source: the file they are from, if any.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    corner_uv: FloatArray
+    polygons: int
+    without: int
+    not_finite: int
+    notes: tuple[str, ...] = ()
+    source: MeshFile | None = None
+
+    @property
+    def has_uv(self) -> BoolArray:
+        """(m,) whether all corners have finite UVs."""
+        return np.asarray(np.isfinite(self.corner_uv).all(axis=(1, 2)))
+
+
+def as_mapped(
+    mesh: Any, faces: ArrayLike | None = None, corner_uv: ArrayLike | None = None, weld: bool | None = None
+) -> Mapped:
+    """Return the triangles and UVs of whatever the user has; see `measure_uv`."""
+    if faces is not None:
+        return _of_arrays(mesh, faces, corner_uv)
+    if isinstance(mesh, (str, PathLike)):
+        if Path(mesh).suffix.lower() == ".npz":
+            from .npz import read_flattening
+
+            return _of_result(read_flattening(mesh))
+        from .read import read_joined
+
+        return of_file(read_joined(mesh, weld))
+    if isinstance(mesh, MeshFile):
+        return of_file(Joined(mesh, np.arange(len(mesh.vertices))))
+    if hasattr(mesh, "uv_faces") and hasattr(mesh, "uv"):
+        return _of_result(mesh)
+    raise ArrayShapeError(
+        f"cannot read UVs from {type(mesh).__name__}: give a file's path, a result, or vertices, faces and corner_uv"
+    )
+
+
+def of_file(joined: Joined) -> Mapped:
+    """Return the triangles of a file, polygons as fans, with the UVs that it gives their corners.
+
+    Raises:
+        MissingUVError: it gives none.
+    """
+    mesh = joined.mesh
+    if not has_uv(mesh):
+        raise MissingUVError(
+            f"{mesh.path} has no UV coordinates: `coneflat flatten` makes some"
+            if mesh.texture is None or mesh.uv is not None
+            else f"{mesh.path} numbers UV coordinates, but does not hold them"
+        )
+    assert mesh.texture is not None
+    assert mesh.uv is not None
+    points = np.append(mesh.uv, [[np.nan, np.nan]], axis=0)
+    texture = np.where(mesh.texture < 0, len(mesh.uv), mesh.texture)
+    fans = fan_corners(mesh.offsets)
+    missing = texture == len(mesh.uv)
+    return Mapped(
+        vertices=mesh.vertices,
+        faces=mesh.corners[fans],
+        corner_uv=points[texture[fans]],
+        polygons=len(mesh.offsets) - 1,
+        without=int(np.count_nonzero(missing)),
+        not_finite=int(np.count_nonzero(~np.isfinite(points[texture]).all(axis=1) & ~missing)),
+        notes=joined.notes(),
+        source=mesh,
+    )
+
+
+def has_uv(mesh: MeshFile) -> bool:
+    """Return whether a file gives any corner a UV."""
+    return mesh.uv is not None and mesh.texture is not None and bool((mesh.texture >= 0).any())
+
+
+def _of_result(result: Flattening) -> Mapped:
+    source = result.source
+    count = len(result.faces)
+    return Mapped(result.vertices, result.faces, result.corner_uv, count, 0, 0, source=source)
+
+
+def _of_arrays(vertices: ArrayLike, faces: ArrayLike, corner_uv: ArrayLike | None) -> Mapped:
+    given = as_input(vertices, faces)
+    points = np.asarray(given.vertices, dtype=np.float64)
+    triangles = as_faces(given.faces, len(points))
+    if corner_uv is None:
+        raise MissingUVError("vertices and faces alone have no UV coordinates: give corner_uv, too")
+    try:
+        uv = np.asarray(corner_uv, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ArrayShapeError(f"corner_uv must be an array of numbers: {error}") from error
+    if uv.shape != (*triangles.shape, 2):
+        raise ArrayShapeError(f"corner_uv must have the shape {(*triangles.shape, 2)}, not {uv.shape}")
+    without = np.isnan(uv).all(axis=2)
+    broken = ~np.isfinite(uv).all(axis=2) & ~without
+    return Mapped(points, triangles, uv, len(triangles), int(without.sum()), int(broken.sum()))

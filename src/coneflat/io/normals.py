@@ -1,0 +1,103 @@
+"""The normals that a mesh's file gives, or its smoothing groups, at the corners of a result's triangles."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import FloatArray, IntArray
+from ..geometry.normals import face_normals, sums_at, unit_vectors, vertex_normals
+from ..mesh.polygons import polygon_of
+from ..mesh.weld import weld
+from .mesh_file import MeshFile
+
+if TYPE_CHECKING:
+    from ..result import Flattening
+
+_SMOOTHING = re.compile(rb"(?m)^[ \t]*s[ \t]+(\S+)")
+_FLAT = (b"off", b"0")
+
+
+class CornerNormals(NamedTuple):
+    """Normals of a surface that need not be smooth everywhere.
+
+    Attributes:
+        normals: (k, 3) unit vectors, all different.
+        corners: (m, 3) index into them of every triangle corner.
+    """
+
+    normals: FloatArray
+    corners: IntArray
+
+
+def usable_normals(normals: FloatArray, corners: IntArray) -> IntArray | None:
+    """Return (c,) index of each corner into (k, 3) normals, -1 for those that are none; None if no corner has any."""
+    is_usable = np.append(np.isfinite(normals).all(axis=1) & normals.any(axis=1), False)
+    known = np.where((corners >= 0) & (corners < len(normals)), corners, -1)
+    known = np.where(is_usable[known], known, -1)
+    return known if np.any(known >= 0) else None
+
+
+def source_normals(result: Flattening) -> CornerNormals | None:
+    """Return the shading of the file that a result was read from; None where it says nothing of it.
+
+    That is the file's normals, or what its smoothing groups make; corners without either have the mean normal of
+    their vertex.
+    """
+    source = result.source
+    if source is None or result.face_corners is None:
+        return None
+    if source.normals is not None and source.normal is not None:
+        normals, corners = source.normals, source.normal[result.face_corners]
+    else:
+        groups = _smoothing_groups(source)
+        if groups is None:
+            return None
+        normals, corners = _smoothed(result, source, groups)
+    missing = corners < 0
+    if missing.any():
+        corners = np.where(missing, len(normals) + result.faces, corners)
+        normals = np.concatenate([normals, vertex_normals(result.vertices, result.faces)])
+    used, numbers = np.unique(corners, return_inverse=True)
+    # Many files have a normal for every corner, most of them the same.
+    kept, merged = weld(shading_normals(normals[used]))
+    return CornerNormals(shading_normals(normals[used][kept]), merged[numbers.reshape(corners.shape)])
+
+
+def _smoothing_groups(source: MeshFile) -> IntArray | None:
+    """Return (p,) the smoothing group of each polygon of an OBJ file, 0 for none; None if they make no difference."""
+    if source.obj is None:
+        return None
+    known: dict[bytes, int] = {}
+    starts, groups = [0], [0]
+    for polygon in sorted(source.obj.gaps):
+        names = _SMOOTHING.findall(source.obj.gaps[polygon])
+        if names:
+            name = names[-1].lower()
+            starts.append(polygon)
+            groups.append(0 if name in _FLAT else known.setdefault(name, len(known) + 1))
+    of_polygon = np.repeat(groups, np.diff([*starts, len(source.offsets) - 1]))
+    if len(starts) == 1 or (of_polygon[0] > 0 and np.all(of_polygon == of_polygon[0])):
+        return None
+    return of_polygon
+
+
+def _smoothed(result: Flattening, source: MeshFile, groups: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return normals, and the (m, 3) of each corner: the mean over the group at the vertex, or the polygon's own."""
+    assert result.face_corners is not None
+    polygon = polygon_of(result.face_corners, source.offsets)
+    group = groups[polygon][:, None]
+    count = len(result.vertices)
+    keys = np.where(group > 0, group * count + result.faces, -1 - polygon[:, None])
+    _, corners = np.unique(keys, return_inverse=True)
+    corners = corners.reshape(keys.shape)
+    areas = face_normals(result.vertices, result.faces)[:, None]
+    return sums_at(corners, areas, int(corners.max()) + 1), corners
+
+
+def shading_normals(vectors: FloatArray) -> FloatArray:
+    """Return vectors of length one; (0, 0, 1) for those without a direction, as files need one."""
+    units = unit_vectors(vectors)
+    return np.where(units.any(axis=1, keepdims=True), units, [0.0, 0.0, 1.0])

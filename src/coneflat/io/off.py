@@ -1,0 +1,110 @@
+"""Reading OFF, with its polygons."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..base.arrays import IntArray
+from ..errors import MeshFileError
+from .mesh_file import MeshFile
+from .raw import offsets_of
+from .text import Growing, TextBlock, text_blocks
+
+# Normals follow the position, then colours and texture coordinates, so that these can be passed over; "4" and "n"
+# change what the position itself is.
+_HEADER = re.compile(rb"(ST)?(C)?(N)?(4)?(n)?OFF\b", re.IGNORECASE)
+_LINE = re.compile(rb"([^\r\n]*)(?:\r\n|[\r\n]|\Z)")
+
+
+def is_off(content: bytes) -> bool:
+    """Return whether a file begins as one of OFF does that has its keyword."""
+    return _HEADER.match(next((line for _, line, _ in _filled_lines(content[:4096])), b"")) is not None
+
+
+def parse_off(path: Path, content: bytes) -> MeshFile:
+    """Return the mesh of an OFF file: OFF, COFF, NOFF, STOFF and their combinations, in text.
+
+    Raises:
+        MeshFileError: the file is not OFF, is shorter than its header promises, or has text for a number.
+    """
+    vertex_count, face_count, begin, has_normals = _header(path, content)
+    normals = Growing(np.float64, 3)
+    vertices, sizes, corners = Growing(np.float64, 3), Growing(np.int64), Growing(np.int64)
+    lines = 0
+    for block in text_blocks(path, content, begin):
+        rows = np.flatnonzero(block.counts)
+        of_vertices, of_faces = np.clip(
+            [vertex_count - lines, vertex_count + face_count - lines], 0, len(rows)
+        )
+        points = block.words(rows[:of_vertices]).points()
+        vertices.add(points[:, :3])
+        if has_normals and points.shape[1] >= 6:
+            normals.add(points[:, 3:6])
+        for whole, new in zip((sizes, corners), _polygons(block, rows[of_vertices:of_faces]), strict=True):
+            whole.add(new)
+        lines += len(rows)
+    if lines < vertex_count:
+        raise MeshFileError(f"{path} ends after {lines} of the {vertex_count} vertices it promises")
+    if lines < vertex_count + face_count:
+        held = lines - vertex_count
+        raise MeshFileError(f"{path} ends after {held} of the {face_count} faces it promises")
+    mesh = MeshFile(path, vertices.done(), corners.done(), offsets_of(sizes.done()))
+    if len(normals) < vertex_count or not vertex_count:
+        return mesh
+    return replace(mesh, normals=normals.done(), normal=mesh.corners)
+
+
+def _polygons(block: TextBlock, rows: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the sizes and the corners of the polygons in some lines."""
+    sizes = block.words(rows, stop=1).integers("a number of corners")
+    # What follows the corners is a colour, which need not be of whole numbers.
+    words = block.words(rows, first=1, stop=1 + np.maximum(sizes, 0))
+    corners = words.integers()
+    short = (words.counts != sizes) | (sizes < 3)
+    if short.any():
+        i = int(np.argmax(short))
+        reason = f"a face of {sizes[i]} corners names {words.counts[i]} vertices"
+        if sizes[i] < 3:
+            reason = f"a face needs at least 3 corners, but has {sizes[i]}"
+        block.fail(int(rows[i]), reason)
+    return sizes, corners
+
+
+def _header(path: Path, content: bytes) -> tuple[int, int, int, bool]:
+    """Return the counts of vertices and faces, where the lines behind them begin, and if vertices have normals."""
+    lines = _filled_lines(content)
+    number, first, end = next(lines, (0, b"", 0))
+    if not first:
+        raise MeshFileError(f"{path} is not an OFF file: it has nothing but comments")
+    keyword = _HEADER.match(first)
+    if keyword:
+        if keyword.group(4) or keyword.group(5):
+            raise MeshFileError(f"{path}: OFF with points of another dimension than 3 is not supported")
+        first = first[keyword.end() :].strip()
+        if first.upper().startswith(b"BINARY"):
+            raise MeshFileError(f"{path} is a binary OFF file, which is not supported; convert it to text")
+    if not first:
+        number, first, end = next(lines, (number, first, end))
+    words = first.split()
+    try:
+        vertex_count, face_count = int(words[0]), int(words[1])
+    except (ValueError, IndexError):
+        raise MeshFileError(
+            f"{path}, line {number}: not an OFF file, the numbers of vertices and faces were expected"
+        ) from None
+    if vertex_count < 0 or face_count < 0:
+        raise MeshFileError(f"{path}, line {number}: a number of vertices or faces is negative")
+    return vertex_count, face_count, end, keyword is not None and keyword.group(3) is not None
+
+
+def _filled_lines(content: bytes) -> Iterator[tuple[int, bytes, int]]:
+    """Yield the number, the text without comment and the end of each line that has any."""
+    for number, line in enumerate(_LINE.finditer(content), 1):
+        text = line[1].partition(b"#")[0].strip()
+        if text:
+            yield number, text, line.end()

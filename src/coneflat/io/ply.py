@@ -1,0 +1,308 @@
+"""Reading PLY, text and binary, with its polygons.
+
+An own reader, since polygons, all numbers of vertices and the UVs of corners are to survive, and what a header promises
+is not to be believed before it is found.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from ..base.arrays import FloatArray, IntArray
+from ..errors import EmptyMeshError, MeshFileError
+from ..mesh.polygons import COLOURS
+from .mesh_file import MeshFile
+from .raw import NO_UV, offsets_of
+from .text import Growing, text_blocks
+
+_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+#: One property of an element, all rows of it.
+Column: TypeAlias = "np.ndarray[tuple[int, ...], np.dtype[Any]]"
+
+_STRUCT = {
+    "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
+    "f4": "f", "f8": "d",
+}  # fmt: skip
+_NORMAL = ("nx", "ny", "nz")
+_CORNERS = ("vertex_indices", "vertex_index")
+#: What programs call a vertex's UV point, and the list of those of a face's corners: u, v, u, v, ...
+_VERTEX_UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("u0", "v0"))
+_FACE_UV = "texcoord"
+
+
+@dataclass(frozen=True, eq=False)
+class _Property:
+    name: str
+    kind: str  # numpy code of the value, or of a list's items; with the byte order once that is known
+    count: str | None = None  # numpy code of a list's length, likewise
+
+
+@dataclass(frozen=True, eq=False)
+class _Element:
+    name: str
+    length: int
+    properties: tuple[_Property, ...] = ()
+
+    @cached_property
+    def steps(self) -> list[tuple[int, struct.Struct | None]]:
+        """Of each property, the bytes of the value or of an item, and what reads a list's length."""
+        return [
+            (
+                np.dtype(p.kind).itemsize,
+                struct.Struct(p.count[0] + _STRUCT[p.count[1:]]) if p.count else None,
+            )
+            for p in self.properties
+        ]
+
+
+def parse_ply(path: Path, content: bytes) -> MeshFile:
+    """Return the mesh of a PLY file.
+
+    Raises:
+        MeshFileError: the file is not PLY, is shorter than its header promises, or has text for a number.
+        EmptyMeshError: it has no vertex or no face.
+    """
+    form, elements, start = _header(path, content)
+    if form == "ascii":
+        # As an array of doubles the text is read by the same code as the binary forms; doubles hold every
+        # index a file can have.
+        content, start = _text_values(path, content, start), 0
+    vertices: FloatArray | None = None
+    properties: dict[str, FloatArray] = {}
+    polygons: tuple[IntArray, IntArray] | None = None
+    corner_uv: tuple[IntArray, FloatArray] | None = None
+    for element in elements:
+        wanted = _wanted(path, element)
+        try:
+            columns, start = _decode(content, start, _stored(element, form), wanted)
+        except _EndOfFile as error:
+            raise MeshFileError(
+                f"{path} ends before the {element.length} {element.name} elements its header promises"
+            ) from error
+        if element.name == "vertex":
+            names = [element.properties[i].name for i in wanted]
+            vertices = np.stack([np.asarray(c, np.float64) for c in columns[:3]], axis=1)
+            properties = {name: _shade(name, c) for name, c in zip(names[3:], columns[3:], strict=True)}
+        elif element.name == "face":
+            polygons = (columns[0].astype(np.int64), _whole(path, columns[1]))
+            corner_uv = _corner_uv(path, polygons[0], *columns[2:]) if columns[2:] else None
+        if vertices is not None and polygons is not None:
+            break
+    if vertices is None or not len(vertices):
+        raise EmptyMeshError(f"{path} has no vertices")
+    if polygons is None or not len(polygons[0]):
+        raise EmptyMeshError(f"{path} has no faces")
+    normals = None
+    if all(name in properties for name in _NORMAL):
+        normals = np.stack([properties[name] for name in _NORMAL], axis=1)
+    mesh = MeshFile(
+        path,
+        vertices,
+        polygons[1],
+        offsets_of(polygons[0]),
+        properties=properties,
+        normals=normals,
+        normal=None if normals is None else polygons[1],
+    )
+    if corner_uv is not None and len(corner_uv[1]):
+        return replace(mesh, texture=corner_uv[0], uv=corner_uv[1])
+    for pair in _VERTEX_UV:
+        if all(name in properties for name in pair):
+            return replace(mesh, texture=mesh.corners, uv=np.stack([properties[n] for n in pair], axis=1))
+    return mesh
+
+
+def _corner_uv(path: Path, sizes: IntArray, counts: Column, numbers: Column) -> tuple[IntArray, FloatArray]:
+    """Return (c,) the number of each corner's UV point and (u, 2) the points; a face may have no list.
+
+    Raises:
+        MeshFileError: a face's list has not two numbers for each of its corners.
+    """
+    wrong = (counts != 0) & (counts != 2 * sizes)
+    if wrong.any():
+        face = int(np.argmax(wrong))
+        raise MeshFileError(
+            f"{path}: face {face} has {sizes[face]} corners and {int(counts[face])} numbers in '{_FACE_UV}', which "
+            "needs two for each corner"
+        )
+    has_uv = np.repeat(counts != 0, sizes)
+    texture = np.where(has_uv, np.cumsum(has_uv) - 1, NO_UV)
+    return texture, np.asarray(numbers, np.float64).reshape(-1, 2)
+
+
+def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
+    """Return the form, the elements, and where the header ends."""
+    end = content.find(b"end_header")
+    if not content.startswith(b"ply") or end < 0:
+        raise MeshFileError(f"{path} is not a PLY file: it has no PLY header")
+    lines = content[:end].splitlines()
+    start = end + len(b"end_header")
+    while content[start : start + 1] == b" ":
+        start += 1
+    # A lone carriage return ends the lines of some old files; what follows it is data then.
+    start += 2 if content[start : start + 2] == b"\r\n" and b"\n" in content[:end] else 1
+
+    form = ""
+    elements: list[_Element] = []
+    for i, line in enumerate(lines):
+        words = line.decode("latin-1").split()
+        try:
+            if words[:1] == ["format"]:
+                form = words[1]
+            elif words[:1] == ["element"]:
+                elements.append(_Element(words[1], int(words[2])))
+                if elements[-1].length < 0:
+                    raise ValueError("a negative count")
+            elif words[:1] == ["property"]:
+                if words[1] == "list":
+                    new = _Property(words[4], _TYPES[words[3]], _TYPES[words[2]])
+                else:
+                    new = _Property(words[2], _TYPES[words[1]])
+                elements[-1] = replace(elements[-1], properties=(*elements[-1].properties, new))
+        except (IndexError, KeyError, ValueError) as error:
+            raise MeshFileError(f"{path}, line {i + 1}: not a line of a PLY header: {line!r}") from error
+    if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
+        raise MeshFileError(f"{path} is not a PLY file: its header names no known format")
+    return form, elements, start
+
+
+def _wanted(path: Path, element: _Element) -> list[int]:
+    """Return which properties of an element make up the mesh."""
+    if element.name == "vertex":
+        names = [p.name for p in element.properties]
+        missing = [axis for axis in "xyz" if axis not in names]
+        if missing:
+            raise MeshFileError(f"{path}: its vertices have no property {missing[0]!r}")
+        axes = [names.index(axis) for axis in "xyz"]
+        return axes + [i for i, p in enumerate(element.properties) if i not in axes and not p.count]
+    if element.name == "face":
+        lists = [i for i, p in enumerate(element.properties) if p.count]
+        named = [i for i in lists if element.properties[i].name in _CORNERS]
+        if not named and (len(lists) != 1 or element.properties[lists[0]].name == _FACE_UV):
+            raise MeshFileError(f"{path}: its faces have no list 'vertex_indices'")
+        return (named[:1] or lists) + [i for i in lists if element.properties[i].name == _FACE_UV][:1]
+    return []
+
+
+def _shade(name: str, values: Column) -> FloatArray:
+    """Return a property as doubles; colours, which are bytes in most files, from 0 to 1."""
+    numbers = np.asarray(values, np.float64)
+    return numbers / 255 if name in COLOURS and numbers.max(initial=0.0) > 1 else numbers
+
+
+class _EndOfFile(Exception):
+    """The file is shorter than its header promises."""
+
+
+def _decode(content: bytes, start: int, element: _Element, wanted: list[int]) -> tuple[list[Column], int]:
+    """Return the wanted columns of an element, a list as two (lengths, items), and where it ends."""
+    lists = [i for i, p in enumerate(element.properties) if p.count]
+    lengths = dict(
+        zip(lists, _row(content, start, element)[1] if element.length else [0] * len(lists), strict=True)
+    )
+    fields: list[tuple[str, str] | tuple[str, str, int]] = []
+    for i, p in enumerate(element.properties):
+        fields += [(f"n{i}", p.count), (f"p{i}", p.kind, lengths[i])] if p.count else [(f"p{i}", p.kind)]
+    row = np.dtype(fields)
+    stop = start + element.length * row.itemsize
+    if stop <= len(content):
+        rows = np.frombuffer(content, row, element.length, start)
+        if all(np.all(rows[f"n{i}"] == lengths[i]) for i in lists):
+            columns: list[Column] = []
+            for i in wanted:
+                if i in lengths:
+                    columns.append(np.full(element.length, lengths[i], dtype=np.int64))
+                columns.append(rows[f"p{i}"].reshape(-1))
+            return columns, stop
+    if not lists or element.length > len(content):
+        raise _EndOfFile
+    return _decode_ragged(content, start, element, wanted)
+
+
+def _decode_ragged(
+    content: bytes, start: int, element: _Element, wanted: list[int]
+) -> tuple[list[Column], int]:
+    """Return what `_decode` does, of an element whose lists differ in length."""
+    codes = np.frombuffer(content, np.uint8)
+    starts = [start]
+    for _ in range(element.length):
+        starts.append(_row(content, starts[-1], element)[0])
+
+    def read(places: IntArray, kind: str) -> Column:
+        every = np.lib.stride_tricks.sliding_window_view(codes, np.dtype(kind).itemsize)
+        return every[places].reshape(-1).view(kind)
+
+    places: IntArray = np.array(starts[:-1])
+    columns: dict[int, list[Column]] = {}
+    for i, p in enumerate(element.properties):
+        size = np.dtype(p.kind).itemsize
+        lengths: IntArray = np.ones(element.length, np.int64)
+        if p.count:
+            lengths = read(places, p.count).astype(np.int64)
+            places = places + np.dtype(p.count).itemsize
+        if i in wanted:
+            within = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+            items = read(np.repeat(places, lengths) + within * size, p.kind)
+            columns[i] = [lengths, items] if p.count else [items]
+        places = places + lengths * size
+    return [column for i in wanted for column in columns[i]], starts[-1]
+
+
+def _row(content: bytes, start: int, element: _Element) -> tuple[int, list[int]]:
+    """Return where a row of an element ends, and how long its lists are.
+
+    Raises:
+        _EndOfFile: the content ends before.
+    """
+    lengths = []
+    for size, count in element.steps:
+        if count is not None:
+            if start + count.size > len(content):
+                raise _EndOfFile
+            (length,) = count.unpack_from(content, start)
+            if not 0 <= length < 2**31 or length != int(length):
+                raise ValueError(f"a list has the length {length}")
+            lengths.append(int(length))
+            size = count.size + size * lengths[-1]
+        start += size
+    if start > len(content):
+        raise _EndOfFile
+    return start, lengths
+
+
+def _text_values(path: Path, content: bytes, start: int) -> bytes:
+    """Return all numbers of a text body, as little-endian doubles."""
+    numbers = Growing(np.float64)
+    for block in text_blocks(path, content, start, comments=False):
+        numbers.add(block.words(np.arange(len(block.counts))).floats())
+    return numbers.done().astype("<f8", copy=False).tobytes()
+
+
+def _stored(element: _Element, form: str) -> _Element:
+    """Return an element with its properties' types as they are stored, those of a text as `_text_values` gives them."""
+    order = ">" if form == "binary_big_endian" else "<"
+
+    def kind(code: str) -> str:
+        return "<f8" if form == "ascii" else order + code
+
+    stored = [_Property(p.name, kind(p.kind), p.count and kind(p.count)) for p in element.properties]
+    return replace(element, properties=tuple(stored))
+
+
+def _whole(path: Path, corners: Column) -> IntArray:
+    """Return corners as integers, which in a text they need not be."""
+    numbers = corners.astype(np.int64, copy=False)
+    if corners.dtype.kind == "f" and np.any(numbers != corners):
+        odd = corners[np.argmax(numbers != corners)]
+        raise MeshFileError(f"{path}: a face names vertex {odd}, which is not a whole number")
+    return numbers

@@ -1,0 +1,176 @@
+"""Factorized matrices: by MKL PARDISO (pypardiso) if the system is large and it is installed, else by cholespy.
+
+A matrix is factorized once and solved with often. SuperLU factorizes indefinite matrices and small scattered ones.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bmat, csc_matrix, csr_matrix
+from scipy.sparse.linalg import splu
+
+from ..base.arrays import FloatArray
+from ..errors import MetricError
+
+# Unknowns below which loading MKL, 0.03 s in each process, takes longer than what it saves.
+LARGE = 12_000
+# Unknowns of scattered parts below which SuperLU is faster.
+SCATTERED = 20_000
+
+
+class NotPositiveDefinite(ArithmeticError):
+    """The matrix has no Cholesky factorization in floating point."""
+
+
+def aligned(shape: tuple[int, ...]) -> FloatArray:
+    """Return room for numbers, in one piece, that starts at a multiple of 64 bytes; MKL counts on it."""
+    size = math.prod(shape)
+    buffer = np.empty(size + 8)
+    start = -(buffer.ctypes.data // 8) % 8
+    return buffer[start : start + size].reshape(shape)
+
+
+def is_aligned(array: FloatArray) -> bool:
+    """Return whether an array is like those of `aligned`."""
+    return array.dtype == np.float64 and array.flags.c_contiguous and array.ctypes.data % 64 == 0
+
+
+class Factor:
+    """A factorized matrix; this one has no rows, as that of a mesh without free vertices.
+
+    Attributes:
+        break_even: how many solutions, with what conjugate gradients do besides, take as long as another factorization.
+    """
+
+    break_even = 60
+
+    def __init__(self, matrix: csc_matrix) -> None:
+        pass
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
+        return np.zeros_like(right)
+
+    def renewed(self, matrix: csc_matrix) -> Factor:
+        """Return the factor of another matrix of the same size, and use this one up: its analysis may serve again.
+
+        Raises:
+            NotPositiveDefinite: rounding has made the matrix indefinite.
+        """
+        return type(self)(matrix)
+
+
+class SuperLUFactor(Factor):
+    """A sparse LU factorization that keeps a symmetric ordering."""
+
+    def __init__(self, matrix: csc_matrix) -> None:
+        try:
+            self._factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        except RuntimeError as error:
+            raise MetricError(
+                f"a linear system of {matrix.shape[0]} unknowns is singular: the mesh has triangles too "
+                "thin for double precision; remesh them, or run with --repair"
+            ) from error
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
+        solution: FloatArray = self._factor.solve(np.asarray(right, dtype=np.float64))
+        return solution
+
+
+class CholespyFactor(Factor):
+    """A sparse Cholesky factorization by CHOLMOD: wheels everywhere, quick to load, slow on large meshes."""
+
+    def __init__(self, matrix: csc_matrix) -> None:
+        from cholespy import CholeskySolverD, MatrixType
+
+        if not (matrix.diagonal() > 0).all():
+            # CHOLMOD finds out, too, and says so on standard output.
+            raise NotPositiveDefinite("the diagonal is not positive")
+        try:
+            self._solver = CholeskySolverD(
+                matrix.shape[0],
+                matrix.indptr.astype(np.int32),
+                matrix.indices.astype(np.int32),
+                matrix.data.astype(np.float64),
+                MatrixType.CSC,
+            )
+        except ValueError as error:
+            raise NotPositiveDefinite(str(error)) from error
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
+        right = np.ascontiguousarray(right, dtype=np.float64)
+        solution = np.zeros_like(right)
+        self._solver.solve(right, solution)
+        return solution
+
+
+@cache
+def has_pardiso() -> bool:
+    """Whether PARDISO is installed."""
+    return find_spec("pypardiso") is not None
+
+
+def factorize(
+    matrix: csc_matrix, used_up: Factor | None = None, whole: int = 0, is_scattered: bool = False
+) -> Factor:
+    """Factorize a sparse symmetric positive definite matrix.
+
+    Args:
+        matrix: (n, n), both triangles, with sorted indices.
+        used_up: the factor of another matrix of the same size, needed no more, whose analysis may serve.
+        whole: unknowns of something larger that it is a part of: what is loaded for that factorizes it, too, and has an
+            analysis that serves again, which takes most of the time.
+        is_scattered: whether it is of small parts that hardly hang together. SuperLU finds an order of elimination
+            for these in a fraction of the time that others take.
+
+    Raises:
+        MetricError: it is singular in double precision.
+    """
+    size = matrix.shape[0]
+    if size == 0:
+        return Factor(matrix)
+    is_by_pardiso = max(size, whole) >= LARGE and has_pardiso()
+    try:
+        if used_up is not None:
+            return used_up.renewed(matrix)
+        if is_scattered and size < SCATTERED:
+            return SuperLUFactor(matrix)
+        return _by_pardiso(matrix) if is_by_pardiso else CholespyFactor(matrix)
+    except NotPositiveDefinite:
+        # Rounding has made it indefinite: with pivots it has a factorization all the same.
+        return _by_pardiso(matrix, is_definite=False) if is_by_pardiso else SuperLUFactor(matrix)
+
+
+def _by_pardiso(matrix: csc_matrix, is_definite: bool = True) -> Factor:
+    from .pardiso import PardisoFactor
+
+    return PardisoFactor(matrix, is_definite)
+
+
+class HermitianFactor:
+    """A factorized Hermitian positive definite matrix: as a real one of twice the size.
+
+    Args:
+        matrix: (n, n) complex.
+
+    Raises:
+        MetricError: it is singular in double precision.
+    """
+
+    def __init__(self, matrix: csr_matrix) -> None:
+        real, imaginary = matrix.real, matrix.imag
+        self._factor = factorize(csc_matrix(bmat([[real, -imaginary], [imaginary, real]])))
+
+    def solve(self, right: NDArray[Any]) -> NDArray[np.complex128]:
+        """Return the complex x with A x = right, both (n,)."""
+        parts = self._factor.solve(np.concatenate([right.real, right.imag]))
+        solution: NDArray[np.complex128] = parts[: len(right)] + 1j * parts[len(right) :]
+        return solution

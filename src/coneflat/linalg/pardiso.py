@@ -1,0 +1,222 @@
+"""PARDISO of Intel's MKL, which pypardiso brings: the fastest on large meshes, on x86-64 only.
+
+Its own interface copies, hashes and checks matrices, which takes longer than the factorization; here the routine is
+called itself. It takes the upper triangle by rows: for a symmetric matrix the lower one by columns.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import weakref
+from contextlib import suppress
+from enum import IntEnum
+from functools import lru_cache
+from importlib import metadata
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix
+
+from ..base.arrays import FloatArray
+from ..base.threads import threads
+from .factors import Factor, NotPositiveDefinite, aligned, is_aligned
+
+AnyArray: TypeAlias = NDArray[Any]
+
+
+class Kind(IntEnum):
+    """Kinds of matrices."""
+
+    POSITIVE_DEFINITE = 2
+    INDEFINITE = -2
+
+
+class Phase(IntEnum):
+    """What PARDISO is to do."""
+
+    ANALYSE = 11
+    FACTORIZE = 22
+    SOLVE = 33
+    RELEASE = -1
+
+
+class Place(IntEnum):
+    """Positions in PARDISO's table of parameters."""
+
+    NO_DEFAULTS = 0
+    ORDERING = 1
+    SCHEDULE = 23
+    FROM_ZERO = 34
+
+
+class Code(IntEnum):
+    """Errors."""
+
+    OUT_OF_MEMORY = -2
+    ZERO_PIVOT = -4
+
+
+# Parallel nested dissection, and a factorization on two levels; a permutation, given or asked for, would silently turn
+# that off.
+SETTINGS = {Place.NO_DEFAULTS: 1, Place.ORDERING: 3, Place.SCHEDULE: 1, Place.FROM_ZERO: 1}
+# MKL's file on each system, and what tells pypardiso of another one.
+RUNTIMES = ("libmkl_rt.", "mkl_rt.")
+LIBRARY_GIVEN = "PYPARDISO_MKL_RT"
+# How long, in milliseconds, a thread of MKL that has nothing to do turns in circles on its core before it sleeps; by
+# default 200, which other stages or other processes need.
+WAITING_TIME = "KMP_BLOCKTIME"
+
+
+class PardisoFactor(Factor):
+    """A sparse Cholesky factorization whose analysis serves other matrices of the same pattern.
+
+    It stays on as many threads as it was made on: to solve on fewer than were factorized on gives wrong results
+    without an error, and to factorize anew on more than were solved on ends the process. On two levels results are the
+    same, bit for bit, from one run to the next, and differ in the last digits between numbers of threads.
+    """
+
+    break_even = 30
+
+    def __init__(self, matrix: csc_matrix, is_definite: bool = True) -> None:
+        kind = Kind.POSITIVE_DEFINITE if is_definite else Kind.INDEFINITE
+        n, self._kind, self._threads = matrix.shape[0], kind, threads()
+        self._handle = np.zeros(64, dtype=np.int64)
+        self._table = np.zeros(64, dtype=np.int32)
+        self._table[list(SETTINGS)] = list(SETTINGS.values())
+        self._order = np.zeros(n, dtype=np.int32)
+        # What is released when this object goes: PARDISO keeps its memory elsewhere.
+        self._finalizer = weakref.finalize(self, _release, kind, self._threads, self._handle, self._table, n)
+        self._set_pattern(matrix)
+        self._fill(matrix)
+
+    def _set_pattern(self, matrix: csc_matrix) -> None:
+        starts, rows = matrix.indptr, matrix.indices
+        columns = np.repeat(np.arange(len(starts) - 1, dtype=rows.dtype), np.diff(starts))
+        self._indices, self._is_lower = rows, rows >= columns
+        self._rows = np.ascontiguousarray(rows[self._is_lower], dtype=np.int32)
+        self._starts = np.zeros(len(starts), dtype=np.int32)
+        np.cumsum(np.bincount(columns[self._is_lower], minlength=len(starts) - 1), out=self._starts[1:])
+        self._values = _copied(matrix.data[self._is_lower])
+        self._call(Phase.ANALYSE)
+
+    def _fill(self, matrix: csc_matrix) -> None:
+        self._values = _copied(matrix.data[self._is_lower])
+        self._call(Phase.FACTORIZE)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
+        # One after the other in memory; of (k, n) this is a view.
+        columns = right.T
+        if not is_aligned(columns):
+            columns = _copied(columns)
+        solution = aligned(columns.shape)
+        self._call(Phase.SOLVE, columns, solution)
+        return solution.T
+
+    def renewed(self, matrix: csc_matrix) -> PardisoFactor:
+        """Return the factor of another matrix of the same size."""
+        if matrix.indices is not self._indices:
+            # A second analysis by one handle would leave the memory of the first behind.
+            _release(self._kind, self._threads, self._handle, self._table, matrix.shape[0])
+            self._handle[:] = 0
+            self._set_pattern(matrix)
+        self._fill(matrix)
+        return self
+
+    def _call(self, phase: int, right: FloatArray | None = None, solution: FloatArray | None = None) -> None:
+        count = 1 if right is None or right.ndim == 1 else len(right)
+        code = _pardiso(
+            self._kind,
+            self._threads,
+            phase,
+            self._handle,
+            self._table,
+            (self._values, self._starts, self._rows, self._order),
+            (right, solution),
+            count,
+        )
+        if code == Code.ZERO_PIVOT and self._kind == Kind.POSITIVE_DEFINITE:
+            raise NotPositiveDefinite("a pivot is not positive")
+        if code == Code.OUT_OF_MEMORY:
+            raise MemoryError(f"PARDISO has not enough memory for {len(self._order):,} unknowns")
+        if code:
+            raise RuntimeError(f"PARDISO failed with code {code} in phase {phase}")
+
+
+def _copied(array: FloatArray) -> FloatArray:
+    copy = aligned(array.shape)
+    copy[...] = array
+    return copy
+
+
+def _release(kind: int, thread_count: int, handle: AnyArray, table: AnyArray, n: int) -> None:
+    none = np.zeros(1)
+    order = np.zeros(1, dtype=np.int32)
+    starts = np.zeros(n + 1, dtype=np.int32)
+    _pardiso(kind, thread_count, Phase.RELEASE, handle, table, (none, starts, order, order), (None, None), 1)
+
+
+def _pardiso(
+    kind: int,
+    thread_count: int,
+    phase: int,
+    handle: AnyArray,
+    table: AnyArray,
+    matrix: tuple[AnyArray, AnyArray, AnyArray, AnyArray],
+    sides: tuple[AnyArray | None, AnyArray | None],
+    count: int,
+) -> int:
+    values, starts, rows, order = matrix
+    code = ctypes.c_int32(0)
+    pardiso, set_threads = _routines()
+    before = set_threads(thread_count)
+    pardiso(
+        _address(handle),
+        *map(_number, (1, 1, kind, phase, len(starts) - 1)),
+        *map(_address, (values, starts, rows, order)),
+        _number(count),
+        _address(table),
+        _number(0),  # no messages
+        *map(_address, sides),
+        ctypes.byref(code),
+    )
+    set_threads(before)
+    return code.value
+
+
+def _number(value: int) -> Any:
+    return ctypes.byref(ctypes.c_int32(value))
+
+
+def _address(array: AnyArray | None) -> ctypes.c_void_p:
+    return ctypes.c_void_p(None if array is None else array.ctypes.data)
+
+
+@lru_cache(maxsize=1)
+def _routines() -> tuple[Any, Any]:
+    """Return PARDISO, and what sets the number of threads of the calling thread and returns the one before."""
+    library = _library()
+    pardiso, set_threads = library["pardiso"], library["MKL_Set_Num_Threads_Local"]
+    pardiso.restype = None
+    set_threads.argtypes, set_threads.restype = [ctypes.c_int], ctypes.c_int
+    # Or else it takes fewer threads than it is told where it thinks that best.
+    library["MKL_Set_Dynamic"](0)
+    return pardiso, set_threads
+
+
+def _library() -> ctypes.CDLL:
+    """Load MKL from the package that brings it; pypardiso, which knows more places, looks through all folders."""
+    os.environ.setdefault(WAITING_TIME, "0")
+    try:
+        installed = metadata.files("mkl") or ()
+    except metadata.PackageNotFoundError:
+        installed = ()
+    for path in installed if LIBRARY_GIVEN not in os.environ else ():
+        if path.name.startswith(RUNTIMES):
+            with suppress(OSError):
+                return ctypes.CDLL(str(path.locate()))
+    from pypardiso import PyPardisoSolver
+
+    return PyPardisoSolver().libmkl

@@ -1,0 +1,161 @@
+"""Shortest paths and spanning trees on graphs that may have parallel edges and loops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.compiled import compiled
+from ..base.sets import edges_at_nodes, grow_forest
+
+
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """The shortest path to each node from the nearest of some sources.
+
+    Attributes:
+        distance: (n,) infinite at nodes that are not reached.
+        before, edge: (n,) the last node before each on its path, and the edge from there; -1 at sources and at nodes
+            that are not reached.
+        source: (n,) where the path begins, -1 at nodes that are not reached.
+    """
+
+    distance: FloatArray
+    before: IntArray
+    edge: IntArray
+    source: IntArray
+
+    def nodes_to(self, ends: IntArray) -> IntArray:
+        """Return the nodes on the paths to some nodes, each once, without the sources."""
+        found: dict[int, None] = {}
+        for node in ends.tolist():
+            while node not in found and self.before[node] >= 0:
+                found[node] = None
+                node = int(self.before[node])
+        return np.array(list(found), dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class MultiGraph:
+    """An undirected graph.
+
+    Attributes:
+        nodes: number of nodes.
+        ends: (e, 2) the nodes that each edge connects.
+        costs: (e,) from 0, for paths.
+        beside: the edges at each node, if they are known; see `edges_at_nodes`.
+    """
+
+    nodes: int
+    ends: IntArray
+    costs: FloatArray
+    beside: tuple[IntArray, IntArray] | None = None
+
+    @cached_property
+    def _beside(self) -> tuple[IntArray, IntArray]:
+        return edges_at_nodes(self.ends, self.nodes) if self.beside is None else self.beside
+
+    def shortest_paths(self, sources: IntArray, targets: IntArray | None = None) -> Paths:
+        """Return the shortest paths from sources; edges of infinite costs are not taken.
+
+        Args:
+            sources: nodes.
+            targets: nodes of which only the nearest is of interest: the search ends there, and what lies farther away
+                is as if it could not be reached, or farther than it is.
+        """
+        is_target = np.zeros(self.nodes, dtype=bool)
+        if targets is not None:
+            is_target[targets] = True
+        distance = np.full(self.nodes, np.inf)
+        before, edge, source = np.full((3, self.nodes), -1)
+        find_paths(*self._beside, self.ends, self.costs, sources, is_target, distance, before, edge, source)
+        return Paths(distance, before, edge, source)
+
+    def minimum_spanning_tree(self) -> IntArray:
+        """Return the edges of a minimum spanning forest; of equally dear ones the first."""
+        order = np.argsort(self.costs, kind="stable")
+        return np.sort(order[grow_forest(self.ends[order], self.nodes)])
+
+
+@compiled
+def find_paths(
+    starts: IntArray,
+    sides: IntArray,
+    ends: IntArray,
+    costs: FloatArray,
+    sources: IntArray,
+    is_target: BoolArray,
+    distance: FloatArray,
+    before: IntArray,
+    edge: IntArray,
+    source: IntArray,
+) -> None:
+    """Fill distances (infinite on entry), and what `Paths` has beside them (-1), as far as the nearest target.
+
+    E. W. Dijkstra, "A note on two problems in connexion with graphs", 1959.
+
+    starts, sides: of the edges at each node, see `edges_at_nodes`.
+    """
+    keys, items = np.empty(len(sides) + len(sources)), np.empty(len(sides) + len(sources), np.int64)
+    size = 0
+    for v in sources:
+        if distance[v] > 0.0:
+            distance[v], source[v] = 0.0, v
+            size = push(keys, items, size, 0.0, v)
+    while size > 0:
+        key, v = keys[0], items[0]
+        if is_target[v]:
+            break
+        size = drop_first(keys, items, size)
+        if key > distance[v]:
+            continue
+        for i in range(starts[v], starts[v + 1]):
+            e = sides[i]
+            other = ends[e, 0] + ends[e, 1] - v
+            if key + costs[e] < distance[other]:
+                distance[other], before[other], edge[other] = key + costs[e], v, e
+                source[other] = source[v]
+                size = push(keys, items, size, distance[other], other)
+
+
+@compiled
+def push(keys: FloatArray, items: IntArray, size: int, key: float, item: int) -> int:
+    """Put an item on a heap, four below each, and return its new size."""
+    i = size
+    while i > 0:
+        parent = (i - 1) >> 2
+        if keys[parent] <= key:
+            break
+        keys[i] = keys[parent]
+        items[i] = items[parent]
+        i = parent
+    keys[i] = key
+    items[i] = item
+    return size + 1
+
+
+@compiled
+def drop_first(keys: FloatArray, items: IntArray, size: int) -> int:
+    """Take the least item off a heap and return its new size."""
+    size -= 1
+    key, item = keys[size], items[size]
+    i = 0
+    while True:
+        first = 4 * i + 1
+        if first >= size:
+            break
+        child, least = first, keys[first]
+        for other in range(first + 1, min(first + 4, size)):
+            if keys[other] < least:
+                child, least = other, keys[other]
+        if least >= key:
+            break
+        keys[i] = least
+        items[i] = items[child]
+        i = child
+    keys[i] = key
+    items[i] = item
+    return size

@@ -1,0 +1,52 @@
+"""Measures of a parameterization, and of how it was found.
+
+What needs NumPy is imported on first use: the commands name the measures in their help.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .requirements import REPORTED, Requirement, breaches, parse_requirements
+
+if TYPE_CHECKING:
+    from .distortion import Distortion, angle_sum_errors, measure, quantile
+    from .guarantees import broken_promises
+    from .report import Row, as_rows, map_rows, number_text, packing_row
+
+__all__ = [
+    "as_rows",
+    "angle_sum_errors",
+    "Distortion",
+    "REPORTED",
+    "Requirement",
+    "Row",
+    "breaches",
+    "broken_promises",
+    "map_rows",
+    "measure",
+    "number_text",
+    "packing_row",
+    "parse_requirements",
+    "quantile",
+]
+
+_HOMES = {
+    "as_rows": "report",
+    "angle_sum_errors": "distortion",
+    "Distortion": "distortion",
+    "Row": "report",
+    "broken_promises": "guarantees",
+    "map_rows": "report",
+    "measure": "distortion",
+    "number_text": "report",
+    "packing_row": "report",
+    "quantile": "distortion",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module("." + _HOMES[name], __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,375 @@
+"""Measures of a parameterization, from the mesh and its UVs alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.arrays import BoolArray, FloatArray, IntArray, dots
+from ..base.compiled import compiled
+from ..errors import ArrayShapeError
+from ..geometry.lengths import check_lengths
+from ..geometry.overlap import Overlaps, overlaps_of_mesh
+from ..geometry.straight import place_triangles
+from ..mesh.charts import both_sides, joined_edges, label_charts
+from ..mesh.connectivity import TriangleMesh
+
+ZERO_AREA = 1e-12  # twice the area over the longest side squared: no digit of the shape is left below
+
+
+@dataclass(frozen=True, eq=False)
+class Distortion:
+    """Quality of a flattening.
+
+    Quasi-conformal distortion (QC) is the ratio of the singular values of a triangle's map, 1 where it is
+    conformal (Kharevych et al. 2006); means and quantiles are weighted by the area on the model.
+
+    Attributes:
+        qc: (m,) per triangle; NaN where the triangle is degenerate on the model or in the plane.
+        log_area_scale: (m,) log of sqrt(UV area / area on the model); NaN likewise.
+        qc_mean, qc_p95, qc_max: of `qc`.
+        area_std: standard deviation of `log_area_scale`.
+        flipped: triangles that run against the orientation of their chart.
+        degenerate: triangles without area in the plane that have some on the model.
+        degenerate_input: triangles without area on the model.
+        charts: pieces of the layout.
+        mirrored_charts: charts whose orientation is reversed.
+        seam_length: length on the model of all seams, each once, over the square root of the area.
+        seam_mismatch: relative difference of a seam edge's two UV lengths: mean, weighted by length.
+        seam_mismatch_max: the same, the largest.
+        seam_motion_mismatch: how far the two sides of a seam are from one rigid motion of each other: the largest
+            change of the rotation between them from one seam edge to the next, radians; where seams branch
+            or end, and at cones, there is none to compare.
+        density_spread: of texels per length on the model, the quantile at 95% over that at 5%.
+        overlap: part of the area that the layout covers that it covers more than once.
+        overlapping_pairs: pairs of triangles with inner points in common, without rounding.
+        angle_sum_error: largest difference, radians, between the sum of the angles around a vertex in the plane and
+            what it is to be: 2 pi (pi on the boundary) less the curvature prescribed; NaN if none is known.
+        curvature_error: ||target - K||_2 / n of the metric, in units of pi (Table 1 of the paper).
+        curvature_error_max: largest |target - K|, in units of pi.
+    """
+
+    qc: FloatArray
+    log_area_scale: FloatArray
+    qc_mean: float
+    qc_p95: float
+    qc_max: float
+    area_std: float
+    flipped: int
+    degenerate: int
+    degenerate_input: int
+    charts: int
+    mirrored_charts: int
+    seam_length: float
+    seam_mismatch: float
+    seam_mismatch_max: float
+    seam_motion_mismatch: float
+    density_spread: float
+    overlap: float
+    overlapping_pairs: int
+    angle_sum_error: float = float("nan")
+    curvature_error: float = float("nan")
+    curvature_error_max: float = float("nan")
+
+    def rescaled(self, log_factor: float) -> Distortion:
+        """Return the measures of the same layout at another scale, given by the log of that over the one measured."""
+        return replace(self, log_area_scale=self.log_area_scale + log_factor)
+
+
+def curvature_errors(residual: FloatArray) -> tuple[float, float]:
+    """Return ||target - K||_2 / n as in Table 1 of the paper, and the largest |target - K|, both over pi.
+
+    residual: (n,) target - K, radians.
+    """
+    return (
+        float(np.linalg.norm(residual) / len(residual) / np.pi),
+        float(np.abs(residual).max() / np.pi),
+    )
+
+
+def measure(
+    mesh: TriangleMesh,
+    corner_uv: FloatArray,
+    curvature_error: tuple[float, float] = (np.nan, np.nan),
+    cones: IntArray | None = None,
+    prescribed: FloatArray | None = None,
+    overlaps: Overlaps | None = None,
+    lengths: ArrayLike | None = None,
+) -> Distortion:
+    """Measure a UV map.
+
+    Args:
+        mesh: the mesh.
+        corner_uv: (m, 3, 2) the UV point of every triangle corner.
+        cones: (s,) vertices at which the rotation between the sides of a seam changes.
+        curvature_error: what `curvature_errors` returns for the metric.
+        prescribed: (n,) curvature that vertices are to have in the plane, radians; NaN where it is free.
+        overlaps: what `find_overlaps` returns, if that is known.
+        lengths: (m, 3) side lengths of the metric that is mapped, column i opposite corner i; None for those between
+            the positions of the vertices.
+
+    Raises:
+        ArrayShapeError, NonFiniteError: the arrays do not fit the mesh, or UVs are not finite.
+        LengthError: the lengths are no metric.
+    """
+    _check_shapes(mesh, corner_uv, prescribed)
+    own = None if lengths is None else check_lengths(mesh, lengths, flat=True)
+    measured = measure_map(mesh, corner_uv, curvature_error, cones, own)
+    found = overlaps_of_mesh(mesh.edge_halfedges, corner_uv) if overlaps is None else overlaps
+    if prescribed is not None:
+        errors = np.abs(angle_sum_errors(mesh, corner_uv, prescribed)[0])
+        measured = replace(measured, angle_sum_error=float(np.nanmax(errors, initial=0.0)))
+    return replace(measured, overlap=found.fraction, overlapping_pairs=len(found.pairs))
+
+
+def _check_shapes(mesh: TriangleMesh, corner_uv: FloatArray, prescribed: FloatArray | None) -> None:
+    """Refuse arrays that compiled loops would read beyond their ends."""
+    for name, found, wanted in (
+        ("corner_uv", np.shape(corner_uv), (*np.shape(mesh.faces), 2)),
+        (
+            "prescribed",
+            (len(mesh.vertices),) if prescribed is None else np.shape(prescribed),
+            (len(mesh.vertices),),
+        ),
+    ):
+        if found != wanted:
+            raise ArrayShapeError(f"{name} must have the shape {wanted}, as the mesh has it, not {found}")
+
+
+def angle_sum_errors(
+    mesh: TriangleMesh, corner_uv: FloatArray, prescribed: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return (n,) by what the angles around each vertex sum to too much, radians; and what a rounded point makes of it.
+
+    Args:
+        mesh: the mesh.
+        corner_uv: (m, 3, 2) the UV point of every triangle corner.
+        prescribed: (n,) curvature of vertices in the plane, NaN where it is free; so is the error then.
+    """
+    uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
+    sums, change = sum_angles(mesh.faces, uv, len(mesh.vertices))
+    full = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
+    return sums - full + prescribed, change
+
+
+def measure_map(
+    mesh: TriangleMesh,
+    corner_uv: FloatArray,
+    curvature_error: tuple[float, float] = (np.nan, np.nan),
+    cones: IntArray | None = None,
+    lengths: FloatArray | None = None,
+) -> Distortion:
+    """Return all measures but those of overlaps; arguments are those of `measure`."""
+    corner_uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
+    shapes = (mesh.vertices, mesh.faces) if lengths is None else _drawn(lengths)
+    area, has_area, uv_area, has_uv_area, qc = measure_triangles(*shapes, corner_uv, ZERO_AREA)
+    valid = has_area & has_uv_area
+    # Of most meshes all are: no copies then.
+    chosen = slice(None) if valid.all() else valid
+    weights = area[chosen]
+    scales = np.log(np.abs(uv_area[chosen]) / weights) / 2
+    log_scale = np.full(len(area), np.nan)
+    log_scale[chosen] = scales
+    mean_scale = _mean(scales, weights)
+
+    joined = joined_edges(mesh, corner_uv)
+    seams = np.flatnonzero(~joined & ~mesh.is_boundary_edge)
+    charts, chart = label_charts(mesh, joined)
+    sign = np.where(has_uv_area, np.sign(uv_area), 0)
+    majority = np.sign(np.bincount(chart, weights=np.abs(uv_area) * sign, minlength=charts))
+    against = sign * majority[chart] < 0
+    seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
+    if lengths is not None:
+        seam_lengths = lengths.ravel()[mesh.edge_halfedges[seams, 0]]
+    return Distortion(
+        qc=qc,
+        log_area_scale=log_scale,
+        qc_mean=_mean(qc[chosen], weights),
+        qc_p95=quantile(qc[chosen], weights, 0.95),
+        qc_max=float(qc[chosen].max()) if len(weights) else float("nan"),
+        area_std=float(np.sqrt(_mean((scales - mean_scale) ** 2, weights))),
+        flipped=int(against.sum()),
+        degenerate=int((has_area & ~has_uv_area).sum()),
+        degenerate_input=int((~has_area).sum()),
+        charts=charts,
+        mirrored_charts=int((majority < 0).sum()),
+        seam_length=float(seam_lengths.sum() / np.sqrt(area.sum() / 2)) if area.sum() > 0 else 0.0,
+        seam_mismatch=_mean(mismatches, seam_lengths) if len(seams) else 0.0,
+        seam_mismatch_max=float(mismatches.max()) if len(seams) else 0.0,
+        seam_motion_mismatch=_seam_motion_mismatch(mesh, corner_uv, seams, cones),
+        density_spread=_spread(scales, weights),
+        overlap=float("nan"),
+        overlapping_pairs=0,
+        curvature_error=curvature_error[0],
+        curvature_error_max=curvature_error[1],
+    )
+
+
+def _side_lengths(ends: FloatArray) -> FloatArray:
+    side = ends[:, 1] - ends[:, 0]
+    return np.sqrt(dots(side, side))
+
+
+def _seam_mismatch(
+    mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the length on the model of each seam edge, and the relative difference of its UV lengths."""
+    here, there = (_side_lengths(ends) for ends in both_sides(mesh, seams, corner_uv))
+    ends = mesh.vertices[mesh.edges[seams]]
+    return _side_lengths(ends), np.abs(here - there) / np.maximum((here + there) / 2, np.finfo(float).tiny)
+
+
+def _seam_motion_mismatch(
+    mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray, cones: IntArray | None
+) -> float:
+    """Return the largest change, radians, of the rotation between a seam's sides along it."""
+    here, there = both_sides(mesh, seams, corner_uv)
+    one = (here[:, 1] - here[:, 0]) @ np.array([1, 1j])
+    two = (there[:, 1] - there[:, 0]) @ np.array([1, 1j])
+    # `here` is the side of the first half-edge, which may be either side of the seam: each edge tells the
+    # rotation as seen by a walker along it, from the left side to the right.
+    rotation = one * np.conj(two)
+    rotation = rotation / np.maximum(np.abs(rotation), np.finfo(float).tiny)
+    starts, ends = mesh.ends_of(mesh.edge_halfedges[seams, 0])
+    degree = np.bincount(np.concatenate([starts, ends]), minlength=len(mesh.vertices))
+    passed = (degree == 2) & ~mesh.is_boundary_vertex
+    if cones is not None:
+        passed[cones] = False
+    # The two seam edges at each vertex that a seam passes, and whether each of them leaves it.
+    at = np.concatenate([starts, ends])
+    leaves = np.repeat([True, False], len(seams))
+    edge = np.tile(np.arange(len(seams)), 2)
+    order = np.argsort(at, kind="stable")
+    order = order[passed[at[order]]].reshape(-1, 2)
+    if not len(order):
+        return 0.0
+    first, second = rotation[edge[order[:, 0]]], rotation[edge[order[:, 1]]]
+    # Edges that both leave, or both arrive, are walked in opposite directions, with left and right exchanged.
+    opposed = leaves[order[:, 0]] == leaves[order[:, 1]]
+    change = np.where(opposed, first * second, first * np.conj(second))
+    return float(np.abs(np.angle(change)).max())
+
+
+def _mean(values: FloatArray, weights: FloatArray) -> float:
+    total = float(weights.sum())
+    return float((values * weights).sum() / total) if total > 0 else float("nan")
+
+
+def _spread(log_scale: FloatArray, weights: FloatArray) -> float:
+    low, high = quantiles(log_scale, weights, 0.05, 0.95)
+    return float(np.exp(high - low))
+
+
+def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
+    """Return the value below which lies a fraction of the weight; NaN of nothing."""
+    return quantiles(values, weights, fraction)[0]
+
+
+def quantiles(values: FloatArray, weights: FloatArray, *fractions: float) -> list[float]:
+    """Return the values below which lie fractions of the weight; NaN of nothing."""
+    if not len(values):
+        return [float("nan")] * len(fractions)
+    order = np.argsort(values)
+    cumulated = np.cumsum(weights[order])
+    return [float(values[order[np.searchsorted(cumulated, part * cumulated[-1])]]) for part in fractions]
+
+
+def _drawn(lengths: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return triangles with given side lengths, each drawn by itself: positions (3m, 3), and (m, 3) indices of them."""
+    sides = np.empty(lengths.size, dtype=np.complex128)
+    place_triangles(lengths.ravel(), sides)
+    along = sides.reshape(-1, 3)
+    corners = np.stack([np.zeros(len(along)), along[:, 2], along[:, 2] + along[:, 0]], axis=1).ravel()
+    positions = np.stack([corners.real, corners.imag, np.zeros(len(corners))], axis=1)
+    return positions, np.arange(len(corners)).reshape(-1, 3)
+
+
+@compiled
+def measure_triangles(
+    vertices: FloatArray, faces: IntArray, corner_uv: FloatArray, zero: float
+) -> tuple[FloatArray, BoolArray, FloatArray, BoolArray, FloatArray]:
+    """Return twice the area of triangles and whether they have any, the same in the plane, and their QC distortion.
+
+    Args:
+        vertices: (n, 3) positions.
+        faces: (m, 3).
+        corner_uv: (m, 3, 2).
+        zero: twice the area over the square of the longest side up to which there is none.
+
+    Returns:
+        (m,) each. Areas in the plane have a sign. QC is the ratio of the singular values of the map, NaN where one of
+        the areas is none.
+    """
+    count = len(faces)
+    area, uv_area, ratio = np.empty(count), np.empty(count), np.empty(count)
+    has_area, has_uv_area = np.empty(count, np.bool_), np.empty(count, np.bool_)
+    one, two, normal = np.empty(3), np.empty(3), np.empty(3)
+    for f in range(count):
+        along, inner, across, opposite = 0.0, 0.0, 0.0, 0.0
+        for x in range(3):
+            start = vertices[faces[f, 0], x]
+            one[x], two[x] = vertices[faces[f, 1], x] - start, vertices[faces[f, 2], x] - start
+            along += one[x] * one[x]
+            inner += one[x] * two[x]
+            across += two[x] * two[x]
+            opposite += (two[x] - one[x]) ** 2
+        square = 0.0
+        for x in range(3):
+            y, z = (x + 1) % 3, (x + 2) % 3
+            normal[x] = one[y] * two[z] - one[z] * two[y]
+            square += normal[x] * normal[x]
+        area[f] = math.sqrt(square)
+        has_area[f] = area[f] > zero * max(along, across, opposite)
+        u1, v1 = corner_uv[f, 1, 0] - corner_uv[f, 0, 0], corner_uv[f, 1, 1] - corner_uv[f, 0, 1]
+        u2, v2 = corner_uv[f, 2, 0] - corner_uv[f, 0, 0], corner_uv[f, 2, 1] - corner_uv[f, 0, 1]
+        uv_area[f] = u1 * v2 - v1 * u2
+        longest = max(u1 * u1 + v1 * v1, u2 * u2 + v2 * v2, (u2 - u1) ** 2 + (v2 - v1) ** 2)
+        has_uv_area[f] = abs(uv_area[f]) > zero * longest
+        ratio[f] = np.nan
+        if has_area[f] and has_uv_area[f]:
+            # The images of two orthonormal vectors, the first along the first side.
+            base = math.sqrt(along)
+            height = area[f] / base
+            x1, y1 = u1 / base, v1 / base
+            x2, y2 = (u2 - x1 * inner / base) / height, (v2 - y1 * inner / base) / height
+            larger = (math.hypot(x1 + y2, y1 - x2) + math.hypot(x1 - y2, y1 + x2)) / 2
+            # The smaller one from the determinant: their difference would cancel.
+            smaller = abs(uv_area[f]) / area[f] / larger
+            ratio[f] = max(larger / smaller, 1.0)
+    return area, has_area, uv_area, has_uv_area, ratio
+
+
+@compiled
+def sum_angles(faces: IntArray, corner_uv: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return (n,) the sum of the angles in the plane around each vertex, and by what a rounded point changes it.
+
+    Angles are those of the triangles' shapes, whichever way these are turned, so a vertex that its triangles go
+    around twice has 4 pi. Where a side has no length there is no angle. The change is in radians per unit that points
+    are off by, infinite beside such a side.
+
+    Args:
+        faces: (m, 3) the vertices, or whatever else angles are to be summed up at.
+        corner_uv: (m, 3, 2).
+        count: n.
+    """
+    sums, change = np.zeros(count), np.zeros(count)
+    u, v, length = np.empty(3), np.empty(3), np.empty(3)
+    for f in range(len(faces)):
+        for i in range(3):  # the sides from each corner to the next
+            u[i] = corner_uv[f, (i + 1) % 3, 0] - corner_uv[f, i, 0]
+            v[i] = corner_uv[f, (i + 1) % 3, 1] - corner_uv[f, i, 1]
+            length[i] = math.hypot(u[i], v[i])
+            if length[i] > 0.0:
+                # Of length one, lest products of tiny or huge ones are no numbers.
+                u[i], v[i] = u[i] / length[i], v[i] / length[i]
+        for i in range(3):
+            before = (i + 2) % 3
+            change[faces[f, i]] += 1.0 / length[i] + 1.0 / length[before]
+            if length[i] > 0.0 and length[before] > 0.0:
+                across = u[i] * v[before] - v[i] * u[before]
+                along = -(u[i] * u[before] + v[i] * v[before])
+                sums[faces[f, i]] += abs(math.atan2(across, along))
+    return sums, change

@@ -1,0 +1,241 @@
+"""What a flattening promises, held against what it is: a note on everything that is not kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.arrays import unit_exponent
+from ..base.text import plural
+from ..geometry.overlap import Overlaps
+from ..geometry.planar import sides_between
+from ..mesh.connectivity import TriangleMesh
+from .distortion import angle_sum_errors, measure
+from .rotations import Rotations, seam_rotations
+
+if TYPE_CHECKING:
+    from ..result import Flattening
+
+# Of a double, and of the 32-bit numbers of GLB files, relative to 1.
+DOUBLE, SINGLE = 2.0**-53, 2.0**-24
+# Points are off by so many roundings: of the coordinates, and of what turned, moved and scaled them.
+ROUNDINGS = 8
+# Radians, or parts of a length, that a layout may be off by beside rounding. Metrics are solved to about 1e-11.
+EXACT = 1e-6
+# Radians for methods that have no exact angles: a vertex that triangles go around twice is off by 2 pi.
+WINDING = 1.0
+# Mean of QC, and what a twentieth of the area is above, from which on a layout is unfit for most uses, though every
+# triangle is upright. Single triangles are worse on many models.
+EXTREME_QC, EXTREME_TAIL = 1.25, 2.0
+# Radians by which a round boundary may turn otherwise than a circle: it is found in rounds, to a thousandth.
+NOT_ROUND = 0.01
+# Relative difference of the sides of marked seams that methods without a flat metric are let go.
+ROUGH = 0.01
+
+
+def broken_promises(result: Flattening, unit: float = DOUBLE) -> tuple[str, ...]:
+    """Return what a result does not keep of what its options promise, one sentence each.
+
+    Args:
+        result: with its measures.
+        unit: rounding of the coordinates, relative to 1.
+    """
+    return (
+        *_upright(result),
+        *_apart(result),
+        *_angle_sums(result, unit),
+        *_equal_sides(result, unit),
+        *_boundary_lengths(result, unit),
+        *_round_boundary(result, unit),
+        *_whole_turns(result, unit),
+        *_distortion(result),
+    )
+
+
+def remeasured(
+    result: Flattening,
+    changed: Flattening,
+    unit: float,
+    notes: tuple[str, ...] = (),
+    overlaps: Overlaps | None = None,
+) -> Flattening:
+    """Return a changed result, measured anew, with the notes that it then has.
+
+    Args:
+        result: before the change.
+        changed: with the measures and notes of that.
+        unit: rounding of its coordinates.
+        notes: more of them.
+        overlaps: of its triangles, if they are known.
+    """
+    told = broken_promises(result)
+    old = result.distortion
+    # By a power of two, lest squares of tiny or huge lengths are no numbers.
+    exponent = -unit_exponent(changed.vertices[changed.faces])
+    distortion = measure(
+        TriangleMesh(np.ldexp(changed.vertices, exponent), changed.faces),
+        changed.corner_uv,
+        (old.curvature_error, old.curvature_error_max),
+        changed.cones,
+        changed.prescribed,
+        overlaps,
+        None if changed.lengths is None else np.ldexp(changed.lengths, exponent),
+    ).rescaled(exponent * float(np.log(2)))
+    changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
+    kept = tuple(note for note in result.notes if note not in told)
+    return replace(changed, notes=(*kept, *broken_promises(changed, unit), *notes))
+
+
+def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
+    """Return the rotations of seams after points were moved a little: the worst of them is measured anew."""
+    before = result.rotations
+    if before is None:
+        return None
+    old, new = (TriangleMesh(each.vertices, each.faces) for each in (result, changed))
+    off, after = (
+        seam_rotations(mesh, each.corner_uv, before.quantum) for mesh, each in ((old, result), (new, changed))
+    )
+    # Polygons may have other diagonals: edges are told by their ends.
+    known, names = (mesh.edges[~mesh.is_boundary_edge] @ [len(result.vertices), 1] for mesh in (old, new))
+    bound = ~np.isin(names, known[~before.binds(off)])
+    return replace(before, worst=float(after[bound].max(initial=0.0)))
+
+
+def _is_exact(result: Flattening) -> bool:
+    """Whether angles and seams are those of a flat metric, for which no least squares stand in."""
+    return result.settings.get("method") == "exact"
+
+
+def _upright(result: Flattening) -> Iterator[str]:
+    measures = result.distortion
+    parts = [
+        plural(count, f"triangle {what}", f"triangles {what}")
+        for count, what in ((measures.flipped, "upside down"), (measures.degenerate, "without area"))
+        if count
+    ]
+    if parts:
+        advice = "refine the mesh there" if _is_exact(result) else "--method exact has fewest"
+        verb, broken = "is" if parts[0].startswith("1 ") else "are", result.solve.broken
+        why = f" ({plural(broken, 'triangle')} broke the triangle inequality in the metric)" if broken else ""
+        yield f"There {verb} {' and '.join(parts)} in the plane{why}: {advice}."
+
+
+def _apart(result: Flattening) -> Iterator[str]:
+    measures = result.distortion
+    if result.settings.get("charts") == "atlas" and measures.overlapping_pairs:
+        pairs = plural(measures.overlapping_pairs, "pair")
+        verb = "overlaps" if measures.overlapping_pairs == 1 else "overlap"
+        yield f"{pairs} of triangles {verb} in the atlas, {measures.overlap:.2g} of the area that it covers."
+
+
+def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
+    largest = result.distortion.angle_sum_error
+    most = EXACT if _is_exact(result) else WINDING
+    if not largest > most:
+        return
+    mesh = TriangleMesh(result.vertices, result.faces)
+    errors, change = angle_sum_errors(mesh, result.corner_uv, result.prescribed)
+    with np.errstate(invalid="ignore"):
+        off = np.flatnonzero(np.abs(errors) > most + ROUNDINGS * unit * change)
+    if len(off):
+        worst = off[np.argmax(np.abs(errors[off]))]
+        yield (
+            f"Around {plural(len(off), 'vertex', 'vertices')} the angles do not sum to what they are to be: vertex "
+            f"{worst} is the worst, {errors[worst]:+.3g} rad off."
+        )
+
+
+def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
+    settings = result.settings
+    marked = settings.get("seams") is not None or settings.get("sharp_angle") is not None
+    most = EXACT if _is_exact(result) else ROUGH if marked else np.inf
+    if not result.distortion.seam_mismatch_max > most:
+        return
+    mesh = TriangleMesh(result.vertices, result.faces)
+    one, two = np.abs(sides_between(result.corner_uv)).ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]].T
+    off, mean = np.abs(one - two), (one + two) / 2
+    beyond = off > most * mean + ROUNDINGS * unit
+    if beyond.any():
+        worst = (off[beyond] / mean[beyond]).max()
+        yield f"The two sides of seams differ in length, by up to {worst:.2g} of it."
+
+
+def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
+    if result.settings.get("boundary") != "lengths":
+        return
+    mesh = TriangleMesh(result.vertices, result.faces)
+    sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
+    # By a power of two, lest squares underflow.
+    exponent = unit_exponent(mesh.vertices)
+    sides_in_space = np.ldexp(mesh.vertices[mesh.heads[sides]] - mesh.vertices[mesh.tails[sides]], -exponent)
+    lengths = np.linalg.norm(sides_in_space, axis=1) * np.ldexp(result.uv_scale, exponent)
+    if result.lengths is not None:
+        lengths = result.lengths.ravel()[sides] * result.uv_scale
+    off = np.abs(np.abs(sides_between(result.corner_uv).ravel()[sides]) - lengths)
+    beyond = off > EXACT * lengths + ROUNDINGS * unit
+    if beyond.any():
+        worst = (off[beyond] / np.maximum(lengths[beyond], np.finfo(float).tiny)).max()
+        yield f"Lengths along the boundary are not kept: they differ by up to {worst:.2g} of them."
+
+
+def _round_boundary(result: Flattening, unit: float) -> Iterator[str]:
+    """Tell where a loop that is to be round turns otherwise than evenly along its length in the plane."""
+    boundary = result.settings.get("boundary", "free")
+    if boundary != "disk" and isinstance(boundary, str):
+        return
+    mesh = TriangleMesh(result.vertices, result.faces)
+    count, loop = mesh.boundary_loops
+    if isinstance(boundary, Mapping):
+        origin = np.arange(len(loop)) if result.vertex_origin is None else result.vertex_origin
+        on_straight = loop[np.isin(origin, list(boundary)) & (loop >= 0)]
+        loop = np.where(np.isin(loop, on_straight), -1, loop)
+    on_round = np.flatnonzero((loop >= 0) & np.isfinite(result.prescribed))
+    if not len(on_round):
+        return
+    missing, change = angle_sum_errors(mesh, result.corner_uv, np.where(loop >= 0, 0.0, np.nan))
+    edges = mesh.is_boundary_edge
+    sides = np.abs(sides_between(result.corner_uv)).ravel()[mesh.edge_halfedges[edges, 0]]
+    share = np.bincount(mesh.edges[edges].ravel(), np.repeat(sides / 2, 2), len(loop))
+    turns = np.bincount(loop[on_round], -missing[on_round], count)[loop[on_round]]
+    around = np.bincount(loop[on_round], share[on_round], count)[loop[on_round]]
+    even = turns * share[on_round] / np.maximum(around, np.finfo(float).tiny)
+    off = np.abs(-missing[on_round] - even) - ROUNDINGS * unit * change[on_round]
+    worst = int(np.argmax(off))
+    if off[worst] > NOT_ROUND:
+        yield (
+            f"The boundary is not quite round: at vertex {on_round[worst]} it turns by "
+            f"{-missing[on_round[worst]]:.3g} rad, a circle by {even[worst]:.3g}."
+        )
+
+
+def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:
+    rotations = result.rotations
+    if rotations is None or not rotations.worst > EXACT:
+        return
+    mesh = TriangleMesh(result.vertices, result.faces)
+    shorter = (
+        np.abs(sides_between(result.corner_uv))
+        .ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]]
+        .min(axis=1)
+    )
+    off = seam_rotations(mesh, result.corner_uv, rotations.quantum)
+    off = np.where(rotations.binds(off), off, 0.0)
+    if (off * shorter > EXACT * shorter + ROUNDINGS * unit).any():
+        along = np.abs(rotations.handles).max(initial=0.0) > EXACT
+        advice = ", as loops along handles do: correct them (correct_handles=True)" if along else ""
+        yield f"Seams turn by up to {rotations.worst:.2g} rad beside multiples of the quantum{advice}."
+
+
+def _distortion(result: Flattening) -> Iterator[str]:
+    measures = result.distortion
+    if measures.qc_mean > EXTREME_QC or measures.qc_p95 > EXTREME_TAIL:
+        cure = ["more cones", "smaller triangles"]
+        if result.settings.get("boundary", "free") != "free":
+            cure.insert(0, "a free boundary")
+        yield (
+            f"Angles are far from kept: the mean QC distortion is {measures.qc_mean:.3g}, a twentieth of the area is "
+            f"above {measures.qc_p95:.3g}; {', '.join(cure[:-1])} or {cure[-1]} would lower it."
+        )

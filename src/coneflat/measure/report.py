@@ -1,0 +1,208 @@
+"""The numbers of a flattening, for people and for programs."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from ..base.text import plural
+
+if TYPE_CHECKING:
+    from ..result import Flattening
+    from .distortion import Distortion
+
+#: A measure, its value, and what it means.
+Row: TypeAlias = tuple[str, str, str]
+
+MEASURES = (
+    "curvature_error",
+    "curvature_error_max",
+    "angle_sum_error",
+    "qc_mean",
+    "qc_p95",
+    "qc_max",
+    "area_std",
+    "flipped",
+    "degenerate",
+    "degenerate_input",
+    "charts",
+    "mirrored_charts",
+    "seam_length",
+    "seam_mismatch",
+    "seam_mismatch_max",
+    "seam_motion_mismatch",
+    "density_spread",
+    "overlap",
+    "overlapping_pairs",
+)
+
+
+def as_dict(result: Flattening) -> dict[str, Any]:
+    """Return every measure as plain values; what is not finite becomes None, so that it is valid JSON."""
+    report: dict[str, Any] = {
+        "input": path_text(result.source.path) if result.source else None,
+        "vertices": len(result.vertices),
+        "triangles": len(result.faces),
+        "cones": len(result.cones),
+        **{name: getattr(result.distortion, name) for name in MEASURES},
+        **asdict(result.solve),
+        "rotation_deviation": None if result.rotations is None else result.rotations.worst,
+        "handle_deviations": None if result.rotations is None else result.rotations.handles,
+        "packing_efficiency": result.packing_efficiency,
+        "uv_scale": result.uv_scale,
+        "cone_vertices": result.cones.tolist(),
+        "cone_curvatures": result.curvatures.tolist(),
+        "seconds": dict(result.seconds),
+        "notes": list(result.notes),
+        "settings": dict(result.settings),
+    }
+    return {name: _plain(value) for name, value in report.items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def path_text(path: Path) -> str:
+    """Return a path as text that is valid in any encoding, whatever bytes its name has."""
+    return os.fsencode(path).decode("utf-8", "replace")
+
+
+def _allowed(result: Flattening) -> str:
+    """Return what the search for cones was to reach."""
+    settings = result.settings
+    if settings.get("cones") not in ("auto", "sparse"):
+        return "no search for it"
+    if settings.get("cone_count") is not None:
+        return "the least for so many cones"
+    return f"{settings['distortion']:g} allowed"
+
+
+def _rotation_rows(result: Flattening) -> list[Row]:
+    rotations = result.rotations
+    if rotations is None:
+        return []
+    quantum = f"from multiples of {rotations.quantum / np.pi:.4g} pi, radians"
+    rows = [("seam rotations", f"{rotations.worst:.1e}", f"largest deviation of a seam's rotation {quantum}")]
+    if rotations.handles:
+        handles = " ".join(f"{angle:+.1e}" for angle in rotations.handles[:6])
+        more = f"; and {len(rotations.handles) - 6} more" if len(rotations.handles) > 6 else ""
+        rows.append(("around handles", handles, f"the same along each generator{more}"))
+    return rows
+
+
+def number_text(value: float, form: str) -> str:
+    """Return a number as text; a word where there is none, as for the distortion of what has no area."""
+    return f"{value:{form}}" if math.isfinite(value) else "unknown"
+
+
+def as_rows(result: Flattening) -> list[Row]:
+    """Return (measure, value, meaning) rows of the table that the commands print."""
+    d = result.distortion
+    curvatures = result.curvatures / np.pi
+    solve = result.solve
+    cones = f"{len(result.cones)}"
+    if len(result.cones):
+        cones += f"  ({curvatures.min():+.3f} to {curvatures.max():+.3f} pi)"
+    untangled = ""
+    if solve.untangled_vertices:
+        untangled = (
+            f"triangles upside down; {plural(solve.untangled_triangles, 'was', 'were')}, until "
+            f"{plural(solve.untangled_vertices, 'vertex', 'vertices')} moved by at most "
+            f"{solve.untangled_move:.2g} edges"
+        )
+    of_map = map_rows(d)
+    if solve.relaxed_vertices:
+        moved = f"{plural(solve.relaxed_vertices, 'vertex', 'vertices')} moved"
+        relaxed = f"; {moved} to lessen it"
+        if np.isfinite(solve.qc_mean_unrelaxed):
+            before = number_text(solve.qc_mean_unrelaxed, ".4f"), number_text(solve.qc_max_unrelaxed, ".4g")
+            relaxed = f"; before {moved} {before[0]}, worst {before[1]}"
+        name, value, meaning = of_map["QC distortion"]
+        of_map["QC distortion"] = (name, value, meaning + relaxed)
+    if untangled:
+        of_map["flipped"] = (*of_map["flipped"][:2], untangled)
+    return [
+        ("triangles", f"{len(result.faces):,}", f"{_used(result):,} vertices"),
+        ("cones", cones, "singular vertices, and their curvatures"),
+        (
+            "curvature error",
+            f"{number_text(d.curvature_error, '.2e')} pi",
+            f"||target - K|| / n; worst {number_text(d.curvature_error_max, '.2e')} pi",
+        ),
+        of_map["QC distortion"],
+        of_map["area distortion"],
+        (
+            "of the metric",
+            number_text(solve.area_distortion, ".4f"),
+            f"the same of the metric; {number_text(solve.area_distortion_linear, '.4f')} in the linear model, of "
+            f"{_allowed(result)}",
+        ),
+        *(of_map[name] for name in ("flipped", "degenerate", "overlap", "charts")),
+        packing_row(result.packing_efficiency),
+        *(of_map[name] for name in ("texel density", "seam length", "seam mismatch")),
+        *_rotation_rows(result),
+    ]
+
+
+def _used(result: Flattening) -> int:
+    """Return how many vertices have triangles."""
+    is_used = np.zeros(len(result.vertices), dtype=bool)
+    is_used[result.faces] = True
+    return int(np.count_nonzero(is_used))
+
+
+def map_rows(d: Distortion) -> dict[str, Row]:
+    """Return the rows of the measures of a map alone, by their names."""
+    rows = (
+        (
+            "QC distortion",
+            number_text(d.qc_mean, ".4f"),
+            f"1 is conformal; 95% below {number_text(d.qc_p95, '.4f')}, worst {number_text(d.qc_max, '.4g')}",
+        ),
+        (
+            "area distortion",
+            number_text(d.area_std, ".4f"),
+            "standard deviation of the log of the scale, by area",
+        ),
+        ("flipped", f"{d.flipped:,}", "triangles against the orientation of their chart"),
+        (
+            "degenerate",
+            f"{d.degenerate:,}",
+            f"without area in the plane; {d.degenerate_input:,} have none on the model",
+        ),
+        (
+            "overlap",
+            f"{number_text(100 * d.overlap, '.3g')} %" if d.overlapping_pairs else "none",
+            f"of the area covered, covered twice; {plural(d.overlapping_pairs, 'pair')} of triangles",
+        ),
+        ("charts", f"{d.charts:,}", f"pieces of the layout; {d.mirrored_charts:,} mirrored"),
+        (
+            "texel density",
+            number_text(d.density_spread, ".3f"),
+            "its spread: the quantile at 95% over that at 5%",
+        ),
+        ("seam length", number_text(d.seam_length, ".3f"), "over the square root of the area"),
+        (
+            "seam mismatch",
+            number_text(d.seam_mismatch, ".1e"),
+            f"of the two sides' lengths; worst {number_text(d.seam_mismatch_max, '.1e')}",
+        ),
+    )
+    return {row[0]: row for row in rows}
+
+
+def packing_row(efficiency: float, tiles: str = "") -> Row:
+    """Return the row that says how much of the texture is covered; of which tiles, if there are several."""
+    return "packing", number_text(efficiency, ".1%"), f"of the texture is covered{tiles}"

@@ -1,0 +1,100 @@
+"""What a user requires of the measures: `flipped=0,overlap=0,qc_mean<=1.05`."""
+
+from __future__ import annotations
+
+import math
+import operator
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields
+
+from ..errors import OptionError
+from ..stages import SolveStatistics
+from .report import MEASURES
+
+_FORM = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*(?P<relation><=|>=|==|=|<|>)\s*(?P<bound>\S+)\s*")
+_RELATIONS: dict[str, Callable[[float, float], bool]] = {
+    "=": operator.eq,
+    "<=": operator.le,
+    ">=": operator.ge,
+    "<": operator.lt,
+    ">": operator.gt,
+}
+
+#: Numbers in the report of a flattening.
+REPORTED = (
+    "vertices",
+    "triangles",
+    "cones",
+    *MEASURES,
+    *(field.name for field in fields(SolveStatistics)),
+    "rotation_deviation",
+    "packing_efficiency",
+    "uv_scale",
+)
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A bound on a measure.
+
+    Attributes:
+        name: of the measure, as in the report.
+        relation: "=", "<=", ">=", "<" or ">".
+        bound: what stands to its right.
+    """
+
+    name: str
+    relation: str
+    bound: float
+
+    def __str__(self) -> str:
+        return f"{self.name}{self.relation}{self.bound:g}"
+
+    def breach(self, measures: Mapping[str, object]) -> str | None:
+        """Return what is wrong with measures of a report, or None if nothing is; what is not known never suffices."""
+        value = measures.get(self.name)
+        if not isinstance(value, (int, float)) or not math.isfinite(value):
+            return f"{self.name} is not known, and {self} is required"
+        pairs = measures.get("overlapping_pairs")
+        if self.name == "overlap" and value == 0 and isinstance(pairs, int) and pairs > 0:
+            # Overlaps so small that their share is rounded to nothing are overlaps.
+            value = math.ulp(0.0)
+        if _RELATIONS[self.relation](value, self.bound):
+            return None
+        return f"{self.name} is {value:.6g}, and {self} is required"
+
+
+def parse_requirements(texts: Iterable[str], known: Iterable[str]) -> tuple[Requirement, ...]:
+    """Return requirements from texts such as "flipped=0,qc_mean<=1.05".
+
+    Args:
+        texts: each with one or more, between commas.
+        known: names of measures.
+
+    Raises:
+        OptionError: a text is none, or names no measure.
+    """
+    known = tuple(known)
+    found = []
+    for part in (part for text in texts for part in text.split(",")):
+        match = _FORM.fullmatch(part)
+        if match is None:
+            raise OptionError(f"{part.strip()!r} is no requirement; write flipped=0 or qc_mean<=1.05")
+        name, relation = match["name"], "=" if match["relation"] == "==" else match["relation"]
+        if name not in known:
+            raise OptionError(f"there is no measure {name!r}: choose from {', '.join(sorted(known))}")
+        try:
+            bound = float(match["bound"])
+        except ValueError:
+            bound = math.nan
+        if math.isnan(bound):
+            raise OptionError(f"{part.strip()!r}: {match['bound']!r} is not a number")
+        found.append(Requirement(name, relation, bound))
+    return tuple(found)
+
+
+def breaches(requirements: Iterable[Requirement], measures: Mapping[str, object]) -> tuple[str, ...]:
+    """Return what measures of a report do not meet, a line for each requirement."""
+    lines = (requirement.breach(measures) for requirement in requirements)
+    return tuple(line for line in lines if line is not None)

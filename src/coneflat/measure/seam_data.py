@@ -1,0 +1,150 @@
+"""The cut as data: what lies on either side of every seam edge, and the motion that takes one side to the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.arrays import ComplexArray, FloatArray, IntArray, unit_exponent
+from ..geometry import double_areas, edge_lengths
+from ..mesh.charts import label_charts, point_seams
+from ..mesh.connectivity import TriangleMesh, end_corners
+from .distortion import angle_sum_errors
+from .rotations import ratios_across
+
+if TYPE_CHECKING:
+    from ..result import Flattening
+
+
+@dataclass(frozen=True, eq=False)
+class SeamData:
+    """The cut of a flattening: k seam edges, s cones, n vertices, m triangles, u points in the plane.
+
+    Seams are the inner edges that were cut, between two charts or within one; the borders of the model are none. Side 0
+    of a seam edge is on the left of the way from its first vertex to its second, seen from outside, and side 1 on the
+    right. A similarity takes side 0 to side 1: with a point of the plane as a complex number z = u + iv,
+
+        z_1 = seam_scale * exp(i seam_rotation) * z_0 + seam_translation.
+
+    The exact metric makes it a rigid motion: `seam_scale` is 1 to rounding. All is measured on the UVs, and in their
+    units; translations over `uv_scale` are in model units. A side that is missing, which no flattening has but a file
+    may, has indices -1; a motion is NaN there, and where a side has no length.
+
+    Names, types and shapes are the same in a result written as .npz. All indices are int64, all numbers float64.
+
+    Attributes:
+        seams: (k, 2) the vertices of each seam edge, as in `Flattening.seams`.
+        seam_faces: (k, 2) the triangle on each side.
+        seam_corners: (k, 2) the corner of that triangle opposite the edge: 0, 1 or 2.
+        seam_points: (k, 2, 2) index into `uv` on each side of each end, the ends in the order of `seams`.
+        seam_charts: (k, 2) the chart on each side.
+        seam_rotation: (k,) radians, above -pi and up to pi. Of the seams crossed on a way around an inner vertex
+            counterclockwise they sum to its curvature in the plane, that of a cone, say, up to full turns; crossed from
+            side 1 to side 0, a rotation counts as negative.
+        seam_translation: (k, 2) UV units.
+        seam_scale: (k,) length of side 1 over that of side 0.
+        face_chart: (m,) the chart of each triangle, from 0, in the order of their first triangles: what hangs together
+            across sides with the same points.
+        cones: (s,) cone vertices.
+        cone_angles: (s,) sum of the angles around each in the plane, radians; 2 pi less its curvature.
+        vertex_log_scale: (n,) log of the length scale from the model to the plane, UV units per model unit: half the
+            log of the area of the triangles around in the plane over that on the model. NaN where none has area.
+        log_area_scale: (m,) the same of each triangle; that of `Distortion`.
+    """
+
+    seams: IntArray
+    seam_faces: IntArray
+    seam_corners: IntArray
+    seam_points: IntArray
+    seam_charts: IntArray
+    seam_rotation: FloatArray
+    seam_translation: FloatArray
+    seam_scale: FloatArray
+    face_chart: IntArray
+    cones: IntArray
+    cone_angles: FloatArray
+    vertex_log_scale: FloatArray
+    log_area_scale: FloatArray
+
+    def as_arrays(self) -> dict[str, FloatArray | IntArray]:
+        """Return the arrays by their names."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+def seam_data(result: Flattening) -> SeamData:
+    """Return the cut of a result, measured on its points."""
+    mesh = TriangleMesh(result.vertices, result.faces)
+    seams = np.asarray(result.seams, dtype=np.int64).reshape(-1, 2)
+    halfedges = _sides(mesh, seams)
+    is_there = halfedges >= 0
+    start, end = end_corners(halfedges)
+    # The ends as seams name them: along the half-edge on side 0, against it on side 1.
+    ends = np.stack([np.stack([start[:, 0], end[:, 0]], 1), np.stack([end[:, 1], start[:, 1]], 1)], axis=1)
+    points = np.where(is_there[:, :, None], result.uv_faces.ravel()[ends], -1)
+    joined = ~mesh.is_boundary_edge
+    joined[point_seams(mesh, result.uv_faces)] = False
+    chart = label_charts(mesh, joined)[1]
+    faces = np.where(is_there, halfedges // 3, -1)
+    ratio = _ratios(mesh, result.corner_uv, halfedges)
+    middles = result.uv[points].mean(axis=2) @ np.array([1, 1j])
+    shift = middles[:, 1] - ratio * middles[:, 0]
+    full = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
+    errors, _ = angle_sum_errors(mesh, result.corner_uv, np.zeros(len(full)))
+    return SeamData(
+        seams=seams,
+        seam_faces=faces,
+        seam_corners=np.where(is_there, halfedges % 3, -1),
+        seam_points=points,
+        seam_charts=np.where(is_there, chart[faces], -1),
+        seam_rotation=np.angle(ratio),
+        seam_translation=np.stack([shift.real, shift.imag], axis=1),
+        seam_scale=np.abs(ratio),
+        face_chart=chart,
+        cones=result.cones,
+        cone_angles=(errors + full)[result.cones],
+        vertex_log_scale=_vertex_scales(mesh, result.distortion.log_area_scale, result.lengths),
+        log_area_scale=result.distortion.log_area_scale,
+    )
+
+
+def _sides(mesh: TriangleMesh, seams: IntArray) -> IntArray:
+    """Return (k, 2) the half-edges on the left and right of pairs of vertices; -1 where there is none."""
+    count = len(mesh.vertices)
+    # Edges are sorted by their ends.
+    keys, wanted = mesh.edges @ [count, 1], np.sort(seams, axis=1) @ [count, 1]
+    edge = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+    sides = np.where((keys[edge] == wanted)[:, None], mesh.edge_halfedges[edge], -1)
+    is_left = (sides >= 0) & (mesh.tails[sides] == seams[:, :1])
+    is_right = (sides >= 0) & ~is_left
+    return np.stack([np.where(each, sides, -1).max(axis=1) for each in (is_left, is_right)], axis=1)
+
+
+def _ratios(mesh: TriangleMesh, corner_uv: FloatArray, halfedges: IntArray) -> ComplexArray:
+    """Return (k,) side 1 over side 0 as complex numbers; NaN where one of them is missing or has no length."""
+    ratios = np.full(len(mesh.edges), np.nan, dtype=np.complex128)
+    ratios[~mesh.is_boundary_edge] = ratios_across(mesh, corner_uv)
+    edge = mesh.halfedge_edges[halfedges.max(axis=1)]
+    own = ratios[edge]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        own = np.where(halfedges[:, 0] == mesh.edge_halfedges[edge, 0], own, 1 / own)
+    is_known = (halfedges >= 0).all(axis=1) & np.isfinite(own) & (own != 0)
+    return np.where(is_known, own, complex(np.nan, np.nan))
+
+
+def _vertex_scales(mesh: TriangleMesh, log_area_scale: FloatArray, lengths: FloatArray | None) -> FloatArray:
+    """Return (n,) half the log of the area around each vertex in the plane over that on the model."""
+    # At a size of one, as squares of extreme positions are none; factors cancel.
+    if lengths is None:
+        lengths = edge_lengths(np.ldexp(mesh.vertices, -unit_exponent(mesh.vertices[mesh.faces])), mesh.faces)
+    else:
+        lengths = np.ldexp(lengths, -unit_exponent(lengths))
+    known = np.isfinite(log_area_scale)
+    corners, areas = mesh.faces[known].ravel(), np.repeat(double_areas(lengths[known]), 3)
+    largest = log_area_scale[known].max(initial=-np.inf)
+    flat = areas * np.exp(2 * np.repeat(log_area_scale[known] - largest, 3))
+    on_model, in_plane = (np.bincount(corners, each, len(mesh.vertices)) for each in (areas, flat))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scales: FloatArray = np.log(in_plane / on_model) / 2 + largest
+    return np.where(np.isfinite(scales), scales, np.nan)

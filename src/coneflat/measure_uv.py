@@ -1,0 +1,274 @@
+"""Measures of UVs that a mesh already has, whatever made them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .base.arrays import FloatArray, IntArray, unit_exponent
+from .base.text import plural
+from .errors import MissingUVError
+from .geometry.coverage import layers_of_raster
+from .geometry.layers import MOST_CELLS
+from .geometry.overlap import find_overlaps
+from .geometry.planar import signed_double_areas
+from .io.mapped import Mapped, as_mapped
+from .measure.distortion import Distortion, measure_map
+from .measure.report import MEASURES, path_text
+from .mesh.charts import joined_edges, label_charts
+from .mesh.check import CheckedMesh, check_mesh, left_out
+from .mesh.connectivity import TriangleMesh, corner_fans, end_corners
+from .source.numbering import at_unit_size
+
+#: Pairs of triangles that overlap, for each triangle and at least: beyond them areas are counted in pixels, as every
+#: triangle may lie on every other one.
+MOST_PAIRS, FEW_PAIRS = 8, 10_000
+
+#: A power of two beyond which there are no numbers.
+MOST_EXPONENT = 1100
+
+#: Of the measures of a flattening, those of a map alone.
+MAP_MEASURES = tuple(name for name in MEASURES if not name.startswith(("curvature", "angle_sum")))
+
+#: What is measured besides.
+COUNTS = (
+    "vertices",
+    "polygons",
+    "triangles",
+    "triangles_without_uv",
+    "corners_without_uv",
+    "corners_not_finite",
+    "outside",
+    "tiles",
+    "packing_efficiency",
+    "box_efficiency",
+    "angle_sum_error",
+)
+#: Names of all measures, as in the report.
+MEASURED = COUNTS + MAP_MEASURES
+
+
+@dataclass(frozen=True, eq=False)
+class UVMeasures:
+    """Measures of the UVs of a mesh.
+
+    Attributes:
+        mesh: (m triangles) what was measured: the triangles that have UVs, as a manifold.
+        corner_uv: (m, 3, 2) their UVs.
+        distortion: as of a flattening, but for errors of curvature.
+        counts: the other measures by their names; see `report`.
+        notes: what is left out of the measures, and what was done to the mesh, one sentence each.
+        path: of the file, if there is one.
+    """
+
+    mesh: TriangleMesh
+    corner_uv: FloatArray
+    distortion: Distortion
+    counts: Mapping[str, float]
+    notes: tuple[str, ...]
+    path: Path | None = None
+
+    def report(self) -> dict[str, Any]:
+        """Return all measures as plain Python values, ready for JSON; what is not known is None.
+
+        Besides those of `Flattening.report` that are of the map: `triangles_without_uv`, and among the corners of
+        polygons `corners_without_uv` and `corners_not_finite`; `outside`, triangles that reach out of the unit
+        square; `tiles`, unit squares that hold triangles; `packing_efficiency`, what is covered of them;
+        `box_efficiency`, the area of all triangles over that of the smallest upright square around them;
+        `angle_sum_error`, the most by which the angles around a point inside a chart miss a full turn, radians.
+        """
+        return {
+            "input": None if self.path is None else path_text(self.path),
+            **{name: value if np.isfinite(value) else None for name, value in self.values().items()},
+            "notes": list(self.notes),
+        }
+
+    def values(self) -> dict[str, float]:
+        """Return the measures by their names; NaN where one is not known."""
+        return {**self.counts, **{name: getattr(self.distortion, name) for name in MAP_MEASURES}}
+
+    def __repr__(self) -> str:
+        d = self.distortion
+        return (
+            f"<UVMeasures: {plural(len(self.mesh.faces), 'triangle')}, {plural(d.charts, 'chart')}, "
+            f"QC {d.qc_mean:.4f}, {d.flipped:,} flipped, overlap {d.overlap:.3g}>"
+        )
+
+
+def measure_uv(
+    mesh: Any,
+    faces: ArrayLike | None = None,
+    corner_uv: ArrayLike | None = None,
+    *,
+    weld: bool | None = None,
+    strict: bool = False,
+) -> UVMeasures:
+    """Measure the UVs that a mesh has, of any tool.
+
+    Polygons are measured as the fans of triangles that other programs see. A mesh that is no manifold is measured
+    with the repair of `flatten`, but overlaps are those of all triangles; corners without UVs are counted.
+
+    Args:
+        mesh: a path (.obj, .ply, .gltf, .glb with UVs, or a result as .npz), a `MeshFile`, a `Flattening`; or vertices
+            (n, 3) with
+        faces: (m, 3) vertex indices, and
+        corner_uv: (m, 3, 2) the UV of every triangle corner, v upwards; NaN where there is none.
+        weld: of a path: True merges all vertices at the same position, False none; None merges them in formats that
+            cannot share vertices, and joins coinciding borders in the others.
+        strict: refuse a mesh that is no manifold.
+
+    Raises:
+        MissingUVError: there are no UVs, or none that are finite.
+        MeshError, MeshFileError: it is no mesh, or cannot be read.
+    """
+    return measure_mapped(as_mapped(mesh, faces, corner_uv, weld), strict=strict)
+
+
+def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
+    """Return the measures of triangles with UVs.
+
+    Raises:
+        MissingUVError: no triangle has finite UVs at all corners.
+        MeshError: there is no mesh to measure; in particular, if strict, none that is manifold.
+    """
+    known = mapped.has_uv
+    checked, corner_uv = surface_of(mapped, strict=strict)
+    exponent = unit_exponent(corner_uv)
+    unit = np.ldexp(corner_uv, -exponent)
+    scaled = at_unit_size(checked)
+    distortion = measure_map(scaled.mesh, unit).rescaled((scaled.exponent + exponent) * np.log(2))
+    every = mapped.corner_uv[known]
+    cover = _cover(np.ldexp(every, -exponent))
+    tiles = len(_tiles(checked.mesh, unit, exponent))
+    with np.errstate(over="ignore"):  # What is no number is not known.
+        covered = float(np.ldexp(cover.once, min(2 * exponent, MOST_EXPONENT)))
+    counts = {
+        "vertices": len(np.unique(mapped.faces)),
+        "polygons": mapped.polygons,
+        "triangles": len(mapped.faces),
+        "triangles_without_uv": int(np.count_nonzero(~known)),
+        "corners_without_uv": mapped.without,
+        "corners_not_finite": mapped.not_finite,
+        "outside": int(((every < 0) | (every > 1)).any(axis=(1, 2)).sum()),
+        "tiles": tiles,
+        "packing_efficiency": covered / tiles,
+        "box_efficiency": cover.box_efficiency,
+        "angle_sum_error": angle_sum_error(checked.mesh, unit),
+    }
+    return UVMeasures(
+        mesh=checked.mesh,
+        corner_uv=corner_uv,
+        distortion=replace(distortion, overlap=cover.overlap, overlapping_pairs=cover.pairs),
+        counts=counts,
+        notes=(*mapped.notes, *_notes(mapped, checked), *cover.notes),
+        path=None if mapped.source is None else mapped.source.path,
+    )
+
+
+def surface_of(mapped: Mapped, *, strict: bool = False) -> tuple[CheckedMesh, FloatArray]:
+    """Return the triangles that have UVs as a manifold, repaired unless strict, and their (m, 3, 2) UVs.
+
+    Raises:
+        MissingUVError: there are none.
+        MeshError: they are no mesh.
+    """
+    known = np.flatnonzero(mapped.has_uv)
+    if not len(known):
+        raise MissingUVError(
+            f"none of {plural(len(mapped.faces), 'triangle')} has UVs that are finite at all its corners"
+        )
+    checked = check_mesh(mapped.vertices, mapped.faces[known], repair=not strict)
+    corner_uv = mapped.corner_uv[known][checked.face_origin]
+    corner_uv[checked.is_turned] = corner_uv[checked.is_turned][:, [0, 2, 1]]
+    return checked, corner_uv
+
+
+def uv_points(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return (u, 2) points of charts, and (m, 3) those of the corners: one where triangles are joined, else several."""
+    count, fan = corner_fans(mesh.faces, *mesh.edge_halfedges[joined_edges(mesh, corner_uv)].T)
+    points = np.empty((count, 2))
+    points[fan] = corner_uv
+    return points, fan
+
+
+def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
+    """Return the most by which the angles around a point inside a chart miss 2 pi, radians; 0 if there is none inside.
+
+    A triangle that is turned over, or folds that wind around a point twice, make it large.
+    """
+    from .measure.distortion import sum_angles
+
+    points, fan = uv_points(mesh, corner_uv)
+    joined = np.zeros(mesh.faces.size, dtype=bool)
+    joined[mesh.edge_halfedges[joined_edges(mesh, corner_uv)]] = True
+    inside = np.ones(len(points), dtype=bool)
+    for end in end_corners(np.flatnonzero(~joined)):
+        inside[fan.reshape(-1)[end]] = False
+    sums, change = sum_angles(fan, np.ascontiguousarray(corner_uv), len(points))
+    # A side without length has no direction.
+    inside &= np.isfinite(change)
+    return float(np.abs(sums[inside] - 2 * np.pi).max(initial=0.0))
+
+
+def _tiles(mesh: TriangleMesh, unit: FloatArray, exponent: int) -> FloatArray:
+    """Return (k, 2) the unit squares in which the middles of charts lie, one of UDIM tiles each.
+
+    unit: (m, 3, 2) UVs over two to the power of the exponent.
+    """
+    charts, chart = label_charts(mesh, joined_edges(mesh, unit))
+    weights = np.abs(signed_double_areas(unit)) + np.finfo(np.float64).tiny
+    total = np.bincount(chart, weights, charts)
+    middles = [np.bincount(chart, weights * unit[..., k].mean(axis=1), charts) / total for k in (0, 1)]
+    return np.unique(np.floor(np.ldexp(np.stack(middles, axis=1), exponent)), axis=0)
+
+
+class _Cover(NamedTuple):
+    """How triangles cover the plane: how many pairs overlap, the share and the area of what is covered, ..."""
+
+    pairs: int
+    overlap: float
+    once: float
+    box_efficiency: float
+    notes: tuple[str, ...] = ()
+
+
+def _cover(corner_uv: FloatArray) -> _Cover:
+    """Return how triangles (m, 3, 2) cover the plane, exactly, or where that would take too long, in pixels."""
+    total = float(np.abs(signed_double_areas(corner_uv)).sum()) / 2
+    side = float(np.ptp(corner_uv, axis=(0, 1)).max())
+    box_efficiency = total / side**2 if side > 0 else float("nan")
+    limit = max(FEW_PAIRS, MOST_PAIRS * len(corner_uv))
+    found = find_overlaps(corner_uv, limit=limit)
+    if np.isfinite(found.fraction):
+        once = found.area / found.fraction if found.fraction > 0 else total
+        return _Cover(len(found.pairs), found.fraction, once, box_efficiency)
+    twice, once = layers_of_raster(corner_uv)
+    more = (
+        ""
+        if found.complete
+        else f"More than {limit:,} pairs of triangles overlap, which were not counted further. "
+    )
+    note = f"{more}The overlap was counted in {MOST_CELLS:,} x {MOST_CELLS:,} pixels."
+    return _Cover(len(found.pairs), twice / once if once > 0 else 0.0, once, box_efficiency, (note,))
+
+
+def _notes(mapped: Mapped, checked: CheckedMesh) -> tuple[str, ...]:
+    """Return what is left out of the measures."""
+    corners = ((mapped.without, "no UV"), (mapped.not_finite, "a UV that is not finite"))
+    why = " and ".join(f"{plural(count, 'corner')} with {what}" for count, what in corners if count)
+    triangles = plural(int(np.count_nonzero(~mapped.has_uv)), "triangle")
+    notes = [f"{why}: {triangles} left out of the measures."] if why else []
+    repairs = [note for note in checked.notes if note != left_out_of(mapped, checked)]
+    if repairs:
+        notes.append(f"Measured on a mesh in which this was done first: {' '.join(repairs)}")
+    return tuple(notes)
+
+
+def left_out_of(mapped: Mapped, checked: CheckedMesh) -> str:
+    """Return the note that there are vertices without triangles, which does not matter here."""
+    return left_out(len(mapped.vertices) - len(np.unique(checked.vertex_origin)))

@@ -1,0 +1,25 @@
+"""Triangle meshes: connectivity, checks and repair, cutting open, what a user says of vertices and edges."""
+
+from .charts import point_seams, point_vertices, uv_seams
+from .check import REPAIR_ADVICE, CheckedMesh
+from .connectivity import NEXT, PREVIOUS, end_corners, label_components, label_faces, sort_pairs
+from .open_mesh import CutMesh, cut_open, open_along
+from .ties import tie_key
+
+__all__ = [
+    "CheckedMesh",
+    "CutMesh",
+    "NEXT",
+    "PREVIOUS",
+    "REPAIR_ADVICE",
+    "cut_open",
+    "end_corners",
+    "label_components",
+    "label_faces",
+    "open_along",
+    "point_seams",
+    "point_vertices",
+    "sort_pairs",
+    "tie_key",
+    "uv_seams",
+]

@@ -1,0 +1,273 @@
+"""What a mesh must be, the errors that say what is wrong and where, and the repair."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, require_finite
+from ..base.sets import grow_forest
+from ..base.text import list_some, plural
+from ..errors import (
+    ArrayShapeError,
+    DegenerateFaceError,
+    EmptyMeshError,
+    NonManifoldError,
+    NonOrientableError,
+)
+from .connectivity import (
+    NEXT,
+    PREVIOUS,
+    TriangleMesh,
+    corner_fans,
+    has_one_fan_each,
+    label_components,
+    pair_sides,
+    sort_by_counting,
+    sort_pairs,
+)
+
+REPAIR_ADVICE = "pass repair=True (on the command line: leave out --strict)"
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedMesh:
+    """A mesh that can be flattened, and how it came from the input.
+
+    Attributes:
+        mesh: manifold, consistently oriented, without isolated vertices.
+        vertex_origin: (n,) the input vertex of each of its vertices.
+        face_origin: (m,) the input face of each of its faces.
+        is_turned: (m,) True for faces whose orientation was reversed (corners 1 and 2 exchanged).
+        notes: what was done, one sentence each.
+        exponent: the mesh has been scaled by two to the power of this.
+    """
+
+    mesh: TriangleMesh
+    vertex_origin: IntArray
+    face_origin: IntArray
+    is_turned: BoolArray
+    notes: tuple[str, ...]
+    exponent: int = 0
+
+
+def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -> CheckedMesh:
+    """Return the mesh in the form that the rest of the package relies on, or say why it cannot be.
+
+    Orientation is made consistent and isolated vertices are left out, with a note.
+
+    Args:
+        vertices: (n, 3) positions.
+        faces: (m, 3) vertex indices, from 0.
+        repair: drop faces that use a vertex twice and faces given twice, split non-manifold edges and
+            vertices, cut non-orientable surfaces, instead of refusing them. A mesh that would not be refused is
+            left as it is.
+
+    Raises:
+        EmptyMeshError, ArrayShapeError, NonFiniteError, FaceIndexError: the arrays are no mesh.
+        DegenerateFaceError: a face uses a vertex twice.
+        NonManifoldError: an edge has more than two faces, or a vertex more than one fan.
+        NonOrientableError: the faces cannot be oriented consistently.
+    """
+    points = _as_vertices(vertices)
+    triangles = as_faces(faces, len(points))
+    require_finite(points, triangles)
+    try:
+        return _Check(points, triangles, False).run()
+    except (DegenerateFaceError, NonManifoldError, NonOrientableError):
+        if not repair:
+            raise
+    return _Check(points, triangles, True).run()
+
+
+LEFT_OUT, FACELESS = "Left out ", " without a face."
+
+
+def left_out(count: int) -> str:
+    """Return the note that vertices belong to no face."""
+    return f"{LEFT_OUT}{plural(count, 'vertex', 'vertices')}{FACELESS}"
+
+
+def is_left_out(note: str) -> bool:
+    """Return whether a note is `left_out`'s."""
+    return note.startswith(LEFT_OUT) and note.endswith(FACELESS)
+
+
+def _as_vertices(vertices: ArrayLike) -> FloatArray:
+    try:
+        array = np.asarray(vertices)
+        if array.dtype.kind not in "fiu":
+            raise TypeError(f"their type is {array.dtype}")
+        points = np.ascontiguousarray(array, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ArrayShapeError(f"vertices must be an (n, 3) array of numbers: {error}") from error
+    if points.size == 0:
+        raise EmptyMeshError("the mesh has no vertices")
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ArrayShapeError(f"vertices must have the shape (n, 3), not {points.shape}")
+    return points
+
+
+class _Check:
+    """The faces on their way to a manifold, with a record of what happened to them.
+
+    The steps build on one another and run in the order in which they stand here.
+    """
+
+    def __init__(self, vertices: FloatArray, faces: IntArray, repair: bool) -> None:
+        self.vertices = vertices
+        self.faces = faces
+        self.repair = repair
+        self.face_origin = np.arange(len(faces))
+        self.is_turned = np.zeros(len(faces), dtype=bool)
+        self.pairs = np.empty((0, 2), dtype=np.int64)
+        self.vertex_origin = np.arange(len(vertices))
+        self.notes: list[str] = []
+        self.pairing: tuple[IntArray, IntArray, IntArray] | None = None
+
+    def run(self) -> CheckedMesh:
+        """Take all steps."""
+        self.drop_degenerate_faces()
+        if self.is_manifold():
+            return self.finish()
+        self.pair_halfedges()
+        self.orient()
+        self.split_fans()
+        return self.finish()
+
+    def _keep(self, keep: BoolArray) -> None:
+        self.faces = self.faces[keep]
+        self.face_origin = self.face_origin[keep]
+        self.is_turned = self.is_turned[keep]
+        if not len(self.faces):
+            raise EmptyMeshError("the mesh has no faces left once degenerate ones are dropped")
+
+    def drop_degenerate_faces(self) -> None:
+        """Refuse or drop faces that use a vertex twice; drop faces given twice in a repair."""
+        one, two, three = self.faces.T
+        bad = (one == two) | (two == three) | (three == one)
+        if bad.any():
+            where = np.flatnonzero(bad)
+            if not self.repair:
+                raise DegenerateFaceError(
+                    f"{plural(len(where), 'face')} with the same vertex twice: {list_some(where)}; "
+                    f"{REPAIR_ADVICE} to drop them"
+                )
+            self._keep(~bad)
+            self.notes.append(f"Dropped {plural(len(where), 'face')} with the same vertex twice.")
+        if self.repair:
+            _, first = np.unique(np.sort(self.faces, axis=1), axis=0, return_index=True)
+            if len(first) < len(self.faces):
+                keep = np.zeros(len(self.faces), dtype=bool)
+                keep[first] = True
+                self.notes.append(f"Dropped {plural(int((~keep).sum()), 'face')} given twice.")
+                self._keep(keep)
+
+    def is_manifold(self) -> bool:
+        """Whether the faces are one as they stand, as most are: then there is nothing to do."""
+        *pairing, is_plain = pair_sides(self.faces, len(self.vertices))
+        if not is_plain or not has_one_fan_each(self.faces, len(self.vertices), *pairing[1:]):
+            return False
+        self.pairing = (pairing[0], pairing[1], pairing[2])
+        return True
+
+    def pair_halfedges(self) -> None:
+        """Find the pairs of half-edges (k, 2) that are glued; edges of three or more faces are not."""
+        tails, heads = self.faces[:, NEXT].ravel(), self.faces[:, PREVIOUS].ravel()
+        order, is_first = sort_pairs(tails, heads, len(self.vertices))
+        starts = np.flatnonzero(is_first)
+        counts = np.diff(np.append(starts, len(order)))
+        crowded = starts[counts > 2]
+        if len(crowded):
+            edges = ["{}-{}".format(*sorted((tails[h], heads[h]))) for h in order[crowded[:5]]]
+            what = plural(len(crowded), "edge")
+            if not self.repair:
+                raise NonManifoldError(
+                    f"{what} with more than two faces (vertex pairs {list_some(edges, len(crowded))}); "
+                    f"{REPAIR_ADVICE} to separate the faces there"
+                )
+            self.notes.append(f"Separated the faces at {what} with more than two.")
+        double = starts[counts == 2]
+        self.pairs = np.stack([order[double], order[double + 1]], axis=1)
+
+    def orient(self) -> None:
+        """Turn faces so that neighbours agree, the fewest of each component."""
+        count = len(self.faces)
+        tails = self.faces[:, NEXT].ravel()
+        same_way = tails[self.pairs[:, 0]] == tails[self.pairs[:, 1]]
+        if not same_way.any():
+            return
+        pairs = self.pairs // 3
+        one, two = pairs.T
+        tree = np.flatnonzero(grow_forest(pairs, count))
+        # Two copies of each face, one for each orientation; a tree joins them to two mirrored halves.
+        crossing = same_way[tree] * count
+        first, second = one[tree], two[tree]
+        _, half = label_components(
+            2 * count,
+            np.concatenate([first, first + count]),
+            np.concatenate([second + crossing, second + count - crossing]),
+        )
+        turn = half[:count] > half[count:]
+        conflict = same_way ^ turn[one] ^ turn[two]
+        if conflict.any():
+            if not self.repair:
+                raise NonOrientableError(
+                    "the surface has one side only, like a Moebius strip: its faces cannot be oriented to "
+                    f"agree (edge {self._edge_name(int(np.flatnonzero(conflict)[0]))}); "
+                    f"{REPAIR_ADVICE} to cut it open"
+                )
+            self.pairs = self.pairs[~conflict]
+            self.notes.append(f"Cut the one-sided surface at {plural(int(conflict.sum()), 'edge')}.")
+        components, component = label_components(count, one[tree], two[tree])
+        sizes = np.bincount(component, minlength=components)
+        turned = np.bincount(component, weights=turn, minlength=components)
+        turn ^= (turned > sizes / 2)[component]
+        self._turn(turn)
+
+    def _edge_name(self, pair: int) -> str:
+        h = self.pairs[pair, 0]
+        ends = sorted((int(self.faces[h // 3, NEXT[h % 3]]), int(self.faces[h // 3, PREVIOUS[h % 3]])))
+        return f"{ends[0]}-{ends[1]}"
+
+    def _turn(self, turn: BoolArray) -> None:
+        self.faces = np.where(turn[:, None], self.faces[:, [0, 2, 1]], self.faces)
+        self.is_turned ^= turn
+        corner = self.pairs % 3
+        exchanged = np.where(corner == 0, 0, 3 - corner)
+        self.pairs = np.where(turn[self.pairs // 3], self.pairs - corner + exchanged, self.pairs)
+        if turn.any():
+            self.notes.append(f"Turned {plural(int(turn.sum()), 'face')} to agree with the rest.")
+
+    def split_fans(self) -> None:
+        """Refuse or split vertices with more than one fan of faces; leave out isolated vertices."""
+        fans, fan = corner_fans(self.faces, *self.pairs.T)
+        origin = np.empty(fans, dtype=np.int64)
+        origin[fan] = self.faces
+        fans_at = np.bincount(origin, minlength=len(self.vertices))
+        isolated = int((fans_at == 0).sum())
+        split = np.flatnonzero(fans_at > 1)
+        if len(split):
+            if not self.repair:
+                raise NonManifoldError(
+                    f"{plural(len(split), 'vertex', 'vertices')} where surfaces touch in a single point: "
+                    f"{list_some(split)}; {REPAIR_ADVICE} to split them"
+                )
+            self.notes.append(f"Split {plural(len(split), 'non-manifold vertex', 'non-manifold vertices')}.")
+        if isolated:
+            self.notes.append(left_out(isolated))
+        # Numbered as the input is, the parts of a split vertex one after the other.
+        order = sort_by_counting(origin, len(self.vertices))
+        rank = np.empty(fans, dtype=np.int64)
+        rank[order] = np.arange(fans)
+        self.vertex_origin = origin[order]
+        self.faces = rank[fan]
+
+    def finish(self) -> CheckedMesh:
+        """Return the result."""
+        mesh = TriangleMesh(self.vertices[self.vertex_origin], self.faces)
+        if self.pairing is not None:
+            mesh.__dict__["_pairing"] = self.pairing  # the mesh's own, which it need not find again
+        return CheckedMesh(mesh, self.vertex_origin, self.face_origin, self.is_turned, tuple(self.notes))

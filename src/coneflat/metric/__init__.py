@@ -1,0 +1,20 @@
+"""Flat metrics: the linear one of the paper and the exact one."""
+
+from .boundary import straight_boundary
+from .exact import ExactMetric, checked_target, exact_metric
+from .find import find_metric, loop_rotations
+from .linear import linear_flat_metric, scaled_lengths
+from .solve import ExactChoices, exact_flat_metric
+
+__all__ = [
+    "ExactChoices",
+    "ExactMetric",
+    "checked_target",
+    "exact_flat_metric",
+    "exact_metric",
+    "find_metric",
+    "linear_flat_metric",
+    "loop_rotations",
+    "scaled_lengths",
+    "straight_boundary",
+]

@@ -1,0 +1,285 @@
+"""The exact discrete conformal metric of given curvatures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats
+from ..base.text import list_some, plural
+from ..errors import ArrayShapeError, CurvatureError, NonFiniteError
+from ..geometry.intrinsic import IntrinsicTriangulation, double, intrinsic_triangulation
+from ..geometry.lengths import check_lengths
+from ..geometry.straight import FlatTriangles, straight_triangles
+from ..geometry.triangles import double_areas
+from ..mesh.connectivity import TriangleMesh
+from .newton import ConformalProblem, State, find_scale
+from .preconditioner import Inverse
+
+# How far, in radians, prescribed curvatures may miss Gauss-Bonnet; decimals typed by hand are good to more.
+SUM_TOLERANCE = 1e-8
+# A first guess of phi with a wider range than this makes lengths whose squares overflow.
+WIDEST_RANGE = 1000.0
+
+
+@dataclass(frozen=True, eq=False)
+class ExactMetric:
+    """A metric of prescribed curvature, discretely conformal to the input.
+
+    Attributes:
+        log_scale: (n,) phi.
+        curvature: (n,) curvature reached, radians; at fixed vertices the one that came out.
+        triangulation: the triangulation on which the metric lives, Delaunay in it, with its flat lengths in
+            model units times exp(phi).
+        flips: half-edges flipped on the way there from the input's triangles, in order.
+        euclidean_flips: how many of them made the input Delaunay; the others happened during the solve.
+        steps: Newton steps.
+        residual: largest curvature error, radians, over the vertices with a target.
+        worst_vertex: where it is.
+        converged: whether the residual is within the tolerance and every triangle has area.
+        doubled: whether the triangulation is that of the surface glued to its mirror image; the first m
+            triangles are the input's.
+    """
+
+    log_scale: FloatArray
+    curvature: FloatArray
+    triangulation: IntrinsicTriangulation
+    flips: IntArray
+    euclidean_flips: int
+    steps: int
+    residual: float
+    worst_vertex: int
+    converged: bool
+    doubled: bool
+
+    @property
+    def ptolemy_flips(self) -> int:
+        """The number of flips during the solve."""
+        return len(self.flips) - self.euclidean_flips
+
+    def straight(self) -> FlatTriangles:
+        """Return the input's m triangles with straight sides in the metric, which `unfold` lays out."""
+        count = self.triangulation.face_count
+        return straight_triangles(self.triangulation, self.flips, count // 2 if self.doubled else count)
+
+
+def exact_metric(
+    mesh: TriangleMesh,
+    lengths: ArrayLike,
+    target: ArrayLike,
+    *,
+    fixed: ArrayLike | None = None,
+    fixed_log_scale: ArrayLike = 0.0,
+    start: ArrayLike | None = None,
+    preconditioner: Inverse | None = None,
+    tolerance: float = 1e-10,
+    delaunay: bool = True,
+    flipped: tuple[IntrinsicTriangulation, IntArray] | None = None,
+    max_steps: int = 200,
+) -> ExactMetric:
+    """Return the metric l_ij exp((phi_i + phi_j) / 2) whose curvature is the target.
+
+    Args:
+        mesh: the mesh, such as `check_mesh(vertices, faces).mesh`.
+        lengths: (m, 3) side lengths, column i opposite corner i, model units: those of `edge_lengths`, or any others
+            whose triangles have area.
+        target: (n,) curvature in radians, or one number for all vertices; not used at fixed vertices.
+        fixed: (n,) True for vertices whose log scale is given and whose curvature comes out: cones with
+            phi = 0, a free boundary. None: all curvatures are prescribed, and phi, then known up to a
+            constant, is chosen to keep the total area.
+        fixed_log_scale: (n,) or one number, phi at the fixed vertices.
+        start: (n,) first guess of phi; the linear solution is a good one.
+        preconditioner: solves for the Laplacian of the mesh, zero at the fixed vertices, if something does
+            already: then less is factorized.
+        tolerance: curvature error, radians, that counts as converged. The solve goes on as far as rounding
+            permits.
+        delaunay: flip the input to its intrinsic Delaunay triangulation first. Without it, the conformal
+            class is that of the input's own triangles; the same on Delaunay meshes.
+        flipped: that triangulation with the half-edges flipped, from `intrinsic_delaunay`, if something has it already.
+        max_steps: Newton steps after which the best metric so far is returned; counted anew if the surface
+            has to be doubled.
+
+    Raises:
+        ArrayShapeError, NonFiniteError: arrays do not fit the mesh, or lengths are not finite.
+        LengthError: the lengths make no triangles with area, or differ between the two sides of an edge.
+        CurvatureError: a target is 2 pi or more inside, pi or more on the boundary, or the targets of a
+            component without fixed vertices do not sum to 2 pi times its Euler characteristic.
+
+    Notes:
+        Springborn, Schroeder, Pinkall, "Conformal equivalence of triangle meshes", 2008, with the flips of
+        Springborn, "Ideal hyperbolic polyhedra and discrete uniformization", 2019, and of Gillespie,
+        Springborn, Crane, "Discrete conformal equivalence of polyhedral surfaces", 2021. With flips a metric
+        exists for every target that passes the checks. At a boundary the theorem needs the edges of the
+        boundary to flip, too: where the solution has broken triangles there, the surface is glued to its
+        mirror image and solved again.
+    """
+    lengths, n = check_lengths(mesh, lengths), len(mesh.vertices)
+    fixed = np.zeros(n, dtype=bool) if fixed is None else _per_vertex("fixed", fixed, n).astype(bool)
+    target, pinned = checked_target(mesh, _per_vertex("target", target, n), fixed)
+    log_scale = np.zeros(n) if start is None else _per_vertex("start", start, n).copy()
+    log_scale[fixed] = _per_vertex("fixed_log_scale", fixed_log_scale, n)[fixed]
+    bad = np.flatnonzero(fixed & ~np.isfinite(log_scale))
+    if len(bad):
+        raise NonFiniteError(f"fixed_log_scale is NaN or infinite at {_at(bad)}")
+
+    plain = np.where(fixed, log_scale, 0.0)
+    if not np.ptp(log_scale) <= WIDEST_RANGE:
+        log_scale = plain
+    flat_turn = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
+    copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
+    doubled = False
+
+    def solved_from(first: FloatArray) -> tuple[ConformalProblem, State, IntArray, int, int]:
+        """Return the problem, its best state, the vertices it is about, how many flips made it Delaunay, and steps."""
+        original, known = np.arange(n), flipped if delaunay and not doubled else None
+        triangulation = intrinsic_triangulation(mesh, lengths) if known is None else known[0].copy()
+        if doubled:
+            triangulation, original = double(triangulation)
+            problem = ConformalProblem(
+                triangulation,
+                np.full(len(original), 2 * np.pi),
+                (copies * target)[original],
+                fixed[original],
+                np.concatenate([pinned, np.zeros(len(original) - n, dtype=bool)]),
+            )
+        else:
+            problem = ConformalProblem(triangulation, flat_turn, target, fixed, pinned, preconditioner)
+        euclidean = problem.prepare(delaunay, None if known is None else known[1])
+        state, steps = find_scale(problem, first[original], tolerance, max_steps)
+        return problem, state, original, euclidean, steps
+
+    problem, state, original, euclidean, steps = solved_from(log_scale)
+    if not _is_solved(state, tolerance) and mesh.is_boundary_vertex.any():
+        doubled = True
+        problem, state, original, euclidean, more = solved_from(log_scale)
+        steps += more
+    if not _is_solved(state, tolerance) and (log_scale != plain).any():
+        # A first guess may lie so far off, on a field of spikes say, that nothing is left of the triangles there. The
+        # input's own scale is finite.
+        again = solved_from(plain)
+        steps += again[-1]
+        if again[1].largest < state.largest:
+            problem, state, original, euclidean, _ = again
+    if doubled:
+        state.curvature[:n] /= copies
+    if pinned.any():
+        state.place = _keep_area(mesh, lengths, problem, state.place, original)
+    return _finish(problem, state, n, euclidean, steps, tolerance, doubled)
+
+
+def _per_vertex(name: str, values: ArrayLike, count: int) -> FloatArray:
+    """Return (n,) values, or one number for all; raises ArrayShapeError if they are none."""
+    array = as_floats(name, values)
+    if array.shape not in ((), (count,)):
+        raise ArrayShapeError(
+            f"{name} must have the shape {(count,)}, a number for each vertex, not {array.shape}"
+        )
+    return np.broadcast_to(array, (count,))
+
+
+def _at(vertices: IntArray) -> str:
+    return f"{plural(len(vertices), 'vertex', 'vertices')}: {list_some(vertices)}"
+
+
+def _is_solved(state: State, tolerance: float) -> bool:
+    return state.largest <= tolerance and state.broken == 0
+
+
+def _keep_area(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    problem: ConformalProblem,
+    log_scale: FloatArray,
+    original: IntArray,
+) -> FloatArray:
+    """Return phi, shifted on each component without fixed vertices so that its total area stays the same.
+
+    original: (n,) for each vertex of the problem the vertex of the mesh that it is, or is a copy of.
+    """
+    count, labels = mesh.components
+    component = labels[original]
+    free = np.ones(count, dtype=bool)
+    free[component[problem.fixed]] = False
+    centre = np.full(count, -np.inf)
+    np.maximum.at(centre, component, log_scale)
+    log_scale = log_scale - np.where(free, centre, 0.0)[component]
+    metric = problem.flat_lengths(log_scale).reshape(-1, 3)
+    before = np.bincount(labels[mesh.faces[:, 0]], weights=double_areas(lengths), minlength=count)
+    after = np.bincount(
+        component[problem.triangulation.tail[::3]], weights=double_areas(metric), minlength=count
+    )
+    copies = len(metric) / len(lengths)  # 2 if the surface was doubled
+    # Where nothing is left of the area, the metric is refused: any shift will do.
+    is_left = np.isfinite(after) & (after > 0)
+    shift = np.log(copies * before / np.where(is_left, after, copies * before)) / 2
+    shifted: FloatArray = log_scale + np.where(free, shift, 0.0)[component]
+    return shifted
+
+
+def _finish(
+    problem: ConformalProblem,
+    state: State,
+    n: int,
+    euclidean: int,
+    steps: int,
+    tolerance: float,
+    doubled: bool,
+) -> ExactMetric:
+    """Put the metric on the triangulation and collect the report."""
+    triangulation = problem.triangulation
+    triangulation.length = problem.flat_lengths(state.place)
+    residual = np.abs(state.residual[:n])
+    records = problem.records
+    return ExactMetric(
+        log_scale=state.place[:n],
+        curvature=state.curvature[:n],
+        triangulation=triangulation,
+        flips=np.concatenate(records) if records else np.empty(0, dtype=np.int64),
+        euclidean_flips=euclidean,
+        steps=steps,
+        residual=state.largest,
+        worst_vertex=int(residual.argmax()),
+        converged=_is_solved(state, tolerance),
+        doubled=doubled,
+    )
+
+
+def checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> tuple[FloatArray, BoolArray]:
+    """Return a target that satisfies Gauss-Bonnet to rounding, and a pinned vertex a component, if needed."""
+    bad = np.flatnonzero(~fixed & ~np.isfinite(target))
+    if len(bad):
+        raise CurvatureError(f"the target curvature is NaN or infinite at {_at(bad)}")
+    on_boundary = mesh.is_boundary_vertex
+    for where, limit, name, place in (
+        (~on_boundary, 2 * np.pi, "2 pi", "inside"),
+        (on_boundary, np.pi, "pi", "on the boundary"),
+    ):
+        bad = np.flatnonzero(where & ~fixed & ~(target < limit * (1 - 1e-12)))
+        if len(bad):
+            worst = bad[np.argmax(target[bad])]
+            raise CurvatureError(
+                f"no metric has a curvature of {name} or more {place}: vertex {worst} is to have "
+                f"{target[worst] / np.pi:.6g} pi ({len(bad)} such); ask for less"
+            )
+    pinned = np.zeros(len(target), dtype=bool)
+    count, component = mesh.components
+    target = target.copy()
+    has_fixed = np.zeros(count, dtype=bool)
+    has_fixed[component[fixed]] = True
+    for label in np.flatnonzero(~has_fixed):
+        inside = component == label
+        faces = int(inside[mesh.faces[:, 0]].sum())
+        edges = int(inside[mesh.edges[:, 0]].sum())
+        vertices = int(inside.sum())
+        euler = vertices - edges + faces
+        excess = float(target[inside].sum()) - 2 * np.pi * euler
+        if not abs(excess) <= SUM_TOLERANCE:
+            raise CurvatureError(
+                f"curvatures must sum to 2 pi times the Euler characteristic, {2 * euler} pi, but the input "
+                f"sums to {target[inside].sum() / np.pi:.9g} pi; change one cone by {-excess / np.pi:.6g} pi"
+            )
+        target[inside] -= excess / vertices
+        pinned[np.flatnonzero(inside)[0]] = True
+    return target, pinned

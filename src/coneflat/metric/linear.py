@@ -1,0 +1,79 @@
+"""The paper's method: a linear system for the scale, lengths by an edge integral, layout by least squares."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.arrays import FloatArray, IntArray
+from ..errors import MetricError
+from ..geometry import double_areas, is_broken
+from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
+from ..stages import ConeSolution, FlatMetric, SolveStatistics
+
+# Layouts square lengths: shorter ones are lost in double precision.
+LEAST_LENGTH = 1e-150
+
+
+def linear_flat_metric(
+    mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, rule: str = "integral"
+) -> FlatMetric:
+    """Return the paper's metric (Section 2.3) for cones and their log scale, at the area of the input.
+
+    Args:
+        mesh: connected.
+        lengths: (m, 3) side lengths, model units.
+        solution: cones, target curvatures and the linear log scale.
+        rule: as in `scaled_lengths`.
+
+    Raises:
+        MetricError: scales are so far apart that lengths overflow.
+    """
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        scaled = scaled_lengths(lengths, mesh.faces, solution.log_scale, rule)
+        shrink = float(np.sqrt(double_areas(lengths).sum() / double_areas(scaled).sum()))
+        scaled *= shrink
+    if not (np.isfinite(scaled).all() and scaled.min() > LEAST_LENGTH):
+        raise MetricError(
+            f"the scale would vary by a factor of e^{np.ptp(solution.log_scale):.4g} over the mesh, more than numbers "
+            f"can hold: {len(solution.cones)} cones are too few, or their curvatures too extreme"
+        )
+    return FlatMetric(
+        mesh=mesh,
+        lengths=lengths,
+        cones=solution.cones,
+        target=solution.target,
+        log_scale=solution.log_scale + np.log(shrink),
+        is_open=mesh.is_boundary_vertex,
+        is_held=np.zeros(len(mesh.vertices), dtype=bool),
+        statistics=SolveStatistics(broken=int(is_broken(scaled).sum())),
+        flat_lengths=scaled,
+    )
+
+
+def scaled_lengths(
+    lengths: FloatArray, faces: IntArray, log_scale: FloatArray, rule: str = "integral"
+) -> FloatArray:
+    """Return (m, 3) side lengths after conformal scaling.
+
+    Args:
+        lengths: (m, 3) side lengths, model units.
+        faces: (m, 3) vertex indices.
+        log_scale: (n,) log conformal factor phi.
+        rule: "integral" scales a side by the mean of exp(phi) along it, phi being linear there (Section
+            2.3 of the paper); "mean" by exp of the mean of phi, which is the conformal equivalence of
+            Springborn, Schroeder and Pinkall 2008.
+    """
+    tail, head = log_scale[faces[:, NEXT]], log_scale[faces[:, PREVIOUS]]
+    scaled: FloatArray = lengths * np.exp((tail + head) / 2)
+    if rule == "integral":
+        # (e^b - e^a) / (b - a) = e^((a + b) / 2) sinh(d) / d with d = (b - a) / 2: no cancellation.
+        scaled *= _sinhc((head - tail) / 2)
+    return scaled
+
+
+def _sinhc(x: FloatArray) -> FloatArray:
+    """Return sinh(x) / x."""
+    small = np.abs(x) < 1e-3  # the next term of the series is below 1e-16 there
+    safe = np.where(small, 1.0, x)
+    result: FloatArray = np.where(small, 1 + x**2 / 6 * (1 + x**2 / 20), np.sinh(safe) / safe)
+    return result

@@ -1,0 +1,281 @@
+"""Newton's method on the convex energy of discrete conformal maps, with edge flips."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.compiled import compiled
+from ..geometry.delaunay import make_delaunay
+from ..geometry.intrinsic import IntrinsicTriangulation
+from ..linalg import Factor, factorize
+from ..linalg.newton import HALVINGS, Limits, Point, minimise
+from .hessian import HessianPattern
+from .preconditioner import HeldInverse, Inverse, conjugate_gradients, corrected
+
+# Residual, radians, below which nothing is left to gain: the rounding of a sum of a few angles.
+GOAL = 1e-13
+# Largest change of phi in one step. Beyond e^5 in length the quadratic model says nothing any more.
+LARGEST_STEP = 5.0
+# A step is solved for to the accuracy of the residual, but to this at least: more is lost to the next.
+COARSEST = 0.05
+# Below so many vertices a factorization takes less time than the calls that conjugate gradients are made of.
+SMALL = 200
+# Halvings of a step at most where the surface can be doubled instead of creeping along triangles that are about to
+# break.
+HALVINGS_BOUNDED = 6
+
+
+@dataclass(eq=False)
+class State(Point):
+    """Curvature at a log scale, on the triangulation that is Delaunay for it.
+
+    Attributes:
+        curvature: (n,) radians; the residual is what it misses.
+        cots: (3m,) cotangents opposite the half-edges.
+        broken: triangles that break the triangle inequality. On a bounded surface, whose boundary cannot be flipped,
+            the theory does not hold, and no state with such triangles is admissible.
+    """
+
+    curvature: FloatArray = field(default_factory=lambda: np.empty(0))
+    cots: FloatArray = field(default_factory=lambda: np.empty(0))
+    broken: int = 0
+
+
+def centred(log_scale: FloatArray) -> FloatArray:
+    """Return a log scale with its middle at 0: neither huge nor tiny factors overflow, and angles see ratios only."""
+    middle: FloatArray = log_scale - (log_scale.max() + log_scale.min()) / 2
+    return middle
+
+
+@dataclass(eq=False)
+class ConformalProblem:
+    """Find phi, so that the curvature of l_ij exp((phi_i + phi_j) / 2) is the target.
+
+    K(phi) - target is the gradient of a convex energy (Springborn, Schroeder, Pinkall 2008, Eq. 7), whose
+    Hessian is the cotangent Laplacian of the scaled metric; flipped to Delaunay, the energy is defined
+    for every phi and twice continuously differentiable (Springborn 2019; Gu, Luo, Sun, Wu 2018).
+
+    Attributes:
+        triangulation: lengths l; flipped in place.
+        flat_turn: (n,) 2 pi inside, pi on the boundary.
+        target: (n,) curvature, radians; not used at fixed vertices.
+        fixed: (n,) True where phi is given.
+        pinned: (n,) True for one vertex of each component without fixed ones.
+        records: half-edges flipped so far.
+        preconditioner: solves for the Laplacian of a metric that is similar, zero at fixed vertices; may be none.
+        last: the state evaluated last, the one the triangulation belongs to.
+    """
+
+    triangulation: IntrinsicTriangulation
+    flat_turn: FloatArray
+    target: FloatArray
+    fixed: BoolArray
+    pinned: BoolArray
+    preconditioner: Inverse | None = None
+    records: list[IntArray] = field(default_factory=list)
+    last: State | None = None
+    _pattern: HessianPattern | None = None
+    _factor: Factor | None = None
+
+    @cached_property
+    def is_bounded(self) -> bool:
+        """Whether there is a boundary, where edges cannot be flipped and triangles may stay broken."""
+        return bool((self.triangulation.twin < 0).any())
+
+    def prepare(self, delaunay: bool, flipped: IntArray | None = None) -> int:
+        """Flip the input to Delaunay in its own metric, if so wanted; return the number of flips.
+
+        flipped: the half-edges by whose flips it has become so already, if it has.
+        """
+        if not delaunay:
+            return 0
+        self.records.append(make_delaunay(self.triangulation) if flipped is None else flipped)
+        return len(self.records[0])
+
+    def flat_lengths(self, log_scale: FloatArray) -> FloatArray:
+        """Return (3m,) the scaled lengths, the same bits on both sides of an edge."""
+        at_tail = log_scale[self.triangulation.tail].reshape(-1, 3)
+        sums = np.empty(at_tail.shape)
+        for i in range(3):
+            np.add(at_tail[:, i], at_tail[:, (i + 1) % 3], out=sums[:, i])
+        sums /= 2
+        # Multiplication commutes, and the background lengths agree.
+        lengths: FloatArray = np.exp(sums, out=sums).ravel()
+        lengths *= self.triangulation.length
+        return lengths
+
+    def sum_angles(self, log_scale: FloatArray, sums: FloatArray, cots: FloatArray) -> int:
+        """Fill the (n,) angle sums and (3m,) weights of the scaled metric; return the number of broken triangles."""
+        scale = np.exp(centred(log_scale) / 2)
+        return sum_angles(self.triangulation.tail, self.triangulation.length, scale, sums, cots)
+
+    def record(self, flipped: IntArray) -> None:
+        """Keep in mind that half-edges were flipped."""
+        self.records.append(flipped)
+        self._pattern = None
+
+    def evaluate(self, log_scale: FloatArray) -> State:
+        """Flip to Delaunay in the scaled metric and return the curvature there."""
+        sums = np.empty(len(log_scale))
+        cots = np.empty(len(self.triangulation.tail))
+        broken = self.sum_angles(log_scale, sums, cots)
+        # The cotangents are needed anyway and tell at a glance where there is nothing to flip.
+        found = np.empty(len(cots), dtype=np.int64)
+        suspects = found[: find_suspects(self.triangulation.twin, cots, found)]
+        if len(suspects):
+            flipped = make_delaunay(self.triangulation, log_scale, suspects)
+            if len(flipped):
+                self.record(flipped)
+                broken = self.sum_angles(log_scale, sums, cots)
+        curvature = self.flat_turn - sums
+        residual = np.where(self.fixed, 0.0, self.target - curvature)
+        if not self.fixed.any() and np.count_nonzero(self.pinned) == 1:
+            # Gauss-Bonnet holds but for the rounding of 2 pi at every vertex, which no scale can take away.
+            residual -= residual.mean()
+        is_admissible = not (self.is_bounded and broken)
+        self.last = State(log_scale, residual, is_admissible, curvature, cots, broken)
+        return self.last
+
+    def direction(self, here: State, exactly: bool) -> tuple[FloatArray, bool]:
+        """Return the Newton direction of a state, 0 at fixed vertices, and whether it was factorized for.
+
+        exactly: factorize, whatever there is to solve with.
+
+        Raises:
+            MetricError: the Hessian is singular in double precision.
+        """
+        # The Hessian needs the triangulation of its own metric.
+        state = here if here is self.last else self.evaluate(here.place)
+        if exactly:
+            self.preconditioner = None
+        if self._pattern is None:
+            self._pattern = HessianPattern(self.triangulation)
+        if self.preconditioner is not None and len(here.place) >= SMALL:
+            accuracy = min(max(state.largest, GOAL / state.largest / 4), COARSEST)
+            hessian = self._pattern.matrix(state.cots, self.fixed)
+            inverse = corrected(self.preconditioner, hessian, self.fixed)
+            step = conjugate_gradients(hessian, state.residual, inverse, accuracy)
+            if step is not None:
+                return np.where(self.fixed, 0.0, step), False
+        held = self.fixed | self.pinned
+        hessian = self._pattern.matrix(state.cots, held)
+        self._factor = factorize(hessian, self._factor)
+        self.preconditioner = HeldInverse(self._factor, hessian, held)
+        return self.preconditioner.solve(state.residual), True
+
+
+def find_scale(
+    problem: ConformalProblem,
+    log_scale: FloatArray,
+    tolerance: float,
+    max_steps: int,
+) -> tuple[State, int]:
+    """Return the state with the least residual that Newton's method reaches, and the number of steps.
+
+    The search starts from a given log scale; on a bounded surface from none, where that breaks triangles.
+    """
+    start = problem.evaluate(log_scale)
+    if not start.is_admissible:
+        start = problem.evaluate(np.where(problem.fixed, log_scale, 0.0))
+    halvings = HALVINGS_BOUNDED if problem.is_bounded else HALVINGS
+    best, steps = minimise(
+        problem, start, Limits(tolerance, max_steps, GOAL, halvings, largest_step=LARGEST_STEP)
+    )
+    return best if best is problem.last else problem.evaluate(best.place), steps
+
+
+@compiled
+def add_angles(
+    i: int, j: int, k: int, a: float, b: float, c: float, angle_sum: FloatArray
+) -> tuple[bool, float, float, float]:
+    """Add the angles of a triangle with sides a, b, c opposite i, j, k to the sums there.
+
+    Where the triangle inequality is broken they are pi and 0, pi opposite the side that is too long. Returns whether it
+    is, and the cotangents at i, j, k; these are 0 then.
+    """
+    slack_a = min(b, c) - (a - max(b, c))
+    slack_b = min(c, a) - (b - max(c, a))
+    slack_c = min(a, b) - (c - max(a, b))
+    if min(slack_a, slack_b, slack_c) <= 0.0:
+        wide = i if slack_a <= 0.0 else (j if slack_b <= 0.0 else k)
+        angle_sum[wide] += math.pi
+        return True, 0.0, 0.0, 0.0
+    perimeter = a + b + c
+    root = math.sqrt(perimeter * slack_a * slack_b * slack_c)
+    angle_i = 2 * math.atan2(root, perimeter * slack_a)
+    angle_j = 2 * math.atan2(root, perimeter * slack_b)
+    angle_sum[i] += angle_i
+    angle_sum[j] += angle_j
+    angle_sum[k] += math.pi - angle_i - angle_j  # a third of the time less, and as exact as their sum is
+    return (
+        False,
+        (perimeter * slack_a - slack_b * slack_c) / (2 * root),
+        (perimeter * slack_b - slack_c * slack_a) / (2 * root),
+        (perimeter * slack_c - slack_a * slack_b) / (2 * root),
+    )
+
+
+@compiled
+def sum_angles(
+    tail: IntArray, length: FloatArray, scale: FloatArray, angle_sum: FloatArray, cots: FloatArray
+) -> int:
+    """Fill the angle sum at each vertex and the cotangent opposite each half-edge.
+
+    A side from i to j has the length length * scale_i * scale_j. Where the triangle inequality is broken the
+    angles are those of the convex extension (Springborn, Schroeder, Pinkall 2008, Section 5.1): pi opposite
+    the side that is too long, 0 at the others, and no cotangents. Returns the number of broken triangles.
+    """
+    broken = 0
+    angle_sum[:] = 0.0
+    for h in range(0, len(tail), 3):
+        # The corner opposite side i is at the tail of side i + 2.
+        j, k, i = tail[h], tail[h + 1], tail[h + 2]
+        a = length[h] * scale[j] * scale[k]
+        b = length[h + 1] * scale[k] * scale[i]
+        c = length[h + 2] * scale[i] * scale[j]
+        largest = max(a, b, c)
+        a /= largest
+        b /= largest
+        c /= largest
+        is_broken, cots[h], cots[h + 1], cots[h + 2] = add_angles(i, j, k, a, b, c, angle_sum)
+        broken += is_broken
+    return broken
+
+
+@compiled
+def _has_no_weights(cots: FloatArray, h: int) -> bool:
+    """Return whether the triangle of a half-edge has no cotangents."""
+    base = h - h % 3
+    return bool(cots[base] == 0.0 and cots[base + 1] == 0.0 and cots[base + 2] == 0.0)
+
+
+@compiled
+def may_be_flipped(cots: FloatArray, h: int, t: int) -> bool:
+    """Return whether the edge of two half-edges may not be Delaunay.
+
+    Its cotangents sum to less than 0, or it is one of a triangle that has none, as its sides close to none.
+    """
+    # The margin is the rounding of the cotangents; the test that decides on a flip has its own.
+    is_negative = cots[h] + cots[t] < -1e-13 * (abs(cots[h]) + abs(cots[t]))
+    return bool(
+        is_negative
+        or (cots[h] == 0.0 and _has_no_weights(cots, h))
+        or (cots[t] == 0.0 and _has_no_weights(cots, t))
+    )
+
+
+@compiled
+def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
+    """Write a half-edge of each edge that may not be Delaunay; return their number."""
+    count = 0
+    for h in range(len(twin)):
+        t = twin[h]
+        if t > h and may_be_flipped(cots, h, t):
+            found[count] = h
+            count += 1
+    return count

@@ -1,1 +1,0 @@
-"""Measures of a parameterization, and of how it was found."""

@@ -1,1 +1,0 @@
-"""What a flattening returns: put together, measured, held against what was promised."""

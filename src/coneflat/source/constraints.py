@@ -1,0 +1,193 @@
+"""What the user says about vertices of his mesh, in the numbering of the checked mesh and of its components."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..errors import OptionError
+from ..geometry.operators import at_unit_scale
+from ..mesh.check import CheckedMesh
+from ..mesh.polygons import COLOURS
+from ..options import Options
+from ..options.kinds import as_number, as_whole
+from ..stages import VertexCurvatures
+from .input_mesh import InputMesh
+
+# How much more a vertex of a pure colour weighs than a grey one.
+PAINTED = 99.0
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """What the user says about the vertices of a mesh.
+
+    Attributes:
+        names: (n,) what he calls each vertex.
+        cones: cones that he gives.
+        corners: corners of the boundary.
+        required: vertices that are cones in any case of a search; their curvatures are NaN.
+        is_allowed: (n,) whether a search may put a cone there.
+        weights: (n,) importance of each vertex, or None.
+        seam_weights: (n,) by which seams are dearer, or None.
+        on_marks: (n,) vertices on seams that are marked, or None.
+    """
+
+    names: IntArray
+    cones: VertexCurvatures
+    corners: VertexCurvatures
+    required: VertexCurvatures
+    is_allowed: BoolArray
+    weights: FloatArray | None
+    seam_weights: FloatArray | None = None
+    on_marks: BoolArray | None = None
+
+    def without(self, vertices: IntArray) -> Constraints:
+        """Return constraints that forbid cones at some vertices, too."""
+        is_allowed = self.is_allowed.copy()
+        is_allowed[vertices] = False
+        return replace(self, is_allowed=is_allowed)
+
+    def keep_off(self, seams: IntArray) -> None:
+        """Raise OptionError if a cone is wished for on seams, given by vertices, that are cut in any case."""
+        for place in (self.cones, self.required):
+            for vertex in place.vertices[np.isin(place.vertices, seams)]:
+                raise OptionError(
+                    f"cone {self.names[vertex]} lies on a seam that is marked, which takes what curvature it needs"
+                )
+
+    def with_marks(self, seams: IntArray) -> Constraints:
+        """Return constraints that know the marked seams, given by vertices."""
+        on_marks = np.zeros(len(self.names), dtype=bool)
+        on_marks[seams] = True
+        return replace(self, on_marks=on_marks)
+
+    def within(self, component: IntArray) -> Constraints:
+        """Return what is said of a component, numbered there; `component` are its vertices."""
+        return Constraints(
+            self.names[component],
+            self.cones.within(component),
+            self.corners.within(component),
+            self.required.within(component),
+            self.is_allowed[component],
+            _weights_within(self.weights, component),
+            _weights_within(self.seam_weights, component),
+            None if self.on_marks is None else self.on_marks[component],
+        )
+
+
+def _weights_within(weights: FloatArray | None, component: IntArray) -> FloatArray | None:
+    """Return the weights of a component; None where all are 0, which there says no more than that they are equal."""
+    return None if weights is None or not weights[component].any() else at_unit_scale(weights[component])
+
+
+def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh) -> Constraints:
+    """Return what the options say of the input's vertices for those of the checked mesh.
+
+    Args:
+        checked: the mesh.
+        options: where the constraints stand.
+        given: the input.
+
+    Raises:
+        OptionError: vertices that do not exist or cannot be what they are wanted for; weights that make no sense.
+    """
+    names, input_count = checked.vertex_origin, len(np.asarray(given.vertices))
+    required = _locate(checked, "cone", dict.fromkeys(options.required_cones))
+    for vertex in options.forbidden_cones:
+        if not 0 <= vertex < input_count:
+            raise OptionError(
+                f"a forbidden cone, {vertex}, is no vertex: these are numbered from 0 to {input_count - 1}"
+            )
+    is_allowed = ~np.isin(names, list(options.forbidden_cones))
+    for name in names[required.vertices[~is_allowed[required.vertices]]]:
+        raise OptionError(f"vertex {name} is both a required and a forbidden cone")
+    return Constraints(
+        names,
+        _locate(checked, "cone", options.named_cones),
+        _locate(checked, "corner", options.corners),
+        required,
+        is_allowed,
+        None if options.weights is None else _weights("weights", options.weights, given)[names],
+        None
+        if options.seam_weights is None
+        else _weights("seam weights", options.seam_weights, given)[names],
+    )
+
+
+def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) -> VertexCurvatures:
+    """Return given cones, which must be inside, or corners, which must be on the boundary."""
+    names = np.array(list(given), dtype=np.int64)
+    highest = int(checked.vertex_origin[-1])
+    for name in names[(names < 0) | (names > highest)]:
+        raise OptionError(f"{noun} {name} is no vertex of a face: these are numbered from 0 to {highest}")
+    found = np.searchsorted(checked.vertex_origin, names)
+    for name in names[checked.vertex_origin[found] != names]:
+        raise OptionError(f"{noun} {name} cannot be used: no face uses this vertex")
+    on_boundary = checked.mesh.is_boundary_vertex[found]
+    if noun == "cone":
+        for name in names[on_boundary]:
+            raise OptionError(
+                f"cone {name} lies on the boundary, which takes what curvature it needs: choose inner vertices, "
+                "or prescribe the boundary's curvature (boundary)"
+            )
+    else:
+        for name in names[~on_boundary]:
+            raise OptionError(f"corner {name} does not lie on the boundary")
+    curvatures = np.array([np.nan if k is None else k for k in given.values()], dtype=np.float64)
+    return VertexCurvatures(found, curvatures)
+
+
+def _weights_of_some(noun: str, weights: Mapping[Any, Any], count: int) -> FloatArray:
+    """Return (n,) the weights of the vertices that a map has, and 1 of the others."""
+    values = np.ones(count)
+    for vertex, weight in weights.items():
+        at = as_whole(f"a vertex of {noun}", vertex)
+        if not 0 <= at < count:
+            raise OptionError(f"{noun}: {at} is no vertex: these are numbered from 0 to {count - 1}")
+        values[at] = as_number(f"{noun}: that of vertex {at}", weight)
+    return values
+
+
+def _weights(noun: str, weights: object, given: InputMesh) -> FloatArray:
+    """Return (n,) the importance of each vertex of the input."""
+    count = len(np.asarray(given.vertices))
+    if isinstance(weights, str):
+        weights = _property(weights, given)
+    if isinstance(weights, Mapping):
+        weights = _weights_of_some(noun, weights, count)
+    try:
+        numbers = np.asarray(weights)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise OptionError(f"{noun} must be numbers, one for each vertex: {error}") from error
+    if numbers.dtype.kind not in "fiub" and numbers.size:
+        raise OptionError(f"{noun} must be numbers, one for each vertex, not of type {numbers.dtype}")
+    values = numbers.astype(np.float64)
+    if values.shape != (count,):
+        raise OptionError(
+            f"{noun} must be {count:,} numbers, one for each vertex, not of shape {values.shape}"
+        )
+    if not np.isfinite(values).all():
+        at = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise OptionError(f"{noun} must be finite; that of vertex {at} is {values[at]:g}")
+    if not (values.min() >= 0 and values.max() > 0):
+        raise OptionError(
+            f"{noun} must be 0 and up, not all 0; they are {values.min():g} to {values.max():g}"
+        )
+    return values
+
+
+def _property(name: str, given: InputMesh) -> FloatArray:
+    """Return what the input's file says of each vertex; "color" is how strongly it is painted."""
+    known = {} if given.source is None else given.source.properties
+    if name == "color" and all(colour in known for colour in COLOURS):
+        painted = np.ptp(np.stack([known[colour] for colour in COLOURS]), axis=0)
+        return 1.0 + PAINTED * painted
+    if name not in known:
+        has = "it has " + ", ".join(known) if known else "it has none"
+        raise OptionError(f"the mesh has no property {name!r} at its vertices to take weights from; {has}")
+    return known[name]

@@ -1,0 +1,143 @@
+"""Edges that the user wants cut in any case."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import BoolArray, IntArray
+from ..base.text import list_some, plural
+from ..errors import OptionError, SeamError
+from ..geometry.normals import dihedral_angles
+from ..mesh.charts import point_seams
+from ..mesh.check import CheckedMesh
+from ..mesh.connectivity import TriangleMesh, label_components
+from ..mesh.ties import tie_key
+from ..options import Options
+from .input_mesh import InputMesh
+from .numbering import turn_corners
+
+# Of a vertex: what its key adds to the size of a place.
+TIE_BREAK = 1e-6
+
+
+def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh, forbidden: BoolArray) -> BoolArray:
+    """Return (e,) True for inner edges that are to be seams: named, sharp, or seams of the input's own UVs.
+
+    forbidden: (e,) edges that are not to be cut, sharp or not.
+
+    Raises:
+        OptionError: a pair of vertices is no edge; the input has no UVs.
+        SeamError: a pair of vertices is forbidden.
+    """
+    mesh = checked.mesh
+    marked = np.zeros(len(mesh.edges), dtype=bool)
+    word, pairs = _word_and_pairs(options.seams)
+    if word is not None:
+        marked |= _seams_of_input(checked, given)
+    if options.sharp_angle is not None:
+        marked |= np.abs(dihedral_angles(mesh)) > options.sharp_angle
+    marked &= ~forbidden
+    if pairs is not None:
+        named = named_edges(checked, pairs)
+        both = named[forbidden[named]]
+        if len(both):
+            pair = checked.vertex_origin[mesh.edges[both[0]]]
+            raise SeamError(
+                f"{plural(len(both), 'edge')} given as seams and by no_seams: the first is {pair[0]}-{pair[1]}"
+            )
+        marked[named] = True
+    return marked & ~mesh.is_boundary_edge
+
+
+def _word_and_pairs(seams: Any) -> tuple[str | None, IntArray | None]:
+    """Return the word and the pairs of vertices that the option `seams` consists of."""
+    if isinstance(seams, tuple):
+        return seams
+    return (seams, None) if isinstance(seams, str) else (None, seams)
+
+
+def effective_marks(mesh: TriangleMesh, marked: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return the marked edges that cut something, and those that do not: alone, their ends are the same on both sides.
+
+    marked: (e,) inner edges.
+    """
+    at = np.bincount(mesh.edges[marked].ravel(), minlength=len(mesh.vertices))
+    falls_apart = (at > 1) | mesh.is_boundary_vertex
+    cuts = falls_apart[mesh.edges].any(axis=1)
+    return np.flatnonzero(marked & cuts), np.flatnonzero(marked & ~cuts)
+
+
+def named_edges(checked: CheckedMesh, pairs: IntArray) -> IntArray:
+    """Return the edges between pairs (k, 2) of the input's vertices.
+
+    Raises:
+        OptionError: a pair of vertices is no edge.
+    """
+    origin = checked.vertex_origin
+    bound = int(origin.max()) + 1
+    ends = np.sort(origin[checked.mesh.edges], axis=1)
+    keys = ends[:, 0] * bound + ends[:, 1]
+    low, high = pairs.min(axis=1), pairs.max(axis=1)
+    wanted = np.where((low >= 0) & (high < bound), low * bound + high, -1)
+    missing = np.flatnonzero(~np.isin(wanted, keys))
+    if len(missing):
+        names = [f"{a}-{b}" for a, b in pairs[missing[:5]].tolist()]
+        raise OptionError(
+            f"{plural(len(missing), 'seam')} of {len(pairs):,} between vertices that no edge connects: "
+            f"{list_some(names, len(missing))}"
+        )
+    return np.flatnonzero(np.isin(keys, wanted))
+
+
+def forbidden_edges(checked: CheckedMesh, options: Options, count: int) -> BoolArray:
+    """Return (e,) True for the edges of the option `no_seams`; those between its vertices if it names vertices.
+
+    count: of the input's vertices.
+
+    Raises:
+        OptionError: a vertex or an edge does not exist.
+    """
+    given = np.asarray(() if options.no_seams is None else options.no_seams, dtype=np.int64)
+    if given.ndim == 2:
+        forbidden = np.zeros(len(checked.mesh.edges), dtype=bool)
+        forbidden[named_edges(checked, given)] = True
+        return forbidden
+    strange = given[(given < 0) | (given >= count)]
+    if len(strange):
+        raise OptionError(f"no_seams: {strange[0]} is no vertex: these are numbered from 0 to {count - 1}")
+    inside = np.zeros(count, dtype=bool)
+    inside[given] = True
+    ends: BoolArray = inside[checked.vertex_origin][checked.mesh.edges]
+    return ends[:, 0] & ends[:, 1]
+
+
+def out_of_reach(mesh: TriangleMesh, is_forbidden: BoolArray) -> IntArray:
+    """Return the vertices of a connected mesh to which no seam gets from most of the others, or from the boundary.
+
+    None where nothing may be cut at all: it is the seams, then, that cannot be had, and not the cones.
+
+    is_forbidden: (m, 3) sides that are not cut.
+    """
+    barred = is_forbidden.ravel()[mesh.edge_halfedges[:, 0]] & ~mesh.is_boundary_edge
+    ways = mesh.edges[~barred]
+    if not len(ways):
+        return np.empty(0, dtype=np.int64)
+    number, label = label_components(len(mesh.vertices), ways[:, 0], ways[:, 1])
+    # Of places that are equally large, one that does not depend on numbers.
+    sizes = np.bincount(label, weights=1 + TIE_BREAK * tie_key(mesh.vertices), minlength=number)
+    if mesh.is_boundary_vertex.any():
+        sizes[np.bincount(label[mesh.is_boundary_vertex], minlength=number) == 0] = 0
+    return np.flatnonzero(label != np.argmax(sizes))
+
+
+def _seams_of_input(checked: CheckedMesh, given: InputMesh) -> BoolArray:
+    """Return (e,) True where the sides of an edge have different UVs in the input's file."""
+    texture = given.corner_texture()
+    if texture is None:
+        raise OptionError("the input has no UV coordinates whose seams could be kept")
+    mesh = checked.mesh
+    marked = np.zeros(len(mesh.edges), dtype=bool)
+    marked[point_seams(mesh, turn_corners(checked, texture))] = True
+    return marked

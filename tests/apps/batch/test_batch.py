@@ -1,0 +1,238 @@
+"""Many meshes: what fails or hangs stops nothing, what is done is not done again, and a cluster does the same."""
+
+from __future__ import annotations
+
+import csv
+import os
+import signal
+import sys
+import time
+
+import pytest
+import shapes
+from click.testing import CliRunner
+
+from coneflat import errors
+from coneflat.apps.batch import find_jobs, run_batch
+from coneflat.apps.batch.process import Child
+from coneflat.apps.cli.main import cli
+
+
+@pytest.fixture
+def models(tmp_path):
+    shapes.write_obj(tmp_path / "models" / "ball.obj", *shapes.sphere(2))
+    shapes.write_obj(tmp_path / "models" / "hill.obj", *shapes.hill(8, 6))
+    (tmp_path / "models" / "broken.obj").write_text("v 0 0 0\nf 1 2 3\n")
+    (tmp_path / "models" / "notes.txt").write_text("no mesh")
+    return tmp_path / "models"
+
+
+def rows_of(path):
+    with open(path, newline="") as file:
+        return {os.path.basename(row["mesh"]): row for row in csv.DictReader(file)}
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(cli, [str(argument) for argument in arguments])
+
+
+def test_failures_stop_nothing(models, tmp_path):
+    out = tmp_path / "out"
+    result = invoke("batch", models, "--out", out, "--jobs", 2)
+    assert result.exit_code == 1
+    assert "2 of 3 meshes are flattened; 1 failed" in result.output
+    rows = rows_of(out / "summary.csv")
+    assert {name: row["status"] for name, row in rows.items()} == {
+        "ball.obj": "done",
+        "hill.obj": "done",
+        "broken.obj": "failed",
+    }
+    assert "vertex" in rows["broken.obj"]["error"]
+    assert int(rows["ball.obj"]["cones"]) >= 3
+    assert float(rows["ball.obj"]["curvature_error_max"]) < 1e-10
+    assert (out / "ball.obj").read_text().count("\nvt ") > 100
+    assert not (out / "broken.obj").exists()
+
+
+def test_a_further_run_does_what_is_left(models, tmp_path):
+    out = tmp_path / "out"
+    invoke("batch", models, "--out", out)
+    before = (out / "ball.obj").stat().st_mtime_ns
+    shapes.write_obj(models / "broken.obj", *shapes.torus(12, 8))
+    result = invoke("batch", models, "--out", out)
+    assert result.exit_code == 0
+    assert "3 of 3 meshes are flattened, 2 of them before" in result.output
+    assert (out / "ball.obj").stat().st_mtime_ns == before
+    # Other options, another mesh, a result that is gone: each is a reason to work again.
+    assert "of them before" not in invoke("batch", models, "--out", out, "--distortion", 0.5).output
+    shapes.write_obj(models / "ball.obj", *shapes.sphere(1))
+    (out / "hill.obj").unlink()
+    assert "1 of them before" in invoke("batch", models, "--out", out, "--distortion", 0.5).output
+    assert "of them before" not in invoke("batch", models, "--out", out, "--distortion", 0.5, "--redo").output
+
+
+def test_a_mesh_that_hangs_is_ended(models, tmp_path):
+    jobs = find_jobs([str(models / "ball.obj"), str(models / "hill.obj")], tmp_path, ".npz", {}, None)
+    child = Child()
+    try:
+        hanging = child.flatten(jobs[0], 0.05)
+        assert hanging["status"] == "failed"
+        assert "longer than 0.05 s" in hanging["error"]
+        assert child.flatten(jobs[1], 60)["status"] == "done"
+    finally:
+        child.end()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nothing*.obj", "--out", "out"], "matches no mesh"),
+        (["models", "--out", "models"], "would overwrite"),
+        (["models", "--out", "out", "--jobs", "0"], "at least one process"),
+        (["models", "--out", "out", "--time-limit", "0"], "must be positive"),
+        (["models", "--out", "out", "--summary", "table.xls"], "a .csv file"),
+        (["models", "--out", "out", "--distortion", "-1"], "distortion must be a number above 0"),
+        (["models", "--out", "out", "--jobs", "2", "--dask", "tcp://localhost:1"], "leave out --jobs"),
+        (["models", "--out", "broken", "--cones", "none", "--distortion", "2"], "leave out --distortion"),
+    ],
+)
+def test_refusals(models, monkeypatch, arguments, message):
+    monkeypatch.chdir(models.parent)
+    result = invoke("batch", *arguments)
+    text = result.output if result.exception is None else str(result.exception) + result.output
+    assert result.exit_code != 0
+    assert message in text
+
+
+def test_a_cluster_does_the_same_even_if_it_loses_a_worker(models, tmp_path, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    for i in range(6):
+        shapes.write_obj(models / f"ball{i}.obj", *shapes.sphere(2, seed=i))
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    there.mkdir()
+    run_batch(find_jobs([str(models)], here, ".obj", {}, None), here)
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        killed = []
+
+        def listener(row, done, count):
+            if not killed:
+                killed.append(next(iter(cluster.workers.values())).process.pid)
+                os.kill(killed[0], signal.SIGKILL)
+
+        found = run_batch(
+            find_jobs([str(models)], there, ".obj", {}, None),
+            there,
+            dask=cluster.scheduler_address,
+            limit=60,
+            listener=listener,
+        )
+    assert killed
+    assert found.failed == 1
+    one, other = rows_of(here / "summary.csv"), rows_of(there / "summary.csv")
+    for name in one:
+        for column in ("status", "error", "cones", "qc_mean", "seam_length", "curvature_error_max"):
+            assert one[name][column] == other[name][column]
+        if one[name]["status"] == "done":
+            assert (here / name).read_bytes() == (there / name).read_bytes()
+
+
+def test_interrupted_batches_keep_what_they_have(models, tmp_path):
+    jobs = find_jobs([str(models)], tmp_path, ".obj", {}, None)
+
+    def listener(row, done, count):
+        raise KeyboardInterrupt
+
+    start = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        run_batch(jobs, tmp_path, listener=listener)
+    assert time.perf_counter() - start < 60
+    assert len(rows_of(tmp_path / "summary.csv")) == 1
+    assert len(run_batch(jobs, tmp_path).rows) == 3
+
+
+def test_a_link_that_leads_nowhere_is_one_failed_mesh(models, tmp_path):
+    (models / "dangling.obj").symlink_to("nowhere.obj")
+    (models / "loop.obj").symlink_to("loop.obj")
+    out = tmp_path / "out"
+    result = invoke("batch", models, "--out", out)
+    assert result.exit_code == 1
+    assert "2 of 5 meshes are flattened; 3 failed" in result.output
+    rows = rows_of(out / "summary.csv")
+    assert "there is no such file: it is a link that leads nowhere" in rows["dangling.obj"]["error"]
+    assert "symbolic links" in rows["loop.obj"]["error"]
+
+
+def test_broken_lines_of_the_journal_are_left_out_and_named(models, tmp_path):
+    out = tmp_path / "out"
+    invoke("batch", models / "ball.obj", "--out", out)
+    with (out / "batch.jsonl").open("ab") as file:
+        file.write(b'\xff\xfe\x00\n[]\n{"output": []}\n' + b"[" * 100_000 + b'\n{"mesh": "hal')
+    result = invoke("batch", models / "ball.obj", models / "hill.obj", "--out", out)
+    assert "Left out 5 broken lines of the journal" in result.output
+    assert "2 of 2 meshes are flattened, 1 of them before" in result.output
+    # What is written after a line that was cut off is whole.
+    assert (
+        "2 of them before" in invoke("batch", models / "ball.obj", models / "hill.obj", "--out", out).output
+    )
+
+
+def test_what_cannot_be_written_is_said_before_the_work(models, tmp_path):
+    jobs = find_jobs([str(models)], tmp_path, ".obj", {}, None)
+    (tmp_path / "file").write_text("")
+    (tmp_path / "journal" / "batch.jsonl").mkdir(parents=True)
+
+    def listener(row, done, count):
+        raise AssertionError("work was done")
+
+    for folder, summary in (
+        (tmp_path / "file" / "out", None),
+        (tmp_path / "journal", None),
+        (tmp_path, tmp_path / "missing" / "summary.csv"),
+        (tmp_path, tmp_path / "file" / "summary.csv"),
+    ):
+        with pytest.raises(errors.MeshFileError, match=r"cannot (be written|make the folder)"):
+            run_batch(jobs, folder, summary=summary, listener=listener)
+
+
+def test_every_result_has_a_name_of_its_own_in_the_folder(tmp_path):
+    names = ["a/ball.obj", "a/ball.OBJ", "a/Ball.obj", "b/ball.obj", "ball.ply", "ball_ply.obj", "a_ball.obj"]
+    for name in names:
+        shapes.write_obj(tmp_path / "models" / name, *shapes.tetrahedron())
+    jobs = find_jobs([str(tmp_path / "models" / "**")], tmp_path / "out", ".obj", {}, None)
+    results = {job.output.lower() for job in jobs}
+    assert len(results) == len({job.mesh for job in jobs})
+    assert {os.path.dirname(job.output) for job in jobs} == {str(tmp_path / "out")}
+
+
+@pytest.mark.parametrize("what", [b"", b"no JSON\n", b'{"half": '])
+def test_a_worker_that_crashes_fails_its_mesh_alone_and_leaves_nothing_half_written(
+    models, tmp_path, monkeypatch, what
+):
+    """The process for ball.obj begins to write, says something, and kills itself."""
+    monkeypatch.setattr(
+        "coneflat.apps.batch.process.COMMAND", [sys.executable, "-c", CRASHING, what.decode()]
+    )
+    jobs = find_jobs([str(models / "ball.obj"), str(models / "hill.obj")], tmp_path, ".obj", {}, None)
+    found = run_batch(jobs, tmp_path, processes=1)
+    assert [row["status"] for row in found.rows] == ["failed", "done"]
+    assert "SIGKILL" in found.rows[0]["error"]
+    assert not list(tmp_path.glob(".*.tmp"))
+    assert not (tmp_path / "ball.obj").exists()
+
+
+CRASHING = """
+import json, os, signal, sys
+from coneflat.apps.batch import child
+from coneflat.io import atomic_write
+job = json.loads(sys.stdin.readline())
+if job["mesh"].endswith("ball.obj"):
+    with atomic_write(job["output"]) as file:
+        file.write(b"half")
+        file.flush()
+        os.write(1, sys.argv[1].encode())
+        os.kill(os.getpid(), signal.SIGKILL)
+os.write(1, (json.dumps(child.flatten_file(job)) + chr(10)).encode())
+"""

@@ -1,0 +1,228 @@
+"""The command line."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+import shapes
+from command import command as run
+
+from coneflat import errors, flatten, read_mesh
+from coneflat.apps.cli.values import parse_curvature
+
+#: A line of progress, which comes by the clock.
+PROGRESS = re.compile(r" *\d+\.\d s +\d+%  .*")
+
+
+def said(text):
+    """Return the lines that were printed, without those of progress."""
+    return [line for line in text.splitlines() if not PROGRESS.fullmatch(line)]
+
+
+@pytest.fixture
+def model(tmp_path):
+    return shapes.write_obj(tmp_path / "model.obj", *shapes.sphere(2))
+
+
+def test_flatten_writes_mesh_report_and_table(model, tmp_path):
+    done = run("flatten", model, "-o", "out.obj", "--report", "report.json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    # On a slow machine it says what it is doing, and nothing else.
+    assert all(re.fullmatch(r" +\d+\.\d s +\d+%  \w+.*", line) for line in done.stderr.splitlines())
+    for word in ("cones", "QC distortion", "seam length", "wrote out.obj", "wrote report.json", "layout"):
+        assert word in done.stdout
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert {"read", "write", "layout"} <= set(report["seconds"])
+    assert report["flipped"] == 0
+    lines = (tmp_path / "out.obj").read_text().splitlines()
+    assert sum(line.startswith("vt ") for line in lines) > 162
+    np.testing.assert_array_equal(read_mesh(tmp_path / "out.obj").vertices, read_mesh(model).vertices)
+
+
+def test_paper_is_the_published_method(model, tmp_path):
+    done = run("flatten", model, "--paper", "--report", "paper.json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    settings = json.loads((tmp_path / "paper.json").read_text())["settings"]
+    assert settings["cones"] == "greedy"
+    assert settings["method"] == "linear"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nothing.obj"], "nothing.obj"),
+        (["model.obj", "-o", "x.fbx"], "'.fbx'"),
+        (["model.obj", "-o", "missing/x.obj"], "missing"),
+        (["model.obj", "--report", "missing/x.json"], "missing"),
+        (["model.obj", "--texture", "checker"], "only .glb files carry a texture"),
+        (["model.obj", "-o", "x.glb", "--texture", "none.png"], "none.png: there is no such file"),
+        (["."], "coneflat batch"),
+        (["model.obj", "-o", "x.glb", "--texture", "text.ply"], "text.ply is not a readable image"),
+        (["model.obj", "-o", "model.obj"], "is the input and the output"),
+        (["model.obj", "-o", "z.obj", "--report", "model.obj"], "is the input and the report"),
+        (["model.obj", "-o", "z.obj", "--report", "./z.obj"], "is the output and the report"),
+        (["model.obj", "--distortion", "few"], "not a valid float"),
+        (["model.obj", "--max-cones", "0"], "0 cones of at most 1.5 pi each cannot carry"),
+        (["model.obj", "--cones", "magic"], "magic"),
+        (["model.obj", "--boundary", "1:pi,2"], "vertex 2 has none"),
+        (["model.obj", "--cones", "1:pi", "--cones", "2:pi"], "sum to 6.283185 (2 pi)"),
+        (["model.obj", "--cones", "1x"], "'1x' is not VERTEX"),
+        (["model.obj", "--cones", "1", "--max-cones", "3"], "leave out --max-cones"),
+        (["model.obj", "--paper", "--distortion", "1"], "leave out --distortion"),
+        (["model.obj", "--magic"], "--magic"),
+        (["model.obj", "--hide-seams", "much"], "'much' is no strength"),
+        (["empty.obj"], "empty.obj"),
+        (["text.ply"], "text.ply"),
+        (["model.xyz"], ".xyz"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(model, tmp_path, arguments, message):
+    (tmp_path / "empty.obj").write_text("")
+    (tmp_path / "text.ply").write_text("this is no mesh")
+    (tmp_path / "model.xyz").write_text("0 0 0")
+    before = sorted(tmp_path.iterdir())
+    done = run("flatten", *arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    (line,) = said(done.stderr)
+    assert line.startswith("coneflat: error: ")
+    assert message in line
+    assert done.stdout == ""
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_cones_from_a_file(model, tmp_path):
+    def flatten(text):
+        (tmp_path / "cones.txt").write_text(text)
+        return run("flatten", model, "--cones", "cones.txt", "--report", "report.json", cwd=tmp_path)
+
+    done = flatten("# vertex curvature\n3 pi/2\n\n50, 270deg\n100 pi # the third\n120  1.0pi\n")
+    assert done.returncode == 0, done.stderr
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["cone_vertices"] == [3, 50, 100, 120]
+    np.testing.assert_allclose(report["cone_curvatures"], np.pi * np.array([0.5, 1.5, 1, 1]))
+    for text, message in [
+        ("3 pi/2\n50 2pi*0.5\n", "cones.txt, line 2: '50 2pi*0.5'"),
+        ("3 pi/2\n50 pi\n", "sum to 4.712389 (1.5 pi)"),
+        ("# nothing\n", "cones.txt holds no cones"),
+    ]:
+        done = flatten(text)
+        assert done.returncode == 2
+        assert message in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("1.5", 1.5), ("pi", np.pi), ("-pi/2", -np.pi / 2), ("0.5pi", np.pi / 2), ("3pi/2", 1.5 * np.pi),
+     ("90deg", np.pi / 2), ("1e-1", 0.1), ("π", np.pi), ("-.25 pi", -np.pi / 4), ("2 * pi", 2 * np.pi)],
+)  # fmt: skip
+def test_curvatures_as_people_write_them(text, value):
+    assert parse_curvature(text, "here") == pytest.approx(value)
+
+
+@pytest.mark.parametrize("text", ["", "x", "pi/0", "1..2", "pipi", "-", "deg", "nan", "1 2"])
+def test_what_is_no_curvature(text):
+    with pytest.raises(errors.OptionError, match="here"):
+        parse_curvature(text, "here")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has other signals")
+@pytest.mark.parametrize("step", ["cones", "write"])
+def test_interrupt_leaves_nothing_half_written(tmp_path, step):
+    shapes.write_obj(tmp_path / "big.obj", *shapes.sphere(5))
+    command = [sys.executable, "-m", "coneflat", "flatten", "-v", "big.obj", "-o", "out.obj"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        hanging = threading.Timer(60, process.kill)
+        hanging.start()
+        for line in process.stderr:
+            if line.split()[-1:] == [step]:
+                process.send_signal(signal.SIGINT)
+                break
+        said = process.stderr.read()
+        hanging.cancel()
+    assert process.returncode == 130
+    assert said.splitlines()[-1] == "coneflat: error: interrupted; nothing was left half-written"
+    assert [path.name for path in tmp_path.iterdir()] == ["big.obj"]
+
+
+def test_demo(tmp_path):
+    pytest.importorskip("matplotlib")
+    done = run("demo", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "coneflat-demo"
+    assert (folder / "sample.png").read_bytes()[:4] == b"\x89PNG"
+    assert json.loads((folder / "sample.json").read_text())["flipped"] == 0
+    assert "vt " in (folder / "sample.obj").read_text()
+    assert str(folder.relative_to(tmp_path) / "sample.png") in done.stdout
+
+
+def test_textures(model, tmp_path):
+    done = run(
+        "flatten", model, "-o", "out.npz", "--up=-y", "--padding", "8", "--resolution", "512", cwd=tmp_path
+    )
+    assert done.returncode == 0
+    with np.load(tmp_path / "out.npz") as arrays:
+        assert arrays["uv"].min() >= 8 / 512 - 1e-12
+        assert arrays["uv"].max() <= 1 - 8 / 512 + 1e-12
+    for words, message in (
+        (("--up", "north"), "no direction"),
+        (("--up", "0,0,0"), "not all 0"),
+        (("--padding", "-1"), "padding must be"),
+        (("--tiles", "0"), "tiles must be a whole number from 1 to 1,000"),
+        (("--resolution", "0"), "resolution must be a whole number from 1"),
+    ):
+        done = run("flatten", model, "-q", *words, cwd=tmp_path)
+        assert done.returncode == 2
+        assert message in done.stderr
+        assert len(said(done.stderr)) == 1
+
+
+def test_marked_seams(tmp_path):
+    shapes.write_obj(tmp_path / "box.obj", *shapes.box(2))
+    done = run(
+        "flatten", "box.obj", "-o", "six.obj", "--sharp-angle", "60deg", "--report", "r.json", cwd=tmp_path
+    )
+    assert done.returncode == 0
+    assert json.loads((tmp_path / "r.json").read_text())["charts"] == 6
+    (tmp_path / "pairs.txt").write_text("0 1  # an edge\n")
+    assert run("flatten", "box.obj", "-q", "--seams", "pairs.txt", cwd=tmp_path).returncode == 0
+    for text, message in (
+        ("0 x\n", "line 1: '0 x' is not a pair"),
+        ("# none\n", "holds no pairs"),
+        ("0 25", "0-25"),
+    ):
+        (tmp_path / "pairs.txt").write_text(text)
+        done = run("flatten", "box.obj", "-q", "--seams", "pairs.txt", cwd=tmp_path)
+        assert done.returncode == 2
+        assert message in done.stderr
+    done = run("flatten", "box.obj", "-q", "--seams", "input", "--seams", "input", cwd=tmp_path)
+    assert "--seams input is given twice" in done.stderr
+    done = run("flatten", "box.obj", "-q", "--seams", "input", cwd=tmp_path)
+    assert "no UV coordinates" in done.stderr
+
+
+def test_no_seams_takes_vertices_and_pairs(tmp_path):
+    vertices, faces = shapes.sphere(3, bumps=0.4, seed=5)
+    shapes.write_obj(tmp_path / "ball.obj", vertices, faces)
+    seams = flatten(tmp_path / "ball.obj").seams
+    (tmp_path / "pairs.txt").write_text("\n".join(f"{a} {b}" for a, b in seams[:4]) + "  # edges\n")
+    (tmp_path / "some.txt").write_text("\n".join(str(v) for v in np.unique(seams[:4])))
+    for given in ("pairs.txt", "some.txt", ",".join(str(v) for v in np.unique(seams[:4]))):
+        done = run("flatten", "ball.obj", "-q", "-o", "out.npz", "--no-seams", given, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        found = np.load(tmp_path / "out.npz")["seams"]
+        assert not {tuple(sorted(edge)) for edge in seams[:4].tolist()} & {
+            tuple(sorted(edge)) for edge in found.tolist()
+        }
+    done = run("flatten", "ball.obj", "--no-seams", "3", "--no-seams", "pairs.txt", cwd=tmp_path)
+    assert "--no-seams takes vertices or pairs of them, not both" in done.stderr
+    done = run("flatten", "ball.obj", "--no-seams", "x", cwd=tmp_path)
+    assert "--no-seams: 'x' is no vertex, and there is no such file" in done.stderr

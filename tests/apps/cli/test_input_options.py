@@ -1,0 +1,209 @@
+"""Meshes that are not quite one: repaired, closed or refused, by all commands alike."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import shapes
+from click.testing import CliRunner
+
+import coneflat
+from coneflat import MeshFile, check_mesh, errors
+from coneflat.apps.cli.main import cli
+from coneflat.io.join import join_borders
+from coneflat.io.read import read_joined
+
+TAKE_MESHES = ("flatten", "batch", "cones", "compare", "view", "figure", "measure")
+
+
+def mesh_file(vertices, faces):
+    offsets = np.arange(0, faces.size + 1, 3)
+    return MeshFile("x.obj", np.asarray(vertices, float), faces.reshape(-1).copy(), offsets)
+
+
+def triangles(joined):
+    return joined.mesh.vertices, joined.mesh.corners.reshape(-1, 3)
+
+
+def soup(vertices, faces):
+    """Return every triangle with vertices of its own."""
+    return vertices[faces.ravel()], np.arange(faces.size).reshape(-1, 3)
+
+
+def fin():
+    """Return a ball with a triangle that stands out of an edge."""
+    vertices, faces = shapes.sphere(1)
+    return np.r_[vertices, [[2, 2, 2]]], np.r_[faces, [[0, 12, len(vertices)]]]
+
+
+def run(*words):
+    return CliRunner().invoke(cli, [str(word) for word in words])
+
+
+class TestJoining:
+    def test_a_soup_becomes_the_surface_that_it_is(self):
+        vertices, faces = shapes.sphere(2)
+        joined = join_borders(mesh_file(*soup(vertices, faces)))
+        assert joined.edges == 3 * len(faces) // 2
+        assert joined.left == 0
+        mesh = check_mesh(*triangles(joined)).mesh
+        assert len(mesh.vertices) == len(vertices)
+        assert not mesh.is_boundary_edge.any()
+
+    def test_what_is_closed_or_far_apart_is_left_alone(self):
+        for vertices, faces in (shapes.sphere(1), shapes.hill(4, 3)):
+            mesh = mesh_file(vertices, faces)
+            assert join_borders(mesh).mesh is mesh
+
+    def test_three_sides_at_one_place_are_left_open_with_a_hint(self):
+        vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 1], [0, -1, -1]], dtype=float)
+        book = soup(vertices, np.array([[0, 1, 2], [1, 0, 3], [1, 0, 4]]))
+        joined = join_borders(mesh_file(*book))
+        assert (joined.edges, joined.left) == (0, 3)
+        assert "3 open edges at the same places as others, left open; --weld" in joined.notes()[0]
+
+    def test_what_was_manifold_stays_so(self):
+        """Triangles between few places, and two parts of a ball with vertices of their own and a few holes."""
+        random = np.random.default_rng(7)
+        ball, faces = shapes.sphere(1)
+        closed = 0
+        for case in range(400):
+            if case % 2:
+                points = random.integers(0, 3, size=(random.integers(4, 30), 3)).astype(float)
+                chosen = np.array(
+                    [random.choice(len(points), 3, replace=False) for _ in range(random.integers(1, 9))]
+                )
+            else:
+                side = ball[faces].mean(axis=1) @ random.normal(size=3) > random.normal() / 2
+                points, chosen = shapes.join((ball, faces[side]), (ball, faces[~side]))
+                chosen = chosen[random.random(len(faces)) < 0.99]
+            try:
+                before = check_mesh(points, chosen)
+            except errors.MeshError:
+                continue
+            joined = join_borders(mesh_file(points, chosen))
+            after = check_mesh(*triangles(joined))
+            assert after.mesh.is_boundary_edge.sum() == before.mesh.is_boundary_edge.sum() - 2 * joined.edges
+            closed += joined.edges > 0
+        assert closed > 50
+
+    def test_patches_of_a_file_become_one_chart(self, tmp_path, monkeypatch):
+        """A ball in four pieces with borders of their own: the file's own making, and no seams of anybody."""
+        monkeypatch.chdir(tmp_path)
+        vertices, faces = shapes.sphere(2)
+        piece = (vertices[faces].mean(axis=1)[:, :2] > 0) @ [1, 2]
+        parts = [(vertices, faces[piece == k]) for k in range(4)]
+        shapes.write_obj(tmp_path / "pieces.obj", *shapes.join(*parts))
+        done = run("flatten", "pieces.obj", "-o", "a.obj", "--report", "a.json")
+        assert done.exit_code == 0, done.output
+        report = json.loads((tmp_path / "a.json").read_text())
+        assert report["notes"][0].startswith("Closed ")
+        assert "note: Closed " in done.stdout
+        done = run("flatten", "pieces.obj", "-q", "-o", "b.obj", "--report", "b.json", "--no-weld")
+        apart = json.loads((tmp_path / "b.json").read_text())
+        assert apart["charts"] == 4 > report["charts"]
+        assert apart["seam_length"] < report["seam_length"]
+
+    def test_vertices_are_named_as_in_the_file(self, tmp_path, monkeypatch):
+        """Also where another one is used for them."""
+        monkeypatch.chdir(tmp_path)
+        vertices, faces = soup(*shapes.sphere(1))
+        path = shapes.write_obj(tmp_path / "soup.obj", vertices, faces)
+        used = read_joined(path).used
+        merged = np.flatnonzero(used != np.arange(len(used)))
+        words = [word for v in merged[[5, 40, 80]] for word in ("--required-cones", v)]
+        done = run("flatten", path, "-q", "-o", "a.obj", "--report", "a.json", *words)
+        assert done.exit_code == 0, done.output
+        found = json.loads((tmp_path / "a.json").read_text())
+        assert set(used[merged[[5, 40, 80]]].tolist()) <= set(found["cone_vertices"])
+        one = int(merged[0])
+        done = run("flatten", path, "--cones", f"{one},{int(used[one])},7")
+        assert "lie at the same place" in str(done.exception)
+
+
+class TestRepair:
+    @pytest.mark.parametrize(
+        ("command", "more"),
+        [
+            ("flatten", ["-o", "out.obj"]),
+            ("cones", ["-o", "out.txt"]),
+            ("view", ["-o", "out.html"]),
+            ("figure", ["-o", "out.png", "--dpi", "50"]),
+            ("figure", ["--kind", "curve", "-o", "out.png", "--dpi", "50", "--most", "6"]),
+            ("compare", ["--methods", "exact", "--no-peers"]),
+        ],
+    )
+    def test_commands_repair_with_a_note_and_refuse_if_strict(self, tmp_path, monkeypatch, command, more):
+        if command == "figure":
+            pytest.importorskip("matplotlib")
+        monkeypatch.chdir(tmp_path)
+        shapes.write_obj(tmp_path / "fin.obj", *fin())
+        done = run(command, "fin.obj", *more)
+        assert done.exit_code == 0, done.output
+        if command in ("flatten", "view"):
+            assert "note: Separated the faces at 1 edge with more than two." in done.stdout
+        done = run(command, "fin.obj", "--strict", *more)
+        assert isinstance(done.exception, errors.NonManifoldError)
+
+
+def test_every_command_that_reads_meshes_takes_the_same_options():
+    declared = []
+    for name in TAKE_MESHES:
+        options = {
+            option: each for each in cli.commands[name].params for option in each.opts + each.secondary_opts
+        }
+        found = [options.get(option) for option in ("--repair", "--strict", "--weld", "--no-weld")]
+        assert all(found), name
+        declared.append([each.help for each in found])
+    assert all(each == declared[0] for each in declared)
+
+
+class TestOwnUVs:
+    @pytest.fixture
+    def square(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        vertices, faces = shapes.hill(6, 5)
+        return shapes.write_obj(tmp_path / "own.obj", vertices, faces, uv=0.5 * vertices[:, :2])
+
+    @pytest.mark.parametrize(("command", "ending"), [("view", "html"), ("figure", "png")])
+    def test_they_are_shown_and_it_is_said(self, square, command, ending):
+        if command == "figure":
+            pytest.importorskip("matplotlib")
+        done = run(command, square, "-o", f"a.{ending}")
+        assert "note: Shown are the UVs that own.obj has; --again" in done.stdout
+        done = run(command, square, "-o", f"b.{ending}", "--again")
+        assert done.exit_code == 0
+        assert "Shown are" not in done.stdout
+
+    def test_they_are_those_of_the_file(self, square):
+        from coneflat.apps.view.from_uv import own_flattening
+        from coneflat.io.read import read_joined
+
+        shown = own_flattening(read_joined(square))
+        vertices, _ = shapes.hill(6, 5)
+        np.testing.assert_array_equal(shown.corner_uv, 0.5 * vertices[shown.faces][..., :2])
+        assert len(shown.seams) == 0
+        assert shown.distortion.qc_mean == coneflat.measure_uv(square).distortion.qc_mean
+        # Without seams the plane is flat inside.
+        inside = np.ones(len(shown.vertices), dtype=bool)
+        inside[coneflat.TriangleMesh(shown.vertices, shown.faces).is_boundary_vertex] = False
+        assert np.abs(shown.curvature_residual[inside]).max() < 1e-12
+
+
+def test_several_meshes_hint_at_batch():
+    done = run("flatten", "a.obj", "b.obj", "c.obj")
+    assert done.exit_code == 2
+    assert "flatten takes one mesh, and there are 3: `coneflat batch a.obj b.obj ..." in done.output
+
+
+@pytest.mark.parametrize("command", ["view", "figure"])
+def test_uvs_beyond_what_can_be_shown_are_refused_in_a_line(command, tmp_path):
+    path = tmp_path / "far.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1e300 0\nvt 0 1e300\nf 1/1 2/2 3/3\n")
+    output = tmp_path / ("out.html" if command == "view" else "out.png")
+    done = run(command, path, "-o", output)
+    assert isinstance(done.exception, errors.MeshFileError)
+    assert "UVs of up to 1e+300 are too large to be shown" in str(done.exception)
+    assert not output.exists()

@@ -1,0 +1,75 @@
+"""What the commands say of their work: all in the same way."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+import shapes
+from click.testing import CliRunner
+
+from coneflat.apps.cli.console import Console
+from coneflat.apps.cli.main import cli
+
+COMMANDS = {
+    "flatten": ("flatten", "model.obj", "-o", "out.obj"),
+    "view": ("view", "model.obj", "-o", "out.html"),
+    "figure": ("figure", "model.obj", "-o", "out.png", "--dpi", "50"),
+    "curve figure": ("figure", "model.obj", "--kind", "curve", "--most", "6", "-o", "out.png", "--dpi", "50"),
+    "cones": ("cones", "model.obj", "-o", "out.txt"),
+    "curve": ("cones", "model.obj", "--curve", "--most", "6", "--picture", "out.png"),
+    "batch": ("batch", "model.obj", "--out", "out", "--jobs", "1"),
+}
+QUICK = ("view", "figure", "curve figure", "cones", "curve")
+LINE = r" +\d+\.\d s +(\d+)%  \w+.*"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    shapes.write_obj(tmp_path / "model.obj", *shapes.sphere(2))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(words):
+    done = CliRunner().invoke(cli, words, catch_exceptions=False)
+    assert done.exit_code == 0, done.stderr
+    return done
+
+
+def needed(name):
+    if "figure" in name or name in ("curve", "demo"):
+        pytest.importorskip("matplotlib")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_verbose_tells_each_step_and_where_the_time_went(folder, name):
+    needed(name)
+    done = run((*COMMANDS[name], "-v"))
+    told = [re.fullmatch(LINE, line) for line in done.stderr.splitlines()]
+    assert len(told) > (0 if name == "batch" else 2)
+    assert all(told)
+    percents = [int(each[1]) for each in told]
+    assert percents == sorted(percents)
+    assert re.search(r"^time +\d+\.\d+ s", done.stdout, re.MULTILINE)
+    assert "wrote " in done.stdout
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_quiet_says_nothing(folder, name):
+    needed(name)
+    done = run((*COMMANDS[name], "-q"))
+    assert (done.stdout, done.stderr) == ("", "")
+    assert len(list(folder.iterdir())) == 2
+
+
+def test_lines_come_a_second_apart_if_it_takes_long(capsys, monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("coneflat.apps.cli.console.time.perf_counter", lambda: now[0])
+    with Console() as console:
+        for now[0] in (0.0, 0.9, 1.9, 2.9, 3.1, 3.9, 4.3, 4.4):
+            console.progress(f"step {now[0]}", now[0] / 6)
+        console.say(["said"])
+        for now[0] in (5.0, 5.5):
+            console.progress(f"step {now[0]}", now[0] / 6)
+    assert re.findall(r"step (\S+)", capsys.readouterr().err) == ["1.9", "3.1", "4.3", "5.5"]

@@ -1,0 +1,163 @@
+"""Files of integer grids: UVs from which all else follows."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+import shapes
+from grid_maps import RING, on_squares, polycube
+
+import coneflat
+from coneflat import IntegerGrid
+from coneflat.apps.quads.extract import extract_quads
+from coneflat.apps.quads.integer_map import grid_of_corners
+from coneflat.errors import GridError, MeshFileError, UnknownFormatError
+
+MAPS = {
+    "sphere": lambda: coneflat.integer_grid(*shapes.sphere(3, bumps=0.2), quads=300),
+    "torus": lambda: coneflat.integer_grid(*shapes.torus(), quads=300),
+    "free border": lambda: coneflat.integer_grid(*shapes.hill(), quads=300),
+    "straight border": lambda: coneflat.integer_grid(*shapes.hill(), quads=300, boundary="straight"),
+}
+
+
+@pytest.fixture(scope="module", params=MAPS)
+def grid(request):
+    return MAPS[request.param]()
+
+
+def sorted_cones(grid):
+    """The grid with its cones, and the corners of its boundary, in the order of vertices."""
+    one, two = np.argsort(grid.cones), np.argsort(grid.corners)
+    return replace(
+        grid,
+        cones=grid.cones[one],
+        quarters=grid.quarters[one],
+        corners=grid.corners[two],
+        corner_quarters=grid.corner_quarters[two],
+    )
+
+
+def assert_same(one, other):
+    """All fields, bit for bit."""
+    for field in fields(one):
+        if field.name == "seconds":
+            continue
+        np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name), field.name)
+
+
+@pytest.mark.parametrize("ending", [".npz", ".obj", ".OBJ"])
+def test_a_grid_comes_back(grid, tmp_path, ending):
+    again = IntegerGrid.load(grid.save(tmp_path / f"grid{ending}"))
+    assert_same(*((grid, again) if ending == ".npz" else (sorted_cones(grid), again)))
+    one, other = extract_quads(grid), extract_quads(again)
+    np.testing.assert_array_equal(one.vertices, other.vertices)
+    np.testing.assert_array_equal(one.quads, other.quads)
+
+
+def test_motions_and_cones_follow_from_the_corners_alone(grid):
+    again = grid_of_corners(grid.vertices, grid.faces, grid.corner_grid)
+    wanted = sorted_cones(grid)
+    for name in ("turns", "shifts", "cones", "quarters", "corners", "corner_quarters"):
+        np.testing.assert_array_equal(getattr(wanted, name), getattr(again, name))
+    assert again.size == pytest.approx(grid.size, rel=0.1)
+    assert np.isnan(again.qc_mean)
+
+
+def test_known_motions_are_found():
+    # Squares in charts that are turned and moved at random, with motions found one edge at a time.
+    known = on_squares(*polycube(RING), 4, inside=5, along=2, seed=7)
+    again = grid_of_corners(known.vertices, known.faces, known.corner_grid)
+    for name in ("turns", "shifts", "cones", "quarters"):
+        np.testing.assert_array_equal(getattr(known, name), getattr(again, name))
+    assert len(np.unique(again.turns)) == 4
+    # A square's side is a quarter of a cube's.
+    assert again.size == pytest.approx(1 / 4)
+
+
+def test_seams_are_listed(grid, tmp_path):
+    path = grid.save(tmp_path / "grid.obj")
+    lines = [line.split() for line in path.read_text().splitlines() if line.startswith("# seam ")][1:]
+    rows = np.array([line[2:] for line in lines], dtype=int).reshape(-1, 5)
+    assert (len(rows) > 0) == (len(grid.cones) > 0 or len(grid.corners) == 0)
+    with np.load(grid.save(tmp_path / "grid.npz"), allow_pickle=False) as archive:
+        np.testing.assert_array_equal(archive["seams"], rows[:, :2] - 1)
+        np.testing.assert_array_equal(archive["seam_turns"], rows[:, 2])
+        np.testing.assert_array_equal(archive["seam_shifts"], rows[:, 3:])
+
+
+@pytest.fixture(scope="module")
+def known():
+    found = on_squares(*polycube(RING), 2, inside=3, along=1, seed=1)
+    return grid_of_corners(found.vertices, found.faces, found.corner_grid)
+
+
+class TestWhatIsNone:
+    @pytest.mark.parametrize(
+        ("name", "value", "message"),
+        [
+            ("turns", None, "holds no integer grid: 'turns' is missing"),
+            ("turns", 7, "'turns' has indices beyond"),
+            ("shifts", 7, "its turns and shifts are not those of its corners"),
+            ("faces", 10**6, "'faces' has indices beyond"),
+            ("corner_grid", np.inf, "not finite"),
+            ("cones", -1, "'cones' has indices beyond"),
+            ("report", "", "not a readable NPZ file"),
+        ],
+    )
+    def test_archives(self, known, tmp_path, name, value, message):
+        with np.load(known.save(tmp_path / "grid.npz")) as archive:
+            arrays = dict(archive)
+        if value is None:
+            del arrays[name]
+        elif value == "":
+            arrays[name] = np.array("{}")
+        else:
+            arrays[name] = np.full_like(arrays[name], value)
+        np.savez(tmp_path / "bad.npz", **arrays)
+        with pytest.raises(MeshFileError, match=message) as caught:
+            IntegerGrid.load(tmp_path / "bad.npz")
+        assert "\n" not in str(caught.value)
+
+    @pytest.mark.parametrize(
+        ("old", "new", "message"),
+        [
+            ("\nf ", "\nf 1/1 2/2 3/3 4/4\nf ", "polygons that are no triangles"),
+            ("\nf ", "\nf 1 2 3\nf ", "triangle corners without UVs"),
+            (
+                "\nf ",
+                "\nf 1/1 2/2 5/5\nf ",
+                "no integer grid: 3 vertices where surfaces touch in a single point: 0, 1, 4$",
+            ),
+            ("# grid {", "# grid {{", "comment on its grid"),
+        ],
+    )
+    def test_objs(self, known, tmp_path, old, new, message):
+        path = known.save(tmp_path / "grid.obj")
+        path.write_text(path.read_text().replace(old, new, 1))
+        with pytest.raises(MeshFileError, match=message):
+            IntegerGrid.load(path)
+
+    def test_maps_that_do_not_fit(self, known):
+        places = known.corner_grid.copy()
+        with pytest.raises(GridError, match="turned over or without area"):
+            grid_of_corners(known.vertices, known.faces, places[..., ::-1])
+        places[5] += 0.25
+        with pytest.raises(GridError, match="miss each other by 0.[23]"):
+            grid_of_corners(known.vertices, known.faces, places)
+
+    def test_endings(self, known, tmp_path):
+        with pytest.raises(UnknownFormatError, match=r"integer grids are written as \.obj, \.npz"):
+            known.save(tmp_path / "grid.glb")
+        with pytest.raises(UnknownFormatError, match="integer grids are read from"):
+            IntegerGrid.load(tmp_path / "grid.ply")
+
+
+@pytest.mark.parametrize("ending", [".obj", ".npz"])
+def test_sharp_edges_are_kept(tmp_path, ending):
+    grid = coneflat.integer_grid(*shapes.box(4, (1.0, 1.0, 1.0)), quads=96, sharp_angle=1.0)
+    again = IntegerGrid.load(grid.save(tmp_path / f"box{ending}"))
+    assert len(grid.features) >= 12 * 4
+    np.testing.assert_array_equal(again.features, grid.features)

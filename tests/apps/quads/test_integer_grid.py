@@ -1,0 +1,192 @@
+"""Integer grids: transitions that are whole, cones on grid points, no triangle turned over, any topology."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+from coneflat import errors, flatten, integer_grid
+from coneflat.mesh.connectivity import TriangleMesh
+
+TURNS = np.array([1, 1j, -1, -1j])
+QUARTER = {"quantise": np.pi / 2, "charts": "one", "min_cone_angle": 1.5 * np.pi, "max_cone_angle": 3 * np.pi}
+
+
+def pair(*parts):
+    """Several meshes as one of several components."""
+    ends = np.cumsum([0] + [len(v) for v, _ in parts])
+    faces = np.concatenate([f + end for (_, f), end in zip(parts, ends, strict=False)])
+    return np.concatenate([v + 3 * i for i, (v, _) in enumerate(parts)]), faces
+
+
+SHAPES = {
+    "sphere": shapes.sphere(3),
+    "torus": shapes.torus(),
+    "hill": shapes.hill(),
+    "two": pair(shapes.sphere(3), shapes.torus()),
+}
+
+
+def complex_corners(grid):
+    return grid.corner_grid[..., 0] + 1j * grid.corner_grid[..., 1]
+
+
+def double_areas(grid):
+    z = complex_corners(grid)
+    return (np.conj(z[:, 1] - z[:, 0]) * (z[:, 2] - z[:, 0])).imag
+
+
+def angle_sums(grid):
+    z = complex_corners(grid)
+    sides = z[:, [2, 0, 1]] - z[:, [1, 2, 0]]
+    angles = np.angle(-sides[:, [1, 2, 0]] * np.conj(sides[:, [2, 0, 1]]))
+    return np.bincount(grid.faces.ravel(), angles.ravel(), len(grid.vertices))
+
+
+def check_laws(grid):
+    """All that an integer grid promises."""
+    mesh = TriangleMesh(grid.vertices, grid.faces)
+    z = complex_corners(grid)
+    starts, ends = z[:, [1, 2, 0]].ravel(), z[:, [2, 0, 1]].ravel()
+    inner = mesh.edge_halfedges[~mesh.is_boundary_edge]
+    shift = grid.shifts @ [1, 1j]
+    for h, t in (inner.T, inner[:, ::-1].T):
+        across = TURNS[grid.turns[h]]
+        # Not near but equal: coordinates are rounded so that sums with whole numbers are exact.
+        assert (across * ends[t] + shift[h] == starts[h]).all()
+        assert (across * starts[t] + shift[h] == ends[h]).all()
+    border = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
+    assert (grid.turns[border] == -1).all()
+    assert not grid.shifts[border].any()
+    assert grid.turns.dtype == grid.shifts.dtype == np.int64
+    at = grid.corner_grid[np.isin(grid.faces, grid.cones)]
+    assert (at == np.rint(at)).all()
+    assert double_areas(grid).min() > 0
+    inside = ~mesh.is_boundary_vertex & np.isin(np.arange(len(mesh.vertices)), mesh.faces)
+    quarters = np.full(len(mesh.vertices), 4)
+    quarters[grid.cones] = grid.quarters
+    assert (grid.quarters != 4).all()
+    assert angle_sums(grid)[inside] == pytest.approx(np.pi / 2 * quarters[inside], abs=1e-6)
+
+
+@pytest.mark.parametrize("quads", [40, 1000])
+@pytest.mark.parametrize("name", SHAPES)
+def test_laws_on_shapes(name, quads):
+    grid = integer_grid(*SHAPES[name], quads=quads)
+    check_laws(grid)
+    assert np.isin(grid.quarters, [3, 5, 6]).all()
+
+
+def test_the_coarsest_grid_of_a_box_is_a_cube():
+    """Eight cones of three quads, and no other vertex: six quads."""
+    grid = integer_grid(*shapes.box(4, (1.0, 1.1, 1.2)), quads=1)
+    check_laws(grid)
+    assert double_areas(grid).sum() / 2 == pytest.approx(6, abs=1e-9)
+    assert grid.quarters.tolist() == [3] * 8
+    assert "6 squares, not 1" in " ".join(grid.notes)
+
+
+def test_a_result_will_do():
+    shape = shapes.sphere(3)
+    one = integer_grid(flatten(*shape, **QUARTER), quads=200)
+    assert (one.corner_grid == integer_grid(*shape, quads=200).corner_grid).all()
+
+
+def check_sides(grid):
+    """Boundary edges lie on grid lines, corners on grid points; a whole number of squares is covered."""
+    mesh = TriangleMesh(grid.vertices, grid.faces)
+    border = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
+    starts = grid.corner_grid[:, [1, 2, 0]].reshape(-1, 2)[border]
+    ends = grid.corner_grid[:, [2, 0, 1]].reshape(-1, 2)[border]
+    assert ((starts == ends) & (starts == np.rint(starts))).any(axis=1).all()
+    at = grid.corner_grid[np.isin(grid.faces, grid.corners)]
+    assert (at == np.rint(at)).all()
+    on = np.flatnonzero(mesh.is_boundary_vertex)
+    quarters = np.full(len(mesh.vertices), 2)
+    quarters[grid.corners] = grid.corner_quarters
+    assert (grid.corner_quarters != 2).all()
+    assert angle_sums(grid)[on] == pytest.approx(np.pi / 2 * quarters[on], abs=1e-6)
+    assert (4 - grid.quarters).sum() + (2 - grid.corner_quarters).sum() == 4 * mesh.euler_characteristic
+    area = double_areas(grid).sum() / 2
+    assert area == pytest.approx(round(area), abs=1e-6)
+
+
+@pytest.mark.parametrize("quads", [20, 100, 1000])
+@pytest.mark.parametrize("shape", [shapes.hill(), shapes.annulus()], ids=["hill", "annulus"])
+def test_straight_sides_lie_on_grid_lines(shape, quads):
+    grid = integer_grid(*shape, quads=quads, boundary="straight")
+    check_laws(grid)
+    check_sides(grid)
+
+
+def askew():
+    """A bumpy sheet with two square holes, neither of which is parallel to it or to the other."""
+    vertices, faces = shapes.hill(30, 24)
+    places = vertices[faces].mean(axis=1)[:, :2] @ [1, 1j] / np.ptp(vertices[:, 0])
+    kept = np.ones(len(faces), dtype=bool)
+    for centre, half, angle in ((0.3 + 0.3j, 0.1, 0.5), (0.7 + 0.4j, 0.09, 0.2)):
+        turned = (places - centre) * np.exp(-1j * angle)
+        kept &= np.maximum(np.abs(turned.real), np.abs(turned.imag)) > half
+    used, faces = np.unique(faces[kept], return_inverse=True)
+    return vertices[used], faces.reshape(-1, 3)
+
+
+@pytest.mark.parametrize("quads", [300, 2000])
+def test_loops_that_are_askew_come_to_lie_on_grid_lines(quads):
+    grid = integer_grid(*askew(), quads=quads, repair=True)
+    check_laws(grid)
+    check_sides(grid)
+    assert TriangleMesh(grid.vertices, grid.faces).euler_characteristic == -1
+
+
+def test_a_flat_rectangle_keeps_its_shape():
+    """Three by two, asked for 24 squares: six by four, each of half a unit."""
+    vertices, faces = shapes.grid(9, 6)
+    grid = integer_grid(vertices * [3, 2, 0], faces, quads=24, boundary="straight")
+    check_laws(grid)
+    check_sides(grid)
+    assert len(grid.corners) == 4
+    assert grid.corner_quarters.tolist() == [1] * 4
+    assert sorted(np.ptp(grid.corner_grid.reshape(-1, 2), axis=0)) == [4, 6]
+    assert grid.qc_mean == pytest.approx(1)
+    assert grid.least_area == pytest.approx(1)
+
+
+def test_what_is_too_coarse_is_told_what_would_do(shared):
+    """A chess piece with 114 cones, in thirty squares."""
+    result = flatten(shared("knight.off"), **{**QUARTER, "correct_handles": True})
+    with pytest.raises(errors.GridError, match=r"no grid of about 30 quads was found: .*would do") as caught:
+        integer_grid(result, quads=30)
+    advised = int(str(caught.value).rsplit("; ", 1)[1].split()[0].replace(",", ""))
+    check_laws(integer_grid(result, quads=advised))
+
+
+def test_numbering_changes_nothing():
+    vertices, faces = shapes.sphere(3)
+    shuffled, turned, new = shapes.renumber(vertices, faces)
+    one, two = (integer_grid(*shape, quads=300) for shape in ((vertices, faces), (shuffled, turned)))
+    assert sorted(new[one.cones]) == sorted(two.cones)
+    assert np.sort(double_areas(one)) == pytest.approx(np.sort(double_areas(two)), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"quads": 10, "size": 1.0}, "give one of them"),
+        ({"quads": 0}, "quads must be a positive number"),
+        ({"size": -1.0}, "size must be a positive number"),
+        ({"stretch": -1.0}, "stretch must be"),
+    ],
+)
+def test_options_that_make_no_sense(options, message):
+    with pytest.raises(errors.OptionError, match=message):
+        integer_grid(*shapes.sphere(2), **options)
+
+
+def test_cones_that_are_no_quarter_turns_are_refused():
+    free = flatten(*shapes.sphere(3), charts="one")
+    with pytest.raises(errors.GridError, match="beside quarter turns"):
+        integer_grid(free)
+    with pytest.raises(errors.OptionError, match="faces and options"):
+        integer_grid(free, charts="one")

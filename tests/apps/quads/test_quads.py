@@ -1,0 +1,168 @@
+"""Quads out of integer-grid maps whose quads are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from grid_maps import (
+    CUBE,
+    L_SHAPE,
+    QUARTER,
+    RING,
+    TRIPOD,
+    TWO_RINGS,
+    broken,
+    flat,
+    on_squares,
+    polycube,
+    quad_areas,
+    torus_map,
+    with_motions,
+)
+from shapes import grid as rectangle
+
+from coneflat.apps.quads.extract import extract_quads
+from coneflat.apps.quads.quality import measure_quads
+from coneflat.errors import GridError
+from coneflat.geometry.nearest import surface_distances
+
+
+def oriented_sides(quads):
+    """Return the directed sides of all quads as sorted pairs."""
+    sides = np.stack([quads.ravel(), np.roll(quads, -1, axis=1).ravel()], axis=1)
+    return sides[np.lexsort(sides.T)]
+
+
+# Corners of polycubes have valence 3 where one cube is, 5 where three are; the tripod's inner one has 6.
+SHAPES = {
+    "cube": (CUBE, 2, {3: 8}),
+    "l": (L_SHAPE, 2, {3: 10, 5: 2}),
+    "tripod": (TRIPOD, 2, {3: 13, 5: 3, 6: 1}),
+    "ring": (RING, 0, {3: 8, 5: 8}),
+    "double torus": (TWO_RINGS, -2, {3: 8, 5: 16}),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize(("cells", "inside"), [(1, 0), (1, 9), (2, 3), (5, 12), (7, 1)])
+def test_polycubes(name, cells, inside):
+    cubes, euler, valences = SHAPES[name]
+    points, squares = polycube(cubes)
+    grid = on_squares(points, squares, cells, inside=inside, along=min(inside, 3), seed=cells)
+    mesh = extract_quads(grid)
+    count = len(squares) * cells**2
+    assert len(mesh.quads) == count
+    assert len(mesh.vertices) == count + euler  # E is 2 F
+    assert mesh.euler_characteristic == mesh.surface_euler == euler
+    which, many = np.unique(mesh.valences[mesh.irregular], return_counts=True)
+    assert dict(zip(which.tolist(), many.tolist(), strict=True)) == valences
+    # On flat squares all quads are squares, at corners that are whole multiples, and they cover all.
+    np.testing.assert_allclose(quad_areas(mesh), 1 / cells**2, rtol=1e-9)
+    np.testing.assert_allclose(mesh.vertices * cells, np.round(mesh.vertices * cells), atol=1e-9)
+    assert len(np.unique(np.round(mesh.vertices * cells), axis=0)) == len(mesh.vertices)
+    # Each side runs once each way; normals point outwards as those of the triangles do.
+    sides = oriented_sides(mesh.quads)
+    assert len(np.unique(sides, axis=0)) == len(sides)
+    corners = mesh.vertices[mesh.quads]
+    volume = (np.cross(corners[:, 0], corners[:, 1]) * corners[:, 2]).sum()
+    volume += (np.cross(corners[:, 0], corners[:, 2]) * corners[:, 3]).sum()
+    assert volume / 6 == pytest.approx(len(cubes))
+    # Cones are vertices of the input.
+    places = grid.vertices[grid.cones]
+    assert set(map(tuple, np.round(mesh.vertices[mesh.irregular], 9))) == set(map(tuple, places))
+
+
+@pytest.mark.parametrize("turned", range(4))
+@pytest.mark.parametrize("moved", [(0, 0), (-17, 4000)])
+def test_rectangle_on_grid_lines(turned, moved):
+    points, faces = rectangle(7, 5)
+    places = points[:, :2] * [9, 4] @ np.linalg.matrix_power(QUARTER, turned).T + moved
+    mesh = extract_quads(flat(places, faces))
+    assert (len(mesh.quads), mesh.left_out) == (36, 0)
+    assert mesh.area_left_out == pytest.approx(0, abs=1e-9)
+    assert mesh.is_boundary_edge.sum() == 26
+    assert mesh.is_boundary_vertex.sum() == 26
+    assert len(mesh.irregular) == 0
+
+
+@pytest.mark.parametrize(("along", "across", "shear"), [(12, 8, 0), (9, 7, 4), (3, 3, 0), (31, 5, 13)])
+def test_torus(along, across, shear):
+    grid = torus_map(along, across, shear)
+    mesh = extract_quads(grid)
+    assert len(mesh.quads) == len(mesh.vertices) == along * across
+    assert (mesh.valences == 4).all()
+    assert mesh.euler_characteristic == 0
+
+
+def test_what_is_no_grid_map_is_refused():
+    grid = on_squares(*polycube(CUBE), 3)
+    shifts = grid.shifts.copy()
+    shifts[4] += 1
+    with pytest.raises(GridError, match=r"2 half-edges with a motion that is not the inverse"):
+        extract_quads(broken(grid, shifts=shifts))
+    corners = grid.corner_grid.copy()
+    corners[5, 1] += 0.25
+    with pytest.raises(GridError, match="grid units apart|upside down"):
+        extract_quads(broken(grid, corner_grid=corners))
+    with pytest.raises(
+        GridError, match=r"8 vertices with other angles than said: .* has 3 quarter turns, not 4"
+    ):
+        extract_quads(broken(grid, cones=grid.cones[:0], quarters=grid.quarters[:0]))
+    with pytest.raises(GridError, match="upside down"):
+        extract_quads(mirrored(grid))
+
+
+def mirrored(grid):
+    """Return the map with its axes exchanged: all triangles are clockwise."""
+    turns = np.where(grid.turns < 0, -1, -grid.turns % 4)
+    return broken(grid, corner_grid=grid.corner_grid[..., ::-1], turns=turns, shifts=grid.shifts[:, ::-1])
+
+
+def test_cones_off_the_grid_are_refused():
+    # Moving everything by half a unit in one chart leaves motions whole only if the cones are off by a half.
+    points, squares = polycube(CUBE)
+    grid = on_squares(points, squares, 3)
+    moved = with_motions(grid.vertices, grid.faces, grid.corner_grid + 0.5)
+    with pytest.raises(GridError, match="8 vertices around which the grid does not close"):
+        extract_quads(moved)
+
+
+def test_quads_that_touch_in_a_point_have_a_vertex_each():
+    outline = [(0, 0), (1, 0), (1.2, 0.8), (2, 1), (2, 2), (1, 2), (0.8, 1.2), (0, 1), (1, 1)]
+    faces = np.array([[8, k, (k + 1) % 8] for k in range(8)])
+    mesh = extract_quads(flat(outline, faces))
+    assert (len(mesh.quads), len(mesh.vertices), mesh.left_out) == (2, 8, 2)
+    assert (np.round(mesh.vertices, 9) == [1, 1, 0]).all(axis=1).sum() == 2
+    assert mesh.area_left_out == pytest.approx(0.4)
+
+
+def test_measures_by_hand():
+    # A sheet of 2 x 1 rhombi with angles of 60 degrees; the surface is the same plane.
+    points, faces = rectangle(4, 4)
+    grid = flat(points[:, :2] * 4, faces)
+    grid.vertices = (points[:, :2] * 4) @ np.array([[1, 0, 0], [0.5, 0.75**0.5, 0]])
+    mesh = extract_quads(grid)
+    measures = measure_quads(mesh)
+    assert measures.quads == 16
+    assert measures.boundary_edges == 16
+    assert measures.angle_mean == pytest.approx(30)
+    assert measures.angle_max == pytest.approx(30)
+    assert measures.edge_mean == pytest.approx(1)
+    assert measures.edge_cv == pytest.approx(0, abs=1e-9)
+    assert measures.jacobian_min == measures.jacobian_mean == pytest.approx(0.75**0.5)
+    assert measures.hausdorff == pytest.approx(0, abs=1e-12)
+
+
+def test_distances_are_the_least_of_all_triangles():
+    rng = np.random.default_rng(0)
+    vertices, faces = rng.normal(size=(40, 3)), rng.integers(0, 40, (23, 3))
+    faces = faces[(np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)]
+    queries = rng.normal(size=(50, 3)) * 2
+    u, v = (z.ravel() for z in np.meshgrid(np.linspace(0, 1, 201), np.linspace(0, 1, 201), indexing="ij"))
+    weights = np.stack([1 - u - v, u, v], axis=1)[u + v <= 1 + 1e-12]
+    samples = (weights @ vertices[faces]).reshape(-1, 3)
+    dense = np.array([np.linalg.norm(samples - query, axis=1).min() for query in queries])
+    found = surface_distances(vertices, faces, queries)
+    assert (found <= dense + 1e-12).all()
+    # Samples are 0.005 sides apart, and a distance is off by no more than half of that.
+    assert (found >= dense - 0.03).all()

@@ -1,0 +1,171 @@
+"""From a mesh to quads: `coneflat.quads`, its command, and what quads are used for."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import shapes
+from click.testing import CliRunner
+from grid_maps import RING, on_squares, polycube, quad_areas
+from shapes import sphere, write_obj
+
+import coneflat
+from coneflat import IntegerGrid, QuadMesh, measure_quads
+from coneflat.apps.cli.quads import quads as command
+from coneflat.errors import ConeflatError, OptionError
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return sphere(3, bumps=0.2)
+
+
+@pytest.fixture(scope="module")
+def quads_of_ball(ball):
+    return coneflat.quads(*ball, quads=600)
+
+
+def test_a_ball(ball, quads_of_ball):
+    mesh = quads_of_ball
+    assert mesh.euler_characteristic == 2
+    assert 400 < len(mesh.quads) < 900
+    # Gauss-Bonnet of a quad mesh: what valences lack of 4 sums to 4 chi.
+    assert (4 - mesh.valences).sum() == 8
+    assert len(mesh.irregular) < 30
+    assert (mesh.valences >= 3).all()
+    # Quads cover the surface, and are oriented as it is.
+    points = mesh.vertices[mesh.quads]
+    volume = (np.cross(points[:, 0], points[:, 1]) * points[:, 2]).sum() / 6
+    volume += (np.cross(points[:, 0], points[:, 2]) * points[:, 3]).sum() / 6
+    corners = ball[0][ball[1]]
+    assert volume == pytest.approx(
+        (np.cross(corners[:, 0], corners[:, 1]) * corners[:, 2]).sum() / 6, rel=0.03
+    )
+    measures = measure_quads(mesh)
+    assert measures.jacobian_min > 0
+    assert measures.angle_mean < 10
+
+
+def test_a_grid_may_be_given():
+    grid = on_squares(*polycube(RING), 4)
+    unknown = dict.fromkeys(
+        ("size", "move_rms", "move_max", "energy_before", "energy", "qc_before", "qc_mean"), 0.0
+    )
+    own = IntegerGrid(**vars(grid), **unknown, least_area=1.0, notes=("As given.",))
+    mesh = coneflat.quads(own, smooth=0)
+    assert len(mesh.quads) == 32 * 16
+    assert mesh.notes == ("As given.",)
+    with pytest.raises(OptionError, match="a grid has its"):
+        coneflat.quads(own, quads=100)
+
+
+def test_command_refuses_before_the_work(tmp_path, ball):
+    path = write_obj(tmp_path / "ball.obj", *ball)
+    done = run(path, "--faces", 600, "--size", 0.1)
+    assert done.exit_code == 2
+    assert "give one" in done.output
+    for words, message in (
+        (("-o", tmp_path / "quads.stl"), "quads are written as .obj, .ply, .glb, .npz"),
+        (("-o", path), "the input and the output"),
+        (("--grid", tmp_path / "grid.ply"), "integer grids are written as .obj, .npz"),
+        (("--grid", path), "the input and the grid"),
+        (("--smooth", -1), "smooth must be a whole number from 0"),
+        (("--stretch", 2), "stretch must be a number from 0 to 1"),
+    ):
+        with pytest.raises(ConeflatError, match=message):
+            run(path, *words)
+
+
+def run(*words):
+    return CliRunner().invoke(command, [str(word) for word in words], catch_exceptions=False)
+
+
+def test_the_grid_is_written_and_made_into_the_same_quads(tmp_path, ball, quads_of_ball):
+    path = write_obj(tmp_path / "ball.obj", *ball)
+    npz, obj = tmp_path / "grid.npz", tmp_path / "grid.obj"
+    both = tmp_path / "both.npz"
+    done = run(path, "--quads", 600, "--grid", npz, "--report", tmp_path / "grid.json")
+    assert done.exit_code == 0, done.output
+    # Without -o there is a grid alone.
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["ball.obj", "grid.json", "grid.npz"]
+    told = json.loads((tmp_path / "grid.json").read_text())
+    assert "quads" not in told
+    assert told["grid"]["size"] == IntegerGrid.load(npz).size
+    assert list(told["seconds"]) == ["read", "flatten", "grid", "write"]
+    assert run(npz, "-o", both, "--grid", obj).exit_code == 0
+    np.testing.assert_array_equal(IntegerGrid.load(obj).turns, IntegerGrid.load(npz).turns)
+    again = QuadMesh.load(both)
+    np.testing.assert_array_equal(again.quads, quads_of_ball.quads)
+    np.testing.assert_array_equal(again.vertices, quads_of_ball.vertices)
+    refused = run(npz, "--quads", 5)
+    assert refused.exit_code == 2
+    assert "is a grid: leave out --quads" in refused.output
+
+
+def test_options_of_the_search(tmp_path, ball):
+    path = write_obj(tmp_path / "ball.obj", *ball)
+    out = tmp_path / "q.npz"
+    few = run(path, "-o", out, "--quads", 600, "--cone-count", 8, "--required-cones", "7,300", "--smooth", 0)
+    assert few.exit_code == 0, few.output
+    mesh = QuadMesh.load(out)
+    # Eight cones of three quads each, two of them where they are asked for.
+    assert mesh.valences[mesh.irregular].tolist() == [3] * 8
+    places = mesh.vertices[mesh.irregular]
+    for vertex in (7, 300):
+        assert np.linalg.norm(places - ball[0][vertex], axis=1).min() < 1e-12
+    sharp = run(path, "-o", out, "--quads", 600, "--cone-count", 4, "--min-cone-angle", "pi")
+    assert sharp.exit_code == 0, sharp.output
+    mesh = QuadMesh.load(out)
+    assert mesh.valences[mesh.irregular].tolist() == [2] * 4
+    refused = run(path, "--cone-count", 8, "--max-cones", 9)
+    assert refused.exit_code == 2
+    assert "leave out --max-cones" in refused.output
+
+
+def test_cones_that_are_given(tmp_path):
+    vertices, faces = sphere(3)
+    path = write_obj(tmp_path / "ball.obj", vertices, faces)
+    corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / np.sqrt(3)
+    near = [int(np.linalg.norm(vertices - corner, axis=1).argmin()) for corner in corners]
+    words = ",".join(f"{vertex}:pi/2" for vertex in near)
+    done = run(path, "-o", tmp_path / "q.npz", "--quads", 600, "--cones", words, "--smooth", 0)
+    assert done.exit_code == 0, done.output
+    mesh = QuadMesh.load(tmp_path / "q.npz")
+    assert mesh.valences[mesh.irregular].tolist() == [3] * 8
+    # They lie where they are asked for, to rounding: extraction has them at corners of triangles.
+    apart = np.linalg.norm(mesh.vertices[mesh.irregular][:, None] - vertices[near], axis=2)
+    assert (apart.min(axis=0) < 1e-12).all()
+    refused = run(path, "--cones", words, "--max-cones", 9)
+    assert "with cones given there is nothing to search: leave out --max-cones" in refused.output
+    for curvatures, what in ((None, "not given"), (1.0, "is 1")):
+        cones = near if curvatures is None else dict.fromkeys(near, curvatures)
+        with pytest.raises(
+            OptionError, match=f"multiples of pi/2; that of vertex {near[0]} is.*{what.split()[-1]}"
+        ):
+            coneflat.quads(vertices, faces, cones=cones)
+
+
+def test_quads_are_more_alike_where_weights_are():
+    vertices, faces = shapes.sphere(4, bumps=0.5)
+    matters = vertices[:, 2] > np.quantile(vertices[:, 2], 0.7)
+
+    def spread(weights):
+        quads = coneflat.quads(vertices, faces, quads=2000, distortion=0.3, weights=weights)
+        centres = quads.vertices[quads.quads].mean(axis=1)
+        sizes = np.log(np.abs(quad_areas(quads))) / 2
+        there = centres[:, 2] > np.quantile(vertices[:, 2], 0.7)
+        return sizes[there].std()
+
+    assert spread(np.where(matters, 100.0, 1.0)) < 0.9 * spread(None)
+
+
+def test_quads_are_flattened_again(tmp_path):
+    path = coneflat.quads(*shapes.sphere(3), quads=800).save(tmp_path / "quads.obj")
+    result = coneflat.flatten(path)
+    assert result.distortion.flipped == 0
+    assert result.distortion.qc_mean < 1.1
+    again = coneflat.read_mesh(result.save(tmp_path / "flat.obj"))
+    assert (np.diff(again.offsets) == 4).all()
+    assert len(again.offsets) == len(coneflat.read_mesh(path).offsets)

@@ -1,0 +1,103 @@
+"""Files of quads: what they hold, and what is read back from them."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from grid_maps import L_SHAPE, on_squares, polycube
+
+from coneflat import QuadMesh, read_mesh
+from coneflat.apps.quads.extract import extract_quads
+from coneflat.errors import MeshFileError
+from coneflat.io.gltf.data import GltfData
+
+
+@pytest.fixture(scope="module")
+def cube():
+    """Quads of an L of cubes, 3 to a side: 14 squares, ten vertices of valence 3 and two of 5."""
+    return extract_quads(on_squares(*polycube(L_SHAPE), 3, inside=7, along=2, seed=3))
+
+
+class TestGlb:
+    @pytest.fixture
+    def saved(self, cube, tmp_path):
+        return cube.save(tmp_path / "quads.glb")
+
+    def test_triangles_are_halves_of_the_quads(self, cube, saved):
+        mesh = read_mesh(saved)
+        np.testing.assert_array_equal(mesh.vertices, cube.vertices.astype(np.float32))
+        triangles = mesh.corners.reshape(-1, 2, 3)
+        assert len(triangles) == len(cube.quads)
+        # Both halves together have the quad's corners, and each side runs as it does in the quad.
+        for quad, pair in zip(cube.quads, triangles, strict=True):
+            sides = {(t[i], t[(i + 1) % 3]) for t in pair.tolist() for i in range(3)}
+            around = set(zip(quad.tolist(), np.roll(quad, -1).tolist(), strict=True))
+            assert around <= sides
+            (one, two), again = sides - around
+            assert again == (two, one)
+
+    def test_lines_are_the_edges(self, cube, saved):
+        data = GltfData(saved, saved.read_bytes())
+        faces, lines = data.tree["meshes"][0]["primitives"]
+        assert (faces.get("mode", 4), lines["mode"]) == (4, 1)
+        ends = np.sort(data.indices(lines["indices"]).reshape(-1, 2), axis=1)
+        assert len(np.unique(ends, axis=0)) == len(ends) == 2 * len(cube.quads)
+        np.testing.assert_array_equal(ends, cube.edges)
+        # They lie above the quads, by a hundredth of an edge of 1/3.
+        rows = data.raw(lines["attributes"]["POSITION"]).view(np.float32).reshape(-1, 3)
+        off = np.linalg.norm(rows - cube.vertices, axis=1)
+        np.testing.assert_allclose(off, 0.01 / 3, rtol=1e-3)
+        outward = ((rows - cube.vertices) * (cube.vertices - cube.vertices.mean(axis=0))).sum()
+        assert outward > 0
+
+    def test_the_shorter_diagonal(self):
+        quad = np.array([[0.0, 0, 0], [3, 0, 0], [2, 1, 0], [0, 1, 0]])
+        mesh = QuadMesh(quad, np.array([[0, 1, 2, 3]]), *[None] * 5)
+        # From (0, 0) to (2, 1), not from (3, 0) to (0, 1).
+        assert sorted(map(sorted, mesh.triangles.tolist())) == [[0, 1, 2], [0, 2, 3]]
+        mesh = QuadMesh(quad, np.array([[1, 2, 3, 0]]), *[None] * 5)
+        assert sorted(map(sorted, mesh.triangles.tolist())) == [[0, 1, 2], [0, 2, 3]]
+
+
+class TestNpz:
+    @pytest.fixture
+    def saved(self, cube, tmp_path):
+        return cube.save(tmp_path / "quads.npz")
+
+    def test_all_comes_back(self, cube, saved):
+        again = QuadMesh.load(saved)
+        for field in fields(cube):
+            one, other = getattr(cube, field.name), getattr(again, field.name)
+            if field.name == "seconds":
+                continue
+            if field.name == "surface":
+                np.testing.assert_array_equal(one.vertices, other.vertices)
+                np.testing.assert_array_equal(one.faces, other.faces)
+            else:
+                np.testing.assert_array_equal(one, other)
+
+    @pytest.mark.parametrize(
+        ("name", "value", "message"),
+        [
+            ("quads", None, "holds no mesh of quads: 'quads' is missing"),
+            ("quads", np.zeros((3, 3)), "'quads' has the shape"),
+            ("quads", np.full((3, 4), 10**6), "'quads' has indices beyond"),
+            ("faces", np.zeros(1), "'faces' has the shape"),
+            ("surface_vertices", np.full((100, 3), np.nan), "not finite"),
+            ("report", np.array("{}"), "not a readable NPZ file"),
+            ("report", np.array("[]"), "not a readable NPZ file"),
+        ],
+    )
+    def test_what_is_none(self, saved, tmp_path, name, value, message):
+        with np.load(saved) as archive:
+            arrays = dict(archive)
+        if value is None:
+            del arrays[name]
+        else:
+            arrays[name] = value
+        np.savez(tmp_path / "bad.npz", **arrays)
+        with pytest.raises(MeshFileError, match=message) as caught:
+            QuadMesh.load(tmp_path / "bad.npz")
+        assert "\n" not in str(caught.value)

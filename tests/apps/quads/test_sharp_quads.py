@@ -1,0 +1,149 @@
+"""Sharp edges on grid lines: exactly, all along, and quads' edges along them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+from grid_maps import L_SHAPE, polycube
+from scipy.sparse import csr_matrix
+from test_integer_grid import check_laws
+
+from coneflat import errors, integer_grid, quads
+from coneflat.apps.quads.extract import extract_quads
+from coneflat.apps.quads.features import (
+    edge_indices,
+    sharp_edges,
+)
+from coneflat.apps.quads.quality import measure_quads
+from coneflat.layout.relax.elimination import orthogonal_solutions, sparse_solutions
+from coneflat.mesh.connectivity import TriangleMesh
+
+SHARP = np.deg2rad(40)
+
+
+def prism(corners: int):
+    """A prism over a regular polygon, with caps of one triangle per side."""
+    return shapes.cylinder(corners, 3, 1.5, caps=True)
+
+
+def l_block(size: int = 2):
+    """Three unit cubes in the form of an L, their square faces split alike."""
+    vertices, squares = polycube(L_SHAPE)
+    a, b, c, d = squares.T
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    for _ in range(size):
+        vertices, faces = shapes.subdivide(vertices, faces)
+    return vertices, faces
+
+
+SHAPES = {
+    "cube": shapes.box(1, (1.0, 1.0, 1.0)),
+    "box": shapes.box(3),
+    "L": l_block(),
+    "cylinder": shapes.cylinder(caps=True),
+    "hexagon": prism(6),
+    "two": shapes.join(shapes.box(2), (shapes.cylinder(caps=True)[0] + 5, shapes.cylinder(caps=True)[1])),
+}
+
+
+def check_features(grid):
+    """Both ends of each sharp edge have the same whole coordinate, to the bit, in every triangle beside it."""
+    mesh = TriangleMesh(grid.vertices, grid.faces)
+    edges = edge_indices(mesh, grid.features)
+    assert (mesh.edges[edges] == np.sort(grid.features, axis=1)).all()
+    sides = mesh.edge_halfedges[edges]
+    sides = sides[sides >= 0]
+    start = grid.corner_grid[:, [1, 2, 0]].reshape(-1, 2)[sides]
+    end = grid.corner_grid[:, [2, 0, 1]].reshape(-1, 2)[sides]
+    assert ((start == end) & (start == np.rint(start))).any(axis=1).all()
+    nodes = vertices_that_turn(mesh, edges)
+    at = grid.corner_grid[np.isin(grid.faces, nodes)]
+    assert (at == np.rint(at)).all()
+
+
+def vertices_that_turn(mesh, edges):
+    """Vertices at which other than two sharp edges meet."""
+    degree = np.bincount(mesh.edges[edges].ravel(), minlength=len(mesh.vertices))
+    return np.flatnonzero((degree != 2) & (degree > 0))
+
+
+@pytest.mark.parametrize("count", [300, 2000])
+@pytest.mark.parametrize("name", SHAPES)
+def test_laws(name, count):
+    grid = integer_grid(*SHAPES[name], quads=count, sharp_angle=SHARP)
+    assert grid.notes == ()
+    check_laws(grid)
+    check_features(grid)
+    mesh = TriangleMesh(grid.vertices, grid.faces)
+    sharp = sharp_edges(mesh, SHARP)
+    assert set(sharp.tolist()) == set(edge_indices(mesh, grid.features).tolist())
+    found = extract_quads(grid)
+    assert found.left_out == 0
+    assert found.euler_characteristic == found.surface_euler
+    assert abs(found.area_left_out) < 1e-3
+
+
+@pytest.mark.parametrize("count", [100, 1000])
+def test_cube_is_of_squares(count):
+    found = quads(*SHAPES["cube"], quads=count, sharp_angle=SHARP)
+    assert found.valences[found.irregular].tolist() == [3] * 8
+    measures = measure_quads(found)
+    assert measures.angle_max < 1e-6
+    assert measures.edge_cv < 1e-6
+    assert measures.hausdorff < 1e-9
+    corners = found.vertices[found.irregular]
+    assert sorted(map(tuple, np.round(corners, 9).tolist())) == [
+        (x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)
+    ]
+
+
+def test_irregular_vertices_by_patch():
+    """A disk without corners has quarter turns for four cones of three quads; six corners leave -2 (Gauss-Bonnet)."""
+    round_one = quads(*SHAPES["cylinder"], quads=1000, sharp_angle=SHARP)
+    assert (4 - round_one.valences[round_one.irregular]).sum() == 8
+    height = round_one.vertices[:, 2]
+    for level in (height.min(), height.max()):
+        on_cap = round_one.irregular[np.abs(height[round_one.irregular] - level) < 1e-9]
+        assert (4 - round_one.valences[on_cap]).sum() == 4
+    six = quads(*SHAPES["hexagon"], quads=1000, sharp_angle=SHARP)
+    place = six.vertices[six.irregular]
+    cap = np.abs(place[:, 2] - place[:, 2].min()) < 1e-9
+    at_corner = np.abs(np.hypot(place[:, 0], place[:, 1]) - 1) < 1e-6
+    assert (4 - six.valences[six.irregular[cap & at_corner]]).sum() == 6
+    assert (4 - six.valences[six.irregular[cap & ~at_corner]]).sum() == -2
+
+
+def test_surface_without_sharp_edges():
+    grid = integer_grid(*shapes.sphere(3), quads=500, sharp_angle=SHARP)
+    assert len(grid.features) == 0
+    assert any("sharp edge" in note for note in grid.notes)
+    check_laws(grid)
+
+
+@pytest.mark.parametrize("angle", [0.0, -1.0, 4.0, np.nan])
+def test_impossible_angles(angle):
+    with pytest.raises(errors.OptionError, match=r"angle|number"):
+        integer_grid(*SHAPES["cube"], quads=100, sharp_angle=angle)
+
+
+@pytest.mark.parametrize("solutions", [sparse_solutions, orthogonal_solutions])
+@pytest.mark.parametrize("seed", range(5))
+def test_elimination_spans_all_solutions(seed, solutions):
+    rng = np.random.default_rng(seed)
+    rows = rng.integers(-1, 2, (12, 30)) * (rng.random((12, 30)) < 0.2)
+    rows = np.concatenate([rows, rows[:3] - rows[3:6]]).astype(float)
+    right = rows @ rng.normal(size=30)
+    found, left = solutions(csr_matrix(rows), right)
+    basis = found.toarray()
+    assert np.abs(left).max(initial=0.0) < 1e-9
+    assert rows @ basis[:, -1] == pytest.approx(right, abs=1e-9)
+    assert np.abs(rows @ basis[:, :-1]).max() < 1e-9
+    assert np.linalg.matrix_rank(basis[:, :-1]) == 30 - np.linalg.matrix_rank(rows) == basis.shape[1] - 1
+    right[-1] += 1
+    missed = solutions(csr_matrix(rows), right)[1]
+    if solutions is sparse_solutions:
+        assert np.abs(missed).max() == pytest.approx(1)
+    else:  # turned: as long as what least squares leave
+        nearest = rows @ np.linalg.lstsq(rows, right)[0]
+        assert np.linalg.norm(missed) == pytest.approx(np.linalg.norm(right - nearest))

@@ -1,0 +1,141 @@
+"""The studio's first views of layouts, and what the process that flattens keeps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+import coneflat
+from coneflat.apps.studio.child import TO_COME, Bench
+from coneflat.apps.studio.choices import Choices
+from coneflat.apps.studio.known import Known, with_prints
+from coneflat.apps.studio.session import Session
+from coneflat.apps.view.page.payload import pack
+
+
+class Mute:
+    """A process that is given jobs, and says nothing by itself."""
+
+    is_alive, process_id = True, None
+
+    def __init__(self):
+        self.jobs = []
+
+    def send(self, job):
+        self.jobs.append(job)
+
+    def end(self):
+        pass
+
+
+class TestFirstViews:
+    """The first view of a layout, which comes before it."""
+
+    @pytest.fixture
+    def session(self, tmp_path):
+        session = Session(tmp_path)
+        session._worker = Mute()
+        session.open(shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(1)))
+        return session
+
+    @staticmethod
+    def answer(session, kind, job, name):
+        told = {"head": {"title": name, "arrays": []}, "found": [job], "seconds": {"metric": 1.0}}
+        session._hear({"job": job, kind: told}, name.encode())
+
+    def shown(self, session):
+        return (
+            session.picture()[0]["title"],
+            session.state()["early"],
+            bool(session.state()["busy"]),
+            session.state()["layout"],
+        )
+
+    def test_they_are_shown_and_replaced(self, session):
+        job = session._worker.jobs[-1]["job"]
+        self.answer(session, "early", job, "first")
+        assert self.shown(session) == ("first", True, True, 1)
+        assert session.state()["found"] == [job]
+        self.answer(session, "done", job, "last")
+        assert self.shown(session) == ("last", False, False, 2)
+
+    def test_they_replace_nothing_newer(self, session):
+        old = session._worker.jobs[-1]["job"]
+        session.act({"do": "set", "name": "stretch", "value": 0.5})
+        new = session._worker.jobs[-1]["job"]
+        self.answer(session, "early", old, "old")
+        assert session.picture() is None
+        self.answer(session, "early", new, "new")
+        self.answer(session, "early", old, "old")
+        self.answer(session, "done", old, "old")
+        assert self.shown(session) == ("new", True, True, 1)
+        self.answer(session, "done", new, "newest")
+        self.answer(session, "early", old, "old")
+        assert self.shown(session) == ("newest", False, False, 2)
+
+
+def test_a_first_view_comes_before_the_layout_and_has_no_numbers(tmp_path):
+    path = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3))
+    events = []
+    bench = Bench(early_from=1000)
+    job = {"mesh": str(path), "sha256": "", "choices": Choices().as_plain()}
+    for choices in (Choices(), Choices().with_option("stretch", 0.5)):
+        job["choices"] = choices.as_plain()
+        events.clear()
+        head, _ = bench.flatten(
+            job,
+            lambda stage, fraction: events.append((stage, fraction)),
+            lambda head, body: events.append(("shown", head, body)),
+        )
+        names = [event[0] for event in events]
+        assert names.count("shown") == 1
+        assert names.index("shown") < names.index("atlas")
+        fractions = [event[1] for event in events if event[0] != "shown"]
+        assert fractions == sorted(fractions)
+        _, first, early_body = events[names.index("shown")]
+        assert {value for _, value, _ in first["head"]["rows"]} == {TO_COME}
+        assert TO_COME not in {value for _, value, _ in head["head"]["rows"]}
+        assert first["found"] == head["found"]
+        assert len(early_body)
+        result = coneflat.flatten(path, **choices.keywords())
+        np.testing.assert_array_equal(bench.result.uv, result.uv)
+    small = Bench(early_from=2000)
+    events.clear()
+    small.flatten(job, lambda *_: None, lambda *given: events.append(given))
+    assert not events
+
+
+class TestKnownArrays:
+    """Arrays that the page has already."""
+
+    @staticmethod
+    def picture(**arrays):
+        listed, block = pack({name: np.array(values) for name, values in arrays.items()})
+        return with_prints({"arrays": listed}, block), block
+
+    @staticmethod
+    def arrays_of(picture, others=None):
+        """What a page makes of a picture, with those of another one."""
+        head, block = picture
+        found = {}
+        for each in head["arrays"]:
+            kind = np.dtype(each["type"])
+            begin = each["offset"]
+            found[each["name"]] = (
+                others[each["name"]]
+                if begin is None
+                else np.frombuffer(block, kind, each["count"], begin).tolist()
+            )
+        return found
+
+    def test_only_those_that_changed_are_told(self):
+        known = Known()
+        first = known.numbered(self.picture(places=[1.0, 2.0], tints=np.uint8([1, 2, 3]), uv=[0.5]))
+        second = known.numbered(self.picture(places=[1.0, 2.0], tints=np.uint8([1, 2, 4]), uv=[0.5]))
+        whole = known.without(0, second)
+        less = known.without(first[0]["number"], second)
+        assert [each["offset"] is None for each in less[0]["arrays"]] == [True, False, True]
+        assert len(less[1]) < len(whole[1])
+        assert self.arrays_of(less, self.arrays_of(first)) == self.arrays_of(whole)
+        assert self.arrays_of(whole) == {"places": [1.0, 2.0], "tints": [1, 2, 4], "uv": [0.5]}

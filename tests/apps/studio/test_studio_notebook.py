@@ -1,0 +1,125 @@
+"""The studio from Python: its page in a frame of another page, as notebooks have it, its choices and its result."""
+
+from __future__ import annotations
+
+import http.client
+import re
+import urllib.error
+import urllib.request
+
+import numpy as np
+import pytest
+import shapes
+from browsing import PATIENCE
+
+import coneflat
+from coneflat.errors import ArrayShapeError, MeshFileError, OptionError, StudioError
+
+pytest.importorskip("uvicorn", reason="the extra studio is not installed")
+pytest.importorskip("starlette", reason="the extra studio is not installed")
+
+
+@pytest.fixture
+def page():
+    with coneflat.studio(*shapes.sphere(3)) as opened:
+        yield opened
+
+
+def test_arrays_are_flattened_as_they_are(page):
+    whole = coneflat.flatten(*shapes.sphere(3), repair=False)
+    np.testing.assert_array_equal(page.result.vertices, whole.vertices)
+    np.testing.assert_array_equal(page.result.uv, whole.uv)
+    assert page.project.name == "mesh_studio.json"
+    assert page.project.exists()
+
+
+def test_choices_are_set_and_read(page):
+    assert page.choices["options"] == {}
+    page.choices = {"options": {"cone_count": 9}, "paint": {"no_cone": "0-80"}}
+    result = page.result
+    assert len(result.cones) == 9
+    assert (result.cones > 80).all()
+    assert page.choices["paint"] == {"no_cone": "0-80"}
+    again = coneflat.flatten(*shapes.sphere(3), cone_count=9, forbidden_cones=range(81))
+    np.testing.assert_array_equal(result.uv, again.uv)
+    page.choices = {**page.choices, "options": {"stretch": 0.5}}
+    assert page.choices["options"] == {"stretch": 0.5}
+    for bad, message in (
+        ({"options": {"stretch": 7}}, "from 0 to 1"),
+        ({"cuts": 5}, "these are no choices"),
+        ({"paint": {"glue": "1"}}, "nothing is painted as 'glue'"),
+    ):
+        with pytest.raises((StudioError, OptionError), match=message):
+            page.choices = bad
+    assert page.choices["options"] == {"stretch": 0.5}
+    page.choices = {"cuts": [[0, 641]]}
+    with pytest.raises(StudioError, match="no edge connects"):
+        assert page.result
+
+
+def test_files_and_projects(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(2))
+    with coneflat.studio("ball.obj") as first:
+        first.choices = {"options": {"charts": "one"}}
+        uv = first.result.uv
+        assert first.project == tmp_path / "ball_studio.json"
+    with coneflat.studio(tmp_path / "ball_studio.json") as second:
+        np.testing.assert_array_equal(second.result.uv, uv)
+    with coneflat.studio(*shapes.sphere(2), folder=tmp_path) as third:
+        assert third.project == tmp_path / "mesh_studio.json"
+    assert third.project.exists()
+    with pytest.raises(MeshFileError, match="cannot read"):
+        coneflat.studio("nowhere.obj")
+    with pytest.raises(ArrayShapeError, match="must have the shape"):
+        coneflat.studio(np.zeros((3, 2)), np.array([[0, 1, 2]]))
+    with pytest.raises(ArrayShapeError, match="whole numbers"):
+        coneflat.studio(np.zeros((3, 3)), np.zeros((1, 3)))
+
+
+def test_a_frame_of_a_notebook_shows_it_and_of_no_other_page(browser, page):
+    assert page.result is not None
+    context = browser.new_context(viewport={"width": 1200, "height": 760}, reduced_motion="reduce")
+    try:
+        for place in ("http://localhost:8888/", "http://elsewhere.example/"):
+            # A page that the browser plays.
+            outer = context.new_page()
+            outer.route(place, lambda route: route.fulfill(body=page._repr_html_(), content_type="text/html"))
+            outer.goto(place)
+            if "elsewhere" in place:
+                assert outer.frames[-1].url.startswith("chrome-error:")
+                continue
+            frame = outer.frame_locator("iframe")
+            frame.locator("html[data-settled='true']").wait_for(state="attached", timeout=PATIENCE)
+            assert "1,280 triangles" in frame.locator("#title").inner_text()
+            # What is done there is chosen here, and the other way round.
+            frame.locator("#charts").select_option("one")
+            frame.locator("#undo:not([disabled])").wait_for(timeout=PATIENCE)
+            assert page.choices["options"] == {"charts": "one"}
+            page.choices = {"options": {"cone_count": 7}}
+            frame.locator("#cones-by >> option[value=cone_count]:checked").wait_for(
+                state="attached", timeout=PATIENCE
+            )
+    finally:
+        context.close()
+
+
+def test_through_a_proxy_the_token_alone_opens_it():
+    with coneflat.studio(*shapes.sphere(1), through="/proxy/{port}/") as opened:
+        port, query = re.fullmatch(r"/proxy/(\d+)/(\?token=.+)", opened.address).groups()
+        for more, status in ((query, 200), ("", 403), ("?token=wrong", 403)):
+            asked = http.client.HTTPConnection("127.0.0.1", int(port))
+            asked.request("GET", f"/{more}", headers={"Host": "hub.example"})
+            assert asked.getresponse().status == status
+            asked.close()
+    for bad in ("", "/proxy/", "https://hub/user/me/proxy/8000/"):
+        with pytest.raises(OptionError, match="an address with the port in it"):
+            coneflat.studio(*shapes.sphere(1), through=bad)
+
+
+def test_the_command_s_page_is_in_no_frame(page):
+    with urllib.request.urlopen(page.address) as answer:
+        assert "frame-ancestors http://localhost:*" in answer.headers["content-security-policy"]
+        assert answer.headers["x-frame-options"] is None
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        urllib.request.urlopen(page.address.split("?")[0])

@@ -1,0 +1,169 @@
+"""Who may talk to the studio's server, and what it takes."""
+
+from __future__ import annotations
+
+import json
+import struct
+
+import pytest
+import shapes
+
+pytest.importorskip("starlette", reason="the extra studio is not installed")
+pytest.importorskip("httpx2")
+from starlette.testclient import TestClient
+
+from coneflat.apps.studio.server import studio_app
+from coneflat.apps.studio.session import Session
+
+TOKEN, PORT = "a-token-of-some-length", 8123
+BASE = f"http://127.0.0.1:{PORT}"
+ASKED = (
+    ("GET", "/"),
+    ("GET", "/state"),
+    ("GET", "/layout"),
+    ("POST", "/act"),
+    ("POST", "/export/obj"),
+    ("POST", "/mesh"),
+)
+MOST = 200_000
+
+
+@pytest.fixture
+def session(tmp_path):
+    opened = Session(tmp_path)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def stranger(session):
+    return TestClient(studio_app(session, TOKEN, PORT, MOST), base_url=BASE)
+
+
+@pytest.fixture
+def page(stranger):
+    stranger.headers["x-coneflat-token"] = TOKEN
+    return stranger
+
+
+@pytest.fixture
+def ball(tmp_path_factory):
+    path = tmp_path_factory.mktemp("elsewhere") / "ball.obj"
+    shapes.write_obj(path, *shapes.sphere(2))
+    return path
+
+
+@pytest.mark.parametrize(("method", "path"), ASKED)
+class TestStrangers:
+    def test_without_the_token(self, stranger, method, path):
+        for headers in (
+            {},
+            {"x-coneflat-token": "wrong"},
+            {"x-coneflat-token": TOKEN + "x"},
+            {"cookie": TOKEN},
+        ):
+            answer = stranger.request(method, path, headers=headers)
+            assert answer.status_code == 403
+            assert "token" in answer.text
+
+    def test_the_token_in_the_address_opens_the_page_alone(self, stranger, method, path):
+        answer = stranger.request(method, f"{path}?token={TOKEN}")
+        assert answer.status_code == (200 if path == "/" else 403)
+
+    def test_another_name_of_this_machine(self, page, method, path):
+        for host in (
+            "evil.example",
+            f"evil.example:{PORT}",
+            "127.0.0.1:1",
+            f"127.0.0.1.evil.example:{PORT}",
+            "",
+        ):
+            answer = page.request(method, path, headers={"host": host})
+            assert answer.status_code == 403, host
+
+    def test_another_page(self, page, method, path):
+        for origin in ("http://evil.example", "null", "http://127.0.0.1:1", f"https://127.0.0.1:{PORT}"):
+            answer = page.request(method, path, headers={"origin": origin})
+            assert answer.status_code == 403, origin
+
+
+class TestPage:
+    def test_it_is_the_viewers_with_more(self, stranger):
+        answer = stranger.get(f"/?token={TOKEN}")
+        assert "class Renderer" in answer.text
+        assert "class Studio" in answer.text
+        assert "{{" not in answer.text.replace("${{", "")
+        assert TOKEN not in answer.text
+        assert answer.headers["referrer-policy"] == "no-referrer"
+        assert answer.headers["x-frame-options"] == "DENY"
+        assert "connect-src 'self'" in answer.text
+
+    def test_its_own_origin_may_ask(self, page):
+        for name in ("127.0.0.1", "localhost"):
+            headers = {"origin": f"http://{name}:{PORT}", "host": f"{name}:{PORT}"}
+            assert page.get("/state", headers=headers).status_code == 200
+
+    def test_a_mesh_is_dropped_flattened_changed_and_saved(self, page, session, ball, tmp_path):
+        assert page.get("/state").json()["mesh"] is None
+        assert page.get("/layout").status_code == 400
+        assert page.post("/export/obj").status_code == 400
+        assert page.post("/mesh?name=ball.obj", content=ball.read_bytes()).status_code == 200
+        assert session.wait_until_idle(120)
+        state = page.get("/state").json()
+        assert (state["mesh"], state["layout"], state["trouble"]) == ("ball.obj", 1, None)
+        content = page.get("/layout").content
+        size = struct.unpack("<I", content[:4])[0]
+        head = json.loads(content[4 : 4 + size])
+        last = head["arrays"][-1]
+        assert len(content) >= 4 + size + last["offset"] + last["count"]
+        assert size % 4 == 0
+        assert page.post("/act", json={"do": "remove", "vertex": state["found"][0]}).status_code == 200
+        later = page.get(f"/state?after={state['version']}&chosen={state['chosen']}").json()
+        assert later["choices"]["by_hand"]
+        assert "choices" not in page.get(f"/state?chosen={later['chosen']}").json()
+        assert page.post("/export/obj").text.count("\nvt ") > 0
+        assert (tmp_path / "ball_studio.json").exists()
+
+    def test_refusals_say_why(self, page, ball):
+        page.post("/mesh?name=ball.obj", content=ball.read_bytes())
+        answer = page.post("/act", json={"do": "remove", "vertex": 10**9})
+        assert answer.status_code == 400
+        assert "vertex 1000000000 is no cone" in answer.text
+        for garbled in (b"{", b"[]", b"\xff", b'{"do": NaN}'):
+            assert page.post("/act", content=garbled).status_code == 400
+        assert page.post("/export/exe").status_code == 400
+        assert page.get("/nowhere").status_code == 404
+
+
+class TestUploads:
+    def test_too_large_a_mesh_is_refused_and_leaves_nothing(self, page, tmp_path):
+        answer = page.post("/mesh?name=big.obj", content=b"#" * (MOST + 1))
+        assert answer.status_code == 413
+        assert f"{MOST:,}" in answer.text
+        assert list(tmp_path.iterdir()) == []
+
+    def test_its_size_is_counted_whatever_is_said(self, page, tmp_path):
+        def endless():
+            for _ in range(1000):
+                yield b"#" * 1000
+
+        assert page.post("/mesh?name=big.obj", content=endless()).status_code == 413
+        assert list(tmp_path.iterdir()) == []
+
+    @pytest.mark.parametrize(
+        "name",
+        ["../up.obj", "%2e%2e%2fup.obj", "/etc/up.obj", "a/b.obj", ".x.obj", "", "x.exe", "x", "a%00.obj"],
+    )
+    def test_names_lead_nowhere_else(self, page, tmp_path, name, ball):
+        before = set(tmp_path.parent.rglob("*"))
+        assert page.post(f"/mesh?name={name}", content=ball.read_bytes()).status_code == 400
+        assert set(tmp_path.parent.rglob("*")) == before
+
+    def test_no_file_is_overwritten(self, page, ball, tmp_path):
+        (tmp_path / "ball.obj").write_text("# mine\n")
+        assert page.post("/mesh?name=ball.obj", content=ball.read_bytes()).status_code == 200
+        assert (tmp_path / "ball.obj").read_text() == "# mine\n"
+        assert page.get("/state").json()["mesh"] == "ball-2.obj"
+        # The same once more is the same file.
+        assert page.post("/mesh?name=ball.obj", content=ball.read_bytes()).status_code == 200
+        assert page.get("/state").json()["mesh"] == "ball-2.obj"

@@ -1,0 +1,206 @@
+"""The studio's session, without a page: what is flattened, saved, told; and the command."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapes
+from click.testing import CliRunner
+
+import coneflat
+from coneflat.apps.cli.main import cli
+from coneflat.apps.studio.choices import Choices
+from coneflat.apps.studio.frames import read_frame, write_frame
+from coneflat.apps.studio.project import Project, hash_of, read_project
+from coneflat.apps.studio.session import Session
+from coneflat.errors import OptionError, ProjectError, StudioError
+
+
+@pytest.fixture
+def mesh(tmp_path):
+    return shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3))
+
+
+@pytest.fixture
+def session(tmp_path, mesh):
+    opened = Session(tmp_path)
+    opened.open(tmp_path / "ball.obj")
+    yield opened
+    opened.close()
+
+
+def settled(session):
+    assert session.wait_until_idle(120)
+    return session.state()
+
+
+def uv_of(content):
+    return np.load(BytesIO(content), allow_pickle=False)["uv"]
+
+
+class TestSession:
+    def test_it_flattens_what_is_chosen(self, session):
+        state = settled(session)
+        assert state["trouble"] is None
+        assert state["layout"] == 1
+        found = state["found"]
+        session.act({"do": "angle", "vertex": found[0], "degrees": 200})
+        session.act({"do": "lock", "vertex": found[1], "locked": True})
+        state = settled(session)
+        assert state["trouble"] is None
+        assert sorted(state["found"]) == sorted(found)
+        head, _ = session.picture()
+        angles = dict(zip(state["found"], head["cone_curvatures"], strict=True))
+        assert 360 - math.degrees(angles[found[0]]) == pytest.approx(200)
+        session.act({"do": "set", "name": "cone_count", "value": len(found) + 1})
+        state = settled(session)
+        assert found[1] in state["found"]
+        assert len(state["found"]) == len(found) + 1
+
+    def test_what_is_saved_is_what_the_command_makes(self, session, tmp_path):
+        found = settled(session)["found"]
+        session.act({"do": "remove", "vertex": found[0]})
+        session.act({"do": "angle", "vertex": found[1], "degrees": 120})
+        graph = coneflat.TriangleMesh(*shapes.sphere(3)).edges
+        far = [edge for edge in graph.tolist() if not set(edge) & set(found)][:1]
+        session.act({"do": "keep", "path": far[0]})
+        saved = uv_of(session.export(".npz"))
+        assert settled(session)["trouble"] is None
+        done = CliRunner().invoke(
+            cli, ["flatten", "--project", str(session.project_file), "-o", str(tmp_path / "again.npz")]
+        )
+        assert done.exit_code == 0, done.output
+        np.testing.assert_array_equal(coneflat.read_flattening(tmp_path / "again.npz").uv, saved)
+
+    @pytest.mark.parametrize(
+        ("ending", "begins"),
+        [(".obj", b"v "), (".ply", b"ply"), (".glb", b"glTF"), (".npz", b"PK"), (".svg", b"<svg")],
+    )
+    def test_it_saves(self, session, ending, begins):
+        assert session.export(ending).startswith(begins)
+
+    def test_newer_changes_end_older_work(self, session):
+        for step in range(1, 8):
+            session.act({"do": "set", "name": "stretch", "value": step / 10})
+        state = settled(session)
+        # The first may have been flattened before the others came; what is between is given up.
+        assert state["layout"] < 4
+        assert state["choices"]["options"] == {"stretch": 0.7}
+        assert coneflat.flatten(*shapes.sphere(3), stretch=0.7).uv == pytest.approx(
+            uv_of(session.export(".npz"))
+        )
+
+    def test_a_failure_is_told_and_undone(self, session):
+        found = settled(session)["found"]
+        for vertex in found:
+            session.act({"do": "angle", "vertex": vertex, "degrees": 350})
+        state = settled(session)
+        assert "must sum to 2 pi chi" in state["trouble"]["text"]
+        assert state["layout"] >= 1  # which is still shown
+        with pytest.raises(StudioError, match="the last change could not be flattened"):
+            session.export(".obj")
+        for _ in found:
+            session.act({"do": "undo"})
+        assert settled(session)["trouble"] is None
+
+    def test_senseless_actions_are_refused(self, session):
+        before = session.state()["choices"]
+        for action in (
+            {}, {"do": "explode"}, {"do": ["add"]}, {"do": "add"}, {"do": "add", "vertex": "x"},
+            {"do": "add", "vertex": 1.5}, {"do": "cut", "path": 3}, {"do": "cut", "path": ["a", "b"]},
+            {"do": "erase", "edge": [1]}, {"do": "set", "name": "progress", "value": 1},
+            {"do": "set", "name": "distortion", "value": "much"}, {"do": "angle", "vertex": 3, "degrees": "nan"},
+        ):  # fmt: skip
+            with pytest.raises((StudioError, OptionError)):
+                session.act(action)
+            assert session.state()["choices"] == before
+
+    def test_a_killed_process_is_told_of_and_started_again(self, session):
+        settled(session)
+        first = session.worker_process
+        session.act({"do": "set", "name": "stretch", "value": 0.5})
+        os.kill(first, signal.SIGKILL)
+        trouble = settled(session)["trouble"]
+        assert "was ended by SIGKILL" in trouble["text"]
+        assert "nothing is lost" in trouble["text"]
+        session.act({"do": "again"})
+        state = settled(session)
+        assert state["trouble"] is None
+        assert state["choices"]["options"] == {"stretch": 0.5}
+        assert session.worker_process != first
+
+    def test_everything_is_kept_at_once(self, session, tmp_path):
+        session.act({"do": "set", "name": "stretch", "value": 0.5})
+        again = Session(tmp_path)  # as if the first had been killed
+        try:
+            again.open(tmp_path / "ball.obj")
+            assert again.state()["choices"] == session.state()["choices"]
+            again.open(session.project_file)
+            assert again.state()["choices"] == session.state()["choices"]
+        finally:
+            again.close()
+
+    def test_another_mesh_of_the_same_name_overwrites_no_project(self, session, tmp_path):
+        (tmp_path / "other").mkdir()
+        shapes.write_obj(tmp_path / "other" / "ball.obj", *shapes.sphere(2))
+        with pytest.raises(ProjectError, match="is a project of another mesh"):
+            session.open(tmp_path / "other" / "ball.obj")
+
+    def test_links_lead_nowhere_else(self, session, tmp_path_factory, tmp_path):
+        other = tmp_path_factory.mktemp("other")
+        shapes.write_obj(other / "secret.obj", *shapes.sphere(1))
+        (tmp_path / "link.obj").symlink_to(other / "secret.obj")
+        with pytest.raises(StudioError, match="leads out of the session's folder"):
+            session.open_named("link.obj")
+
+    def test_a_dropped_project_names_no_mesh_elsewhere(self, session, tmp_path_factory, tmp_path):
+        other = tmp_path_factory.mktemp("other")
+        shapes.write_obj(other / "secret.obj", *shapes.sphere(1))
+        Project(other / "secret.obj", hash_of(other / "secret.obj"), Choices()).save(tmp_path / "p.json")
+        with pytest.raises(ProjectError, match="lies outside the session's folder"):
+            session.open_named("p.json")
+
+
+def test_frames_come_whole_or_not_at_all():
+    stream = BytesIO()
+    write_frame(stream, {"a": 1}, b"body")
+    write_frame(stream, {"b": "ä"})
+    whole = stream.getvalue()
+    stream.seek(0)
+    assert read_frame(stream) == ({"a": 1}, b"body")
+    assert read_frame(stream) == ({"b": "ä"}, b"")
+    assert read_frame(stream) is None
+    assert read_frame(BytesIO(whole[:19])) is None
+
+
+def test_the_command_prints_its_address_first_and_lives_on_this_machine(tmp_path, mesh):
+    pytest.importorskip("uvicorn")
+    httpx = pytest.importorskip("httpx2")
+    command = [sys.executable, "-m", "coneflat", "studio", "ball.obj", "--no-open"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            address = process.stdout.readline().strip()
+            base, token = address.split("/?token=")
+            assert base.startswith("http://127.0.0.1:")
+            assert len(token) >= 32
+            assert "<title>coneflat</title>" in httpx.get(address).text
+            assert httpx.get(f"{base}/").status_code == 403
+            end = time.monotonic() + 120
+            state = {"version": 0, "layout": 0}
+            while not state["layout"] and time.monotonic() < end:
+                asked = f"{base}/state?after={state['version']}"
+                state = httpx.get(asked, headers={"x-coneflat-token": token}, timeout=60).json()
+            assert state["layout"] == 1
+        finally:
+            process.send_signal(signal.SIGINT)
+            assert process.wait(30) is not None
+    assert read_project(Path(tmp_path) / "ball_studio.json").choices == Choices()

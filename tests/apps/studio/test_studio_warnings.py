@@ -1,0 +1,142 @@
+"""What the studio says of cones set by hand, and in which words."""
+
+from __future__ import annotations
+
+import math
+import re
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapes
+
+import coneflat
+from coneflat.apps.studio.choices import Choices
+from coneflat.apps.studio.paint import Region, region_of
+from coneflat.apps.studio.session import Session
+from coneflat.apps.studio.warnings import misplaced, within
+from coneflat.apps.studio.wording import CONTROLS, in_page
+from coneflat.base.defaults import MAX_CONE_ANGLE
+from coneflat.errors import StudioError
+from coneflat.options import Options, declarations
+
+PAGE = files("coneflat.apps.studio.page")
+SOURCES = Path(coneflat.__file__).parent
+
+
+@pytest.fixture
+def session(tmp_path):
+    opened = Session(tmp_path)
+    opened.open(shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3)))
+    yield opened
+    opened.close()
+
+
+def settled(session):
+    assert session.wait_until_idle(60)
+    return session.state()
+
+
+class TestPlaces:
+    def test_what_is_in_a_region(self):
+        some = np.flatnonzero(np.random.default_rng(7).random(400) < 0.4)
+        every = list(range(-3, 410))
+        assert within(region_of(some), every) == [v for v in every if v in set(some.tolist())]
+        assert within(Region(), every) == []
+
+    def test_one_and_several(self):
+        painted = Choices().painted("no_cone", Region("3-9 20"))
+        assert misplaced(painted) == ()
+        assert misplaced(painted.added(10)) == ()
+        (one,) = misplaced(painted.added(9))
+        assert one.startswith("1 cone set by hand or locked lies where none are to be, as painted: vertex 9.")
+        (two,) = misplaced(painted.added(20).added(10).added(3))
+        assert "2 cones set by hand or locked lie where none are to be, as painted: vertices 3, 20." in two
+
+    def test_they_are_told_at_once_and_noted(self, session):
+        found = settled(session)["found"]
+        session.act({"do": "paint", "layer": "no_cone", "where": f"{found[0]}"})
+        state = settled(session)
+        assert found[0] not in state["found"]
+        assert state["warnings"] == []
+        session.act({"do": "add", "vertex": found[0]})
+        assert f"vertex {found[0]}." in session.state()["warnings"][0]
+        state = settled(session)
+        assert found[0] in state["found"]
+        head, _ = session.picture()
+        assert state["warnings"][0] in head["notes"]
+        session.act({"do": "remove", "vertex": found[0]})
+        assert session.state()["warnings"] == []
+
+
+class TestAngles:
+    def test_none_is_wider_than_a_search_may_have_them(self):
+        chosen = Choices().placed([4, 9]).angled(9, math.radians(720))
+        assert chosen.cones[1].angle == MAX_CONE_ANGLE
+        for angle in (0.0, math.radians(721), math.radians(3000), math.inf, math.nan):
+            with pytest.raises(StudioError, match="a positive angle of at most 720 degrees, not"):
+                chosen.angled(4, angle)
+            with pytest.raises(StudioError, match="a positive angle of at most 720 degrees, not"):
+                chosen.added(5, angle)
+        plain = chosen.as_plain()
+        plain["cones"][1]["angle"] = math.radians(3000)
+        with pytest.raises(StudioError, match="not 3,000"):
+            Choices.from_plain(plain)
+
+    def test_what_typed_angles_leave_out_of_bounds_is_told(self, session):
+        """Of a ball's 720 degrees, three cones of 220 take 420; what is left leaves one more an angle below 90."""
+        settled(session)
+        session.act({"do": "set", "name": "cone_count", "value": 4})
+        one, *others = settled(session)["found"]
+        for vertex in others:
+            session.act({"do": "angle", "vertex": vertex, "degrees": 150})
+        state = settled(session)
+        # 720 - 3 * 210 = 90 is its curvature, 270 its angle.
+        assert (state["trouble"], state["warnings"]) == (None, [])
+        for vertex in others:
+            session.act({"do": "angle", "vertex": vertex, "degrees": 220})
+        state = settled(session)
+        # 720 - 3 * 140 = 300.
+        (warning,) = state["warnings"]
+        assert warning.startswith(
+            f"The angles that are typed leave 1 cone none from 90 to 720 degrees: vertex {one} 60."
+        )
+        assert state["trouble"] is None
+
+
+class TestWords:
+    def test_controls_are_those_of_the_page(self):
+        page = "".join(
+            PAGE.joinpath(name).read_text() for name in ("panel.html", "tools.js", "paint.js", "panel.js")
+        )
+        for name, control in CONTROLS.items():
+            assert name in declarations(Options)
+            assert control in page
+
+    @pytest.mark.parametrize(
+        ("message", "said"),
+        [
+            ("other cones (--distortion, --cone-count)", "other cones (“Distortion”, “Number”)"),
+            ("remesh them, or run with --repair", "remesh them, or run with “Repair the mesh”"),
+            ("cone_count must be a whole number", "“Number” must be a whole number"),
+            ("padding must be 0 and up", "“Texels between charts” must be 0 and up"),
+            ("the padding must be 0", "the padding must be 0"),
+            ("the greedy search (--cones greedy)", "the greedy search (--cones greedy of coneflat flatten)"),
+        ],
+    )
+    def test_options_are_named_as_the_page_has_them(self, message, said):
+        assert in_page(message) == said
+
+    def test_no_flag_that_has_a_control_is_left(self):
+        """In none of the messages of the package."""
+        flags = set()
+        for source in SOURCES.rglob("*.py"):
+            if "apps" not in source.relative_to(SOURCES).parts:
+                flags |= set(re.findall(r"--[a-z][a-z-]+", source.read_text()))
+        assert {"--repair", "--distortion"} <= flags
+        for flag in flags:
+            name = flag[2:].replace("-", "_")
+            assert in_page(f"try {flag}.") == (
+                f"try “{CONTROLS[name]}”." if name in CONTROLS else f"try {flag} of coneflat flatten."
+            )

@@ -1,0 +1,123 @@
+"""Each picture of a flattening: what stands at which place, in pixels and in polygons."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+from drawing import (
+    BLACK,
+    RED,
+    SVG,
+    axes_of,
+    count_dots,
+    enclosed,
+    groups,
+    polygons,
+    shown_at,
+)
+
+import coneflat
+
+pytest.importorskip("matplotlib")
+
+from coneflat.apps.view import draw_cone_curve, draw_cones, draw_layout, draw_quality, quantity
+from coneflat.apps.view.figures import uv_layout as layout
+
+
+@pytest.fixture(scope="module")
+def result():
+    return coneflat.flatten(*shapes.sphere(3), charts="atlas")
+
+
+class TestLayout:
+    @pytest.mark.parametrize("pieces", [1, 2])
+    def test_charts_are_polygons_of_the_right_area(self, tmp_path, pieces):
+        vertices, faces = shapes.annulus()
+        if pieces == 2:
+            other, more = shapes.sphere(2)
+            vertices, faces = shapes.join((vertices, faces), (other + 5, more))
+        result = coneflat.flatten(vertices, faces, charts="atlas")
+        path = coneflat.save_figure(coneflat.make_figure(result, "layout"), tmp_path / "layout.svg")
+        found = groups(path)
+        charts = [found[name] for name in found if name and name.startswith("chart-")]
+        assert len(charts) == result.distortion.charts >= pieces
+        one, two = (result.corner_uv[:, k] - result.corner_uv[:, 0] for k in (1, 2))
+        area = np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum() / 2
+        drawn = sum(abs(sum(enclosed(curve) for curve in polygons(chart))) for chart in charts)
+        # The frame around is the unit square, with 2 in 104 of the width on either side.
+        side = (4.5 - 2 * 0.0) * 72 / 1.04
+        assert drawn / side**2 == pytest.approx(area, rel=1e-4)
+        mesh = coneflat.TriangleMesh(result.uv, result.uv_faces)
+        lines = "".join(part.get("d") for part in found["edges"].iter(f"{SVG}path"))
+        assert lines.count("M") == np.count_nonzero(~mesh.is_boundary_edge)
+        assert count_dots(found.get("cones")) == len(layout.layout_cones(result)[0])
+
+    def test_cones_are_red_and_black_at_their_points(self):
+        tube = shapes.tube()
+        axes = axes_of()
+        draw_layout(tube, axes)
+        vertex, point = layout.layout_cones(tube)
+        assert vertex.tolist() == [0, 0, 11, 11]
+        np.testing.assert_array_equal(shown_at(axes, tube.uv[point]), [RED, RED, BLACK, BLACK])
+
+
+class TestQuality:
+    def test_the_layout_has_the_colours_of_its_triangles(self, result):
+        from matplotlib import colormaps
+
+        axes = axes_of(size=8.0)
+        shown = draw_quality(result, axes, on="layout", measure="qc", dpi=100)
+        share = np.clip((result.distortion.qc - 1) / (shown.scale.high - 1), 0, 1)
+        expected = 255 * np.asarray(colormaps["viridis_r"](share))[:, :3]
+        found = shown_at(axes, result.corner_uv.mean(axis=1))
+        close = np.abs(found - expected).max(axis=1) < 12
+        # The rest is beside outlines and other triangles.
+        assert close.mean() > 0.9
+        assert np.ptp(expected, axis=0).max() > 100
+
+
+class TestConesAndCurvature:
+    def test_cones_are_dots_and_those_behind_are_faint(self):
+        tube = shapes.tube()
+        tube.cones = np.array([4, 7])
+        for eye, hidden in (((1, 0, 0.2), False), ((-1, 0, 0.05), True)):
+            axes = axes_of()
+            draw_cones(tube, axes, eye=eye, up="z", dpi=100)
+            dots = {each.get_gid(): each for each in axes.collections if "cones" in each.get_gid()}
+            assert list(dots) == ["hidden-cones" if hidden else "cones"]
+            (found,) = dots.values()
+            positive, negative = shown_at(axes, found.get_offsets())
+            assert np.abs(positive - RED).max() > 60 if hidden else positive.tolist() == list(RED)
+            assert np.abs(negative - BLACK).max() > 100 if hidden else negative.tolist() == list(BLACK)
+            lines = {each.get_gid() for each in axes.collections if "seams" in each.get_gid()}
+            assert lines == {"hidden-seams", "seams"}
+            seams = {
+                each.get_gid(): len(each.get_segments())
+                for each in axes.collections
+                if "seams" in each.get_gid()
+            }
+            assert (seams["seams"] < seams["hidden-seams"]) == hidden
+
+    def test_curvature_before_and_after(self, result):
+        before, after = (quantity.curvature(result, flat) for flat in (False, True))
+        mesh = coneflat.TriangleMesh(result.vertices, result.faces)
+        angles = coneflat.geometry.corner_angles(coneflat.geometry.edge_lengths(mesh.vertices, mesh.faces))
+        defect = coneflat.geometry.angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+        np.testing.assert_allclose(before.values, np.abs(defect))
+        assert before.percentile(100) == pytest.approx(np.abs(defect).max())
+        assert after.percentile(100) < 1e-10
+        np.testing.assert_allclose(after.values[result.cones], np.abs(result.curvatures), atol=1e-9)
+        linear = quantity.curvature(coneflat.flatten(*shapes.sphere(3), **coneflat.PAPER), True)
+        assert 1e-6 < linear.percentile(50) < before.percentile(50)
+
+    def test_the_curve_is_that_of_the_numbers(self):
+        curve = coneflat.cone_curve(*shapes.sphere(3), most=8)
+        axes = axes_of()
+        draw_cone_curve(curve, axes, distortion=0.15)
+        np.testing.assert_array_equal(
+            axes.lines[0].get_xydata(), np.column_stack([curve.counts, curve.distortions])
+        )
+        texts = [text.get_text() for text in axes.texts]
+        assert texts == ["E = 0.15", f"knee: {curve.knee} cones"]
+        assert coneflat.make_figure(curve, "curve").axes[0].get_xlabel() == "number of cones"

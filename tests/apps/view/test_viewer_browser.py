@@ -1,0 +1,234 @@
+"""What the viewer's page shows in a browser, and what mouse, keys and fingers do there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from browsing import NARROW, WIDE, Visit, thing
+
+from coneflat.apps.view.page.content import content_of
+from coneflat.options.outputs import SHOWS
+
+
+def colour_at(visit, u, v):
+    """The colour that the layout has at a point of the plane."""
+    x, y = visit.run(
+        f"(({{camera}}, m) => camera.project([({u} - m.uvCentre[0]) * m.uvUnit, ({v} - m.uvCentre[1]) * m.uvUnit, 0]))"
+        "(coneflat.panes[1], coneflat.model)"
+    )[:2]
+    return visit.picture("layout")[int(y), int(x)]
+
+
+def inner_points(viewed, cell, count=12):
+    """Middles of squares of the plane that lie well inside a triangle-covered part."""
+    from coneflat.apps.view.figures.projection import rasterise
+
+    flat = np.column_stack([1000 * viewed.uv, np.zeros(len(viewed.uv))])
+    covered = rasterise(flat, viewed.uv_faces, 1000, 1000).covered
+    steps = [slice(int(1000 * i * cell), int(1000 * (i + 1) * cell)) for i in range(int(1 / cell))]
+    inside = [(i, j) for i, u in enumerate(steps) for j, v in enumerate(steps) if covered[v, u].all()]
+    return [inside[k] for k in np.linspace(0, len(inside) - 1, count).astype(int)]
+
+
+def quarters(path):
+    """A picture whose quarters are red, green (above), blue and white (below)."""
+    from PIL import Image
+
+    pixels = np.zeros((64, 64, 3), dtype=np.uint8)
+    pixels[:32, :32], pixels[:32, 32:], pixels[32:, :32], pixels[32:, 32:] = (
+        (255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 255),
+    )  # fmt: skip
+    Image.fromarray(pixels).save(path)
+    return path
+
+
+def expected_quarter(u, v):
+    return {(0, 1): [255, 0, 0], (1, 1): [0, 255, 0], (0, 0): [0, 0, 255], (1, 0): [255, 255, 255]}[
+        u > 0.5, v > 0.5
+    ]
+
+
+@pytest.mark.parametrize("size", [WIDE, NARROW], ids=["wide", "narrow"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_both_views_are_drawn_and_everything_fits(browser, viewed_page, size, scheme):
+    visit = Visit(browser, viewed_page, viewport=size, color_scheme=scheme)
+    for pane in ("model", "layout"):
+        assert 0.1 < visit.drawn_share(pane) < 0.95
+        box = visit.box(pane)
+        assert box["width"] * box["height"] > 0.25 * size["width"] * size["height"]
+    assert visit.state("dark") == (scheme == "dark")
+    assert (visit.picture("model")[3, -3] < 60).all() == (scheme == "dark")
+    assert visit.run("document.documentElement.scrollWidth") <= size["width"]
+    assert visit.run("[...document.querySelectorAll('button, select')].every((one) => {"
+                     "const box = one.getBoundingClientRect(); return !box.width || (box.left >= 0 && "
+                     "box.right <= innerWidth && box.bottom <= innerHeight); })")  # fmt: skip
+    visit.close()
+
+
+def test_the_browser_has_the_numbers_of_the_result(visit, viewed):
+    content = content_of(viewed, 10**6)
+    for name, values in (("qc", content.qc), ("area", content.area), ("flat", content.flat)):
+        there = np.array(visit.run(f"Array.from(coneflat.model.arrays.{name})"), dtype=float)
+        np.testing.assert_allclose(there, values, rtol=1e-6, atol=1e-9)
+    values = {"qc": content.qc, "area": content.area, "curvature": content.curvature}
+    for name, scale in content.scales.items():
+        there = np.array(visit.run(f"Array.from(coneflat.model.tones('{name}'))"))
+        expected = np.nan_to_num(scale.position(values.get(name, content.flat)), nan=-1)
+        np.testing.assert_allclose(there, expected, atol=1e-5)
+
+
+def test_report_help_and_theme(visit, viewed):
+    assert not visit.page.is_visible("#table")
+    visit.page.click("#report")
+    assert "seam mismatch" in visit.page.inner_text("#table")
+    assert 0.1 < visit.drawn_share("layout") < 0.95  # it has made room
+    box, whole = visit.box("layout"), visit.picture()
+    gap = whole[
+        round(box["y"]) + 5 : round(box["y"] + box["height"]) - 5, round(box["x"]) - 6 : round(box["x"]) - 2
+    ]
+    assert np.ptp(gap.reshape(-1, 3), axis=0).max() == 0  # nothing is left of what was there
+    visit.page.click("#report")
+    visit.page.click("#help")
+    assert visit.page.is_visible("#keys")
+    assert "two fingers" in visit.page.inner_text("#keys")
+    visit.page.click("#keys button")
+    assert not visit.page.is_visible("#keys")
+    visit.page.click("#theme")
+    assert (visit.picture("layout")[-3, 3] < 60).all()
+
+
+def test_everything_that_can_be_shown_looks_different(visit):
+    seen = []
+    for show in SHOWS:
+        visit.page.select_option("#show", show)
+        assert visit.state("show") == show
+        has_scale = show in ("qc", "area", "curvature", "flat")
+        assert visit.page.is_visible("#scale") == has_scale
+        assert visit.page.is_visible("#file-label") == (show == "picture")
+        seen.append(visit.picture("layout"))
+        assert not any(np.array_equal(seen[-1], other) for other in seen[:-1])
+    visit.page.select_option("#show", "qc")
+    assert visit.page.locator("#scale-ticks span").count() == 3
+    visit.page.mouse.move(*visit.at("layout", thing("triangle", 200))[0])
+    place = float(visit.page.get_attribute("#scale-mark", "style").split("left:")[1].split("%")[0]) / 100
+    value = visit.run("coneflat.model.arrays.qc[200]")
+    low, high = visit.run("[coneflat.model.head.scales.qc.low, coneflat.model.head.scales.qc.high]")
+    assert place == pytest.approx(min((value - low) / (high - low), 1), abs=1e-3)
+
+
+def test_a_picture_lies_upright(browser, viewed, tmp_path):
+    path = viewed.view(tmp_path / "page.html", texture=quarters(tmp_path / "quarters.png"))
+    visit = Visit(browser, path)
+    visit.run("coneflat.state.set({seams: false, cones: false})")
+    assert visit.state("show") == "picture"
+    for i, j in inner_points(viewed, 0.07):
+        u, v = 0.07 * (i + 0.5), 0.07 * (j + 0.5)
+        if min(abs(u - 0.5), abs(v - 0.5)) > 0.05:
+            assert np.abs(colour_at(visit, u, v) - expected_quarter(u, v)).max() < 8
+    visit.close()
+
+
+def near(visit, pane, x, y, reach=16):
+    """Whether the accent colour of marks is seen near a place."""
+    box = visit.box(pane)
+    picture = visit.picture(pane)
+    row, column = round(y - box["y"]), round(x - box["x"])
+    part = picture[max(row - reach, 0) : row + reach, max(column - reach, 0) : column + reach]
+    return (np.abs(part - [0xD6, 0x00, 0x6C]).max(axis=2) < 60).any()
+
+
+def test_pointing_finds_a_triangle_on_both_sides(visit, viewed):
+    visit.run("coneflat.state.set({seams: false, cones: false})")  # which come before triangles
+    for index in (0, 123, 777, len(viewed.faces) - 1):
+        visit.page.mouse.move(*visit.at("layout", thing("triangle", index))[0])
+        assert visit.state("hovered") == {"kind": "triangle", "index": index}
+        assert f"Triangle {index:,}" in visit.page.inner_text("#facts")
+        assert f"QC {viewed.distortion.qc[index]:.4f}" in visit.page.inner_text("#facts")
+        for pane in ("model", "layout"):
+            (x, y), box = visit.at(pane, thing("triangle", index))[0], visit.box(pane)
+            if 0 < x - box["x"] < box["width"] and 0 < y - box["y"] < box["height"]:
+                assert near(visit, pane, x, y)
+    visit.page.mouse.move(5, 5)
+    assert visit.state("hovered") is None
+
+
+def test_a_click_keeps_a_cone_and_turns_the_model_to_it(visit, viewed):
+    for index in range(len(viewed.cones)):
+        visit.page.mouse.click(*visit.at("layout", thing("cone", index))[0])
+        assert visit.state("picked") == {"kind": "cone", "index": index}
+        visit.rest()
+        assert visit.run(f"coneflat.marks.isSeen(coneflat.panes[0], {thing('cone', index)}, coneflat.state)")
+        (x, y), box = visit.at("model", thing("cone", index))[0], visit.box("model")
+        assert 0 < x - box["x"] < box["width"]
+        assert 0 < y - box["y"] < box["height"]
+        assert near(visit, "model", x, y)
+        assert f"{abs(viewed.curvatures[index]) / np.pi:.3f} π" in visit.page.inner_text("#facts")
+    visit.page.keyboard.press("Escape")
+    assert visit.state("picked") is None
+
+
+def test_mouse_turns_moves_and_zooms(visit):
+    for pane, turns in (("model", True), ("layout", False)):
+        box = visit.box(pane)
+        x, y = round(box["x"] + box["width"] / 2), round(box["y"] + box["height"] / 2)
+        camera = f"coneflat.panes[{int(not turns)}].camera"
+        turn, pan = visit.run(f"[{camera}.turn, {camera}.pan]")
+        visit.page.mouse.move(x, y)
+        visit.page.mouse.down()
+        visit.page.mouse.move(x + 60, y + 30, steps=4)
+        visit.page.mouse.up()
+        assert (visit.run(f"{camera}.turn") != turn) == turns
+        assert (visit.run(f"{camera}.pan") != pan) != turns
+        rows = np.array(visit.run(f"{camera}.turn")).reshape(3, 3)
+        np.testing.assert_allclose(rows @ rows.T, np.eye(3), atol=1e-12)
+        # What is under the pointer stays there.
+        back = f"[({x - 100} - {box['x']} - {camera}.width / 2) / {camera}.scale + {camera}.pan[0], {camera}.zoom]"
+        visit.page.mouse.move(x - 100, y)
+        place, zoom = visit.run(back)
+        visit.page.mouse.wheel(0, -300)
+        visit.wait(f"{camera}.zoom > {1.3 * zoom}")
+        later, _ = visit.run(back)
+        assert later == pytest.approx(place)
+        visit.page.mouse.dblclick(x, y)
+        assert visit.run(f"{camera}.zoom") == 1
+    assert visit.state("hovered") is None or visit.state("picked") is not None
+
+
+def test_keys_do_what_the_help_says(visit):
+    press = visit.page.keyboard.press
+    for key, name in (("s", "seams"), ("c", "cones"), ("t", "edges"), ("r", "report"), ("d", "dark")):
+        was = visit.state(name)
+        press(key)
+        assert visit.state(name) is not was
+    for number, show in enumerate(SHOWS, 1):
+        press(str(number))
+        assert visit.state("show") == show
+    squares = visit.state("squares")
+    press("]")
+    assert visit.state("squares") > squares
+    press("[")
+    assert visit.state("squares") == pytest.approx(squares)
+    visit.page.focus("#layout")
+    camera = "coneflat.panes[1].camera"
+    pan = visit.run(f"{camera}.pan")
+    press("ArrowLeft")
+    assert visit.run(f"{camera}.pan") != pan
+    press("+")
+    assert visit.run(f"{camera}.zoom") > 1
+    press("0")
+    assert (visit.run(f"{camera}.zoom"), visit.run(f"{camera}.pan")) == (1, pan)
+    visit.page.focus("#model")
+    turn = visit.run("coneflat.panes[0].camera.turn")
+    press("ArrowUp")
+    assert visit.run("coneflat.panes[0].camera.turn") != turn
+    press("w")
+    worst = visit.state("picked")["index"]
+    qc = np.array(visit.run("Array.from(coneflat.model.arrays.qc)"))
+    assert qc[worst] == np.nanmax(qc)
+    press("Escape")
+    press("?")
+    assert visit.page.is_visible("#keys")
+    press("Escape")
+    assert not visit.page.is_visible("#keys")
+    press("Enter")
+    assert visit.state("picked") is None or visit.state("picked")["kind"] in ("triangle", "seam", "cone")

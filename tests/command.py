@@ -1,0 +1,29 @@
+"""The command, run in this process: what it prints, and its exit code."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from types import SimpleNamespace
+from unittest.mock import patch
+
+import pytest
+
+from coneflat.apps.cli.main import main
+
+
+def command(*words, cwd="."):
+    out, err, threshold, before = StringIO(), StringIO(), gc.get_threshold(), os.getcwd()
+    argv = patch.object(sys, "argv", ["coneflat", *map(str, words)])
+    os.chdir(cwd)
+    try:
+        with redirect_stdout(out), redirect_stderr(err), argv, pytest.raises(SystemExit) as stopped:
+            main()
+    finally:
+        os.chdir(before)
+        gc.unfreeze()
+        gc.set_threshold(*threshold)
+    return SimpleNamespace(returncode=stopped.value.code, stdout=out.getvalue(), stderr=err.getvalue())

@@ -1,0 +1,307 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+from scipy.sparse import csr_matrix
+
+from coneflat import check_mesh, read_mesh
+from coneflat.cones.sparse import ConeSearch, fit_curvatures
+from coneflat.cones.sparse.aggregation import coarse_basis
+from coneflat.cones.sparse.green import GreenOperator
+from coneflat.errors import CurvatureError, OptionError
+from coneflat.geometry import (
+    angle_defect,
+    corner_angles,
+    cotangent_laplacian,
+    cotangents,
+    double_areas,
+    edge_lengths,
+)
+from coneflat.geometry.operators import area_distortion
+from coneflat.mesh.ties import tie_key
+
+HANDLE = shapes.genus(3)
+SHAPES = {"sphere": shapes.sphere(3), "genus 3": HANDLE, "annulus": shapes.annulus()}
+
+
+def surface(vertices, faces):
+    """Return what the search takes, and what it takes by name."""
+    mesh = check_mesh(vertices, faces).mesh
+    lengths = edge_lengths(mesh.vertices, mesh.faces)
+    curvature = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
+    laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths), len(mesh.vertices))
+    areas = np.bincount(mesh.faces.ravel(), np.repeat(double_areas(lengths) / 6, 3), len(mesh.vertices))
+    return laplacian, curvature, areas, mesh.is_boundary_vertex, mesh.euler_characteristic
+
+
+def sparse_cones(*given, distortion=0.2, count=None, **options):
+    search = ConeSearch(*given, **options)
+    return search.fewest(distortion) if count is None else search.best_of(count)
+
+
+def sparse(vertices, faces, **options):
+    return sparse_cones(*surface(vertices, faces), tie_key=tie_key(vertices), **options)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_reported_distortion_is_that_of_the_log_scale(name):
+    laplacian, curvature, areas, is_boundary, chi = surface(*SHAPES[name])
+    found = sparse_cones(laplacian, curvature, areas, is_boundary, chi, distortion=0.1)
+    solution = found.solution
+    assert found.distortion <= 0.1
+    assert found.distortion == pytest.approx(area_distortion(solution.log_scale, areas), rel=1e-9)
+    residual = laplacian @ solution.log_scale - solution.target + curvature
+    assert np.abs(residual).max() < 1e-9
+    outside = np.setdiff1d(np.arange(len(areas)), solution.cones)
+    assert not solution.target[outside][~is_boundary[outside]].any()
+    assert solution.target.sum() == pytest.approx(2 * np.pi * chi, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("angles", [(np.pi, None), (1.5 * np.pi, 3 * np.pi)])
+def test_cone_angles_keep_to_their_bounds(name, angles):
+    low, high = angles
+    found = sparse(*SHAPES[name], distortion=0.15, min_cone_angle=low, max_cone_angle=high)
+    cone_angles = 2 * np.pi - found.solution.curvatures
+    assert (cone_angles >= low - 1e-9).all()
+    assert high is None or (cone_angles <= high + 1e-9).all()
+
+
+def test_positive_only():
+    found = sparse(*shapes.sphere(3), distortion=0.1, positive_only=True)
+    assert (found.solution.curvatures >= 0).all()
+    with pytest.raises(CurvatureError, match="-8 pi"):
+        sparse(*HANDLE, positive_only=True)
+
+
+def test_bounds_that_leave_nothing_to_gain_end_the_search():
+    """On a torus curvatures sum to 0: without negative ones there are none."""
+    vertices, faces = shapes.genus(1)
+    search = ConeSearch(*surface(vertices, faces), positive_only=True)
+    found = search.fewest(0.01)
+    assert found.distortion > 0.01
+    assert max(search.coarse.best.sizes) < 30
+    assert not found.solution.cones.size
+
+
+@pytest.mark.parametrize("name", [*SHAPES, "stretched"])
+def test_no_cone_can_be_left_out(name):
+    """Also where the coarse model is far off, as on long thin triangles."""
+    vertices, faces = SHAPES["sphere" if name == "stretched" else name]
+    vertices = vertices * ([30, 1, 1] if name == "stretched" else 1)
+    search = ConeSearch(*surface(vertices, faces), tie_key=tie_key(vertices))
+    found = search.fewest(0.1)
+    assert found.distortion <= 0.1
+    members = search.exact.insert(search.unknowns_of(found.solution.cones))
+    for place in range(len(members)):
+        assert search.exact.energy(np.delete(members, place)) > 0.01
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_renumbering_changes_nothing(name):
+    vertices, faces = SHAPES[name]
+    shuffled, turned, _ = shapes.renumber(vertices, faces)
+    one = sparse(vertices, faces, distortion=0.1)
+    two = sparse(shuffled, turned, distortion=0.1)
+    assert len(one.solution.cones) == len(two.solution.cones)
+    assert one.distortion == pytest.approx(two.distortion, rel=1e-6)
+
+
+def test_a_torus_has_no_cones_or_two_and_more():
+    vertices, faces = shapes.torus()
+    loose = sparse(vertices, faces, distortion=10)
+    assert len(loose.solution.cones) == 0
+    tight = sparse(vertices, faces, distortion=0.9 * loose.distortion)
+    assert len(tight.solution.cones) >= 2
+    assert len(sparse(vertices, faces, count=1).solution.cones) == 0
+
+
+def test_a_sphere_needs_enough_cones():
+    vertices, faces = shapes.sphere(3)
+    with pytest.raises(CurvatureError, match=r"2 cones of at most 1\.5 pi each .* 4 pi: 3 or more"):
+        sparse(vertices, faces, count=2)
+    assert len(sparse(vertices, faces, count=3).solution.cones) == 3
+    needles = sparse(vertices, faces, distortion=5, min_cone_angle=1e-3)
+    assert len(needles.solution.cones) == 3
+
+
+def test_more_cones_are_no_worse():
+    given = surface(*shapes.sphere(3))
+    energies = [sparse_cones(*given, count=count).distortion for count in range(3, 9)]
+    assert (np.diff(energies) < 0).all()
+
+
+def test_required_cones_are_kept_and_forbidden_ones_avoided():
+    vertices, faces = shapes.hill(30, 30)
+    search = surface(vertices, faces)
+    free = sparse_cones(*search, distortion=0.05)
+    x = vertices[:, 0]
+    forbidden = x > 0.4
+    found = sparse_cones(*search, distortion=0.05, allowed=~forbidden)
+    assert not forbidden[found.solution.cones].any()
+    inner = np.flatnonzero(~search[3])
+    required = [int(inner[7]), int(inner[300])]
+    found = sparse_cones(*search, distortion=0.05, required=required)
+    assert found.solution.cones[:2].tolist() == required
+    allowed = np.zeros(len(x), dtype=bool)
+    allowed[free.solution.cones] = True
+    found = sparse_cones(*search, distortion=0.05, allowed=allowed)
+    assert set(found.solution.cones) <= set(free.solution.cones)
+    assert found.distortion == pytest.approx(free.distortion, rel=0.05)
+
+
+def test_weights_shift_distortion_away():
+    vertices, faces = shapes.sphere(3)
+    given = surface(vertices, faces)
+    face = vertices[:, 2] > 0.5
+    plain = sparse_cones(*given, count=5)
+    careful = sparse_cones(*given, count=5, weights=np.where(face, 50.0, 1.0))
+
+    def inside(found):
+        return area_distortion(found.solution.log_scale[face], given[2][face])
+
+    assert inside(careful) < 0.7 * inside(plain)
+
+
+def test_what_cannot_be_reached_is_the_best_there_is():
+    vertices, faces = shapes.sphere(3)
+    allowed = np.zeros(len(vertices), dtype=bool)
+    allowed[[0, 5, 9, 11]] = True
+    found = sparse(vertices, faces, distortion=1e-3, allowed=allowed)
+    assert found.distortion > 1e-3
+    assert set(found.solution.cones) <= {0, 5, 9, 11}
+
+
+def test_a_distortion_whose_square_is_zero_may_be_asked_for():
+    cylinder = shapes.cylinder()
+    assert sparse(*cylinder, distortion=1e-300).distortion <= sparse(*cylinder).distortion
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"distortion": 0}, OptionError),
+        ({"distortion": -1}, OptionError),
+        ({"distortion": np.nan}, OptionError),
+        ({"count": -1}, OptionError),
+        ({"count": 2.5}, OptionError),
+        ({"min_cone_angle": 0}, OptionError),
+        ({"max_cone_angle": 1}, OptionError),
+        ({"required": [10**6]}, OptionError),
+        ({"required": [3, 3]}, OptionError),
+        ({"weights": np.ones(3)}, OptionError),
+        ({"required": [1, 2, 3, 4], "count": 3}, CurvatureError),
+        ({"min_cone_angle": 2.5 * np.pi}, CurvatureError),
+        ({"allowed": np.zeros(162, dtype=bool)}, CurvatureError),
+    ],
+)
+def test_options_that_make_no_sense(options, error):
+    with pytest.raises(error):
+        sparse(*shapes.sphere(2), **options)
+
+
+@pytest.mark.parametrize("at_once", [fit_curvatures.AT_ONCE, 0], ids=["at once", "one by one"])
+def test_fit_agrees_with_the_optimality_conditions(at_once, monkeypatch):
+    monkeypatch.setattr(fit_curvatures, "AT_ONCE", at_once)
+    fit = fit_curvatures.fit_curvatures
+    rng = np.random.default_rng(3)
+    for trial in range(105):
+        size = int(rng.integers(1, 9)) if trial < 100 else 60
+        root = rng.normal(size=(size, size + 2))
+        gram, slope = root @ root.T, 3 * rng.normal(size=size)
+        least, most = -rng.uniform(0, 2), rng.uniform(0, 2)
+        total = rng.uniform(size * least, size * most) if rng.random() < 0.5 else np.nan
+        k, multiplier, feasible = fit(gram, slope, np.full(size, least), np.full(size, most), total)
+        gradient = gram @ k + slope + (0 if np.isnan(total) else multiplier)
+        assert feasible
+        assert (k >= least - 1e-12).all()
+        assert (k <= most + 1e-12).all()
+        assert np.isnan(total) or k.sum() == pytest.approx(total, abs=1e-9)
+        assert (gradient[k < most - 1e-9] > -1e-7).all()
+        assert (gradient[k > least + 1e-9] < 1e-7).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("fandisk.obj", 5),
+        ("hand.obj", 10),
+        ("3holes.off", 9),
+    ],
+)
+def test_fewer_cones_than_published(shared, name, count):
+    """Li et al. 2023 report 5, 10 and 10 cones for E <= 0.2."""
+    model = read_mesh(shared(name))
+    vertices, faces = model.vertices, model.corners.reshape(-1, 3)
+    found = sparse(vertices, faces, distortion=0.2, min_cone_angle=0.1 * np.pi)
+    assert found.distortion <= 0.2
+    assert len(found.solution.cones) <= count
+
+
+@pytest.mark.parametrize("shape", ["sphere", "annulus"])
+def test_the_laplacian_of_the_unknowns_is_that_of_the_mesh(shape):
+    laplacian, _, areas, is_boundary, _ = surface(*SHAPES[shape])
+    order = np.random.default_rng(2).permutation(len(areas))
+    operator = GreenOperator(laplacian, areas / areas.sum(), is_boundary, order)
+    free = order[~is_boundary[order]]
+    np.testing.assert_array_equal(operator.vertices, free)
+    np.testing.assert_array_equal(operator.laplacian.toarray(), laplacian.toarray()[free][:, free])
+    assert operator.laplacian.has_canonical_format
+    source = np.zeros(len(free))
+    source[3], source[-5] = 1.0, -1.0
+    np.testing.assert_allclose(operator.laplacian @ operator.solve(source), source, atol=1e-9)
+
+
+def test_scale_does_not_change_the_coarse_model():
+    """Weights across right angles are 0 or rounding, as the scale has it."""
+    vertices, faces = shapes.grid(60, 60)
+
+    def basis(scale):
+        cots = cotangents(edge_lengths(vertices * scale, faces))
+        laplacian = csr_matrix(cotangent_laplacian(faces, cots, len(vertices)))
+        return coarse_basis(laplacian, np.full(len(vertices), 1 / len(vertices)), 60)
+
+    one = basis(1.0)
+    for scale in (7.0, 1e-6, 0.3):
+        other = basis(scale)
+        for matrix in ("functions", "laplacian", "mass"):
+            known, found = getattr(one, matrix), getattr(other, matrix)
+            np.testing.assert_array_equal(found.indices, known.indices)
+            np.testing.assert_allclose(found.data, known.data, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", ["hub", "strip", "pockets"])
+def test_coarse_model_of_odd_connectivity_stays_small(shape):
+    """One vertex that all others meet, a line of vertices between two boundaries, vertices that meet no other."""
+    if shape == "hub":
+        vertices, faces = shapes.cylinder(3000, 1, caps=True)
+    else:
+        vertices, faces = shapes.grid(3000, 2)
+    laplacian, _, areas, is_boundary, _ = surface(vertices, faces)
+    inside = np.flatnonzero(~is_boundary)
+    if shape == "pockets":
+        inside = inside[::2]
+    inner = csr_matrix(laplacian)[inside][:, inside]
+    basis = coarse_basis(inner, areas[inside] / areas[inside].sum(), 400)
+    assert basis.functions.shape[1] <= 700
+    assert basis.functions.nnz < 30 * len(inside)
+
+
+def test_more_cones_than_are_searched_for_is_an_error():
+    with pytest.raises(CurvatureError, match="400 cones or more"):
+        sparse(*SHAPES["sphere"], min_cone_angle=1.99 * np.pi)
+    with pytest.raises(CurvatureError, match="cones were found"):
+        sparse(*HANDLE, room=np.full(len(HANDLE[0]), 2 * np.pi))
+    with pytest.raises(CurvatureError, match="no 15 cones"):
+        sparse(*HANDLE, room=np.full(len(HANDLE[0]), 2.5 * np.pi), count=15)
+
+
+def test_the_few_vertices_with_room_are_found():
+    """Four saddles of 4 pi carry the curvature, and only six vertices have room for one."""
+    wide = np.random.default_rng(0).choice(len(HANDLE[0]), 6, replace=False)
+    room = np.full(len(HANDLE[0]), 2 * np.pi)
+    room[wide] = 4 * np.pi
+    found = sparse(*HANDLE, room=room, count=8).solution
+    assert np.isin(found.cones[found.curvatures < 0], wide).all()
+    assert found.curvatures.min() >= -2 * np.pi - 1e-9

@@ -1,0 +1,52 @@
+"""What does not fit into memory is refused before the work, with numbers."""
+
+from __future__ import annotations
+
+import pytest
+import shapes
+
+import coneflat
+from coneflat.errors import ConeflatError, TooLargeError
+from coneflat.linalg import memory
+from coneflat.linalg.memory import BYTES, LARGE, check_memory, free_memory
+
+
+def free(monkeypatch, count):
+    monkeypatch.setattr(memory, "free_memory", lambda: float(count))
+
+
+def test_small_meshes_are_not_asked(monkeypatch):
+    free(monkeypatch, 0)
+    check_memory(LARGE - 1)
+
+
+def test_what_fits_is_taken(monkeypatch):
+    free(monkeypatch, BYTES * LARGE)
+    check_memory(LARGE)
+
+
+def test_what_does_not_fit(monkeypatch):
+    free(monkeypatch, 2e9)
+    with pytest.raises(TooLargeError) as raised:
+        check_memory(30_000_000)
+    assert str(raised.value) == "30,000,000 triangles take about 42 GB of memory, and 2 GB are free"
+    assert isinstance(raised.value, ConeflatError)
+    assert isinstance(raised.value, MemoryError)
+
+
+def test_a_flattening_is_refused(monkeypatch):
+    free(monkeypatch, 1e5)
+    monkeypatch.setattr(memory, "LARGE", 100)
+    with pytest.raises(TooLargeError, match="320 triangles"):
+        coneflat.flatten(*shapes.sphere(2))
+
+
+def test_free_memory_is_that_of_the_container(monkeypatch, tmp_path):
+    monkeypatch.setattr(memory, "CGROUP", tmp_path)
+    whole = free_memory()
+    assert whole > 0
+    (tmp_path / "memory.current").write_text("1000\n")
+    (tmp_path / "memory.max").write_text("max\n")
+    assert free_memory() == pytest.approx(whole, rel=0.5)
+    (tmp_path / "memory.max").write_text("5000\n")
+    assert free_memory() == 4000

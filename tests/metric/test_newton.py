@@ -1,0 +1,109 @@
+"""Newton's method with a line search on convex functions whose minima are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coneflat.errors import MetricError
+from coneflat.linalg.newton import Limits, Point, minimise
+
+LIMITS = Limits(tolerance=1e-9, steps=50, goal=1e-13, halvings=30)
+
+
+class LogCosh:
+    """The sum of log cosh (x - c): quadratic near c, with a slope of one far off, where full steps run away."""
+
+    def __init__(self, centre):
+        self.centre = centre
+        self.asked = []
+
+    def evaluate(self, place):
+        return Point(place, -np.tanh(place - self.centre))
+
+    def direction(self, here, exactly):
+        self.asked.append(exactly)
+        return here.residual * np.cosh(here.place - self.centre) ** 2, True
+
+
+class Flawed(LogCosh):
+    """The same, with directions that lead uphill unless exact ones are asked for."""
+
+    def direction(self, here, exactly):
+        step, _ = super().direction(here, exactly)
+        return (step, True) if exactly else (-step, False)
+
+
+def test_a_quadratic_takes_one_step():
+    matrix, centre = np.array([[3.0, 1.0], [1.0, 2.0]]), np.array([0.5, -4.0])
+
+    class Quadratic:
+        def evaluate(self, place):
+            return Point(place, matrix @ (centre - place))
+
+        def direction(self, here, exactly):
+            return np.linalg.solve(matrix, here.residual), True
+
+    problem = Quadratic()
+    found, steps = minimise(problem, problem.evaluate(np.zeros(2)), LIMITS)
+    np.testing.assert_allclose(found.place, centre, atol=1e-14)
+    assert steps <= 2
+
+
+@pytest.mark.parametrize("far", [0.1, 2.0, 8.0])
+def test_the_minimum_is_found_where_full_steps_run_away(far):
+    problem = LogCosh(np.array([1.0, 3.0, -2.0]))
+    found, _ = minimise(problem, problem.evaluate(problem.centre + far), LIMITS)
+    np.testing.assert_allclose(found.place, problem.centre, atol=1e-9)
+    assert found.largest <= 1e-9
+
+
+def test_what_leads_uphill_is_not_taken_and_an_exact_direction_is_asked_for():
+    problem = Flawed(np.zeros(2))
+    found, _ = minimise(problem, problem.evaluate(np.array([0.6, -0.4])), LIMITS)
+    assert found.largest <= 1e-9
+    assert problem.asked[:2] == [False, True]
+
+
+def test_the_largest_step_is_kept():
+    problem = LogCosh(np.zeros(1))
+    places = []
+    evaluate = problem.evaluate
+    problem.evaluate = lambda place: places.append(place[0]) or evaluate(place)
+    minimise(problem, problem.evaluate(np.array([5.0])), Limits(1e-9, 60, 1e-13, 30, largest_step=0.5))
+    assert np.abs(np.diff(places)).max() <= 0.5 + 1e-12
+    assert places[-1] == pytest.approx(0, abs=1e-9)
+
+
+def test_a_slope_without_an_end_is_left():
+    class Slope:
+        def evaluate(self, place):
+            return Point(place, np.ones(1))
+
+        def direction(self, here, exactly):
+            return np.ones(1), True
+
+    _, steps = minimise(
+        Slope(), Slope().evaluate(np.zeros(1)), Limits(1e-9, 50, 1e-13, 30, least_change=1e-6)
+    )
+    assert steps == 1
+
+
+def test_a_singular_hessian_leaves_the_best_so_far():
+    class Singular(LogCosh):
+        def direction(self, here, exactly):
+            raise MetricError("singular")
+
+    problem = Singular(np.zeros(1))
+    start = problem.evaluate(np.ones(1))
+    assert minimise(problem, start, LIMITS)[0] is start
+
+
+def test_what_is_not_admissible_is_not_accepted():
+    class Half(LogCosh):
+        def evaluate(self, place):
+            return Point(place, -np.tanh(place - self.centre), bool(place[0] > 0.1))
+
+    problem = Half(np.zeros(1))
+    found, _ = minimise(problem, problem.evaluate(np.array([0.8])), LIMITS)
+    assert 0.1 < found.place[0] < 0.8

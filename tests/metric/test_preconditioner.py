@@ -1,0 +1,84 @@
+"""Conjugate gradients with an inverse that is known nearly: the same solution on another way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from spheres import cones_on, lengths_of, random_sphere
+
+from coneflat.geometry import cotangent_laplacian, cotangents
+from coneflat.metric.exact import exact_metric
+from coneflat.metric.preconditioner import conjugate_gradients, corrected
+
+
+class Scaled:
+    """The inverse of the Laplacian of the input, or nothing like it."""
+
+    def __init__(self, mesh, break_even, is_good):
+        self.laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths_of(mesh)), len(mesh.vertices))
+        self.inverse = np.linalg.pinv(self.laplacian.toarray()) if is_good else np.eye(len(mesh.vertices))
+        self.break_even, self.calls = break_even, 0
+
+    def solve(self, right):
+        self.calls += 1
+        return self.inverse @ right
+
+
+@pytest.mark.parametrize(("break_even", "is_good"), [(60, True), (4, True), (60, False), (1, False)])
+def test_a_preconditioner_changes_the_way_not_the_end(break_even, is_good):
+    mesh = random_sphere(300, 7)
+    target = cones_on(mesh, np.full(4, np.pi))
+    expected = exact_metric(mesh, lengths_of(mesh), target)
+    inverse = Scaled(mesh, break_even, is_good)
+    metric = exact_metric(mesh, lengths_of(mesh), target, preconditioner=inverse)
+    assert metric.converged
+    assert metric.residual < 1e-12
+    assert inverse.calls
+    assert metric.log_scale == pytest.approx(expected.log_scale, abs=1e-9)
+
+
+def test_an_inverse_is_corrected_where_the_matrix_differs():
+    mesh = random_sphere(400, 3)
+    lengths = lengths_of(mesh)
+    inverse = Scaled(mesh, 60, True)
+    phi = np.zeros(400)
+    phi[::50] = 0.15  # the triangles around change
+    scaled = lengths * np.exp(
+        (phi[np.roll(mesh.faces, -1, axis=1)] + phi[np.roll(mesh.faces, -2, axis=1)]) / 2
+    )
+    matrix = cotangent_laplacian(mesh.faces, cotangents(scaled), 400)
+    matrix.sort_indices()
+    held = np.zeros(400, dtype=bool)
+    right = np.random.default_rng(0).normal(size=400)
+    right -= right.mean()
+
+    def calls(one):
+        inverse.calls = 0
+        solution = conjugate_gradients(matrix, right, one, 1e-12)
+        assert matrix @ solution == pytest.approx(right, abs=1e-9)
+        return inverse.calls
+
+    better = corrected(inverse, matrix, held)
+    around = np.unique(mesh.faces[(mesh.faces % 50 == 0).any(axis=1)])
+    assert len(better.chosen) == 40
+    assert set(better.chosen) <= set(around)
+    # It is symmetric, or conjugate gradients would go astray.
+    one, other = np.random.default_rng(1).normal(size=(2, 400))
+    one, other = one - one.mean(), other - other.mean()
+    assert one @ better.solve(other) == pytest.approx(other @ better.solve(one), rel=1e-9)
+    assert calls(better) < 0.6 * calls(inverse)
+    # Nothing differs, or what differs is held.
+    assert corrected(inverse, inverse.laplacian, held) is inverse
+    assert corrected(inverse, matrix, ~held) is inverse
+
+
+def test_conjugate_gradients_tell_what_they_cannot_solve():
+    mesh = random_sphere(60, 1)
+    inverse = Scaled(mesh, 60, True)
+    laplacian = cotangent_laplacian(mesh.faces, cotangents(lengths_of(mesh)), 60)
+    right = np.random.default_rng(0).normal(size=60)
+    right -= right.mean()
+    solution = conjugate_gradients(laplacian, right, inverse, 1e-10)
+    assert laplacian @ solution == pytest.approx(right, abs=1e-9)
+    assert conjugate_gradients(laplacian, np.full(60, np.nan), inverse, 1e-10) is None
+    assert conjugate_gradients(laplacian, right, Scaled(mesh, 5, False), 1e-10) is None

@@ -1,0 +1,234 @@
+"""What seams cost: creases, what is hidden, and weights of the user."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import shapes
+from test_seams import SURFACES, lengths_of, with_cones
+
+from coneflat import TriangleMesh, errors
+from coneflat.geometry import visibility, visible_share
+from coneflat.geometry.normals import dihedral_angles
+from coneflat.mesh import cut_open
+from coneflat.seams import edge_costs, find_seams
+
+
+def well(width=1.0, depth=1.0, wall=0.4, rows=12, around=32):
+    """A solid of revolution with a round well in its top, and the vertices in the middle of the well's bottom."""
+    profile = [
+        (0.02, -wall),
+        (width + wall, -wall),
+        (width + wall, depth),
+        (width, depth),
+        (width, 0.0),
+        (0.02, 0.0),
+    ]
+    steps = np.linspace(0, 1, rows, endpoint=False)[:, None]
+    corners = np.array(profile)
+    line = np.concatenate([p + steps * (q - p) for p, q in itertools.pairwise(corners)])
+    line = np.concatenate([line, corners[-1:]])
+    _, faces = shapes.grid(around, len(line) - 1, wrap=(True, False))
+    angle = 2 * np.pi * np.arange(around)[:, None] / around
+    vertices = np.stack(
+        [
+            line[:, 0] * np.cos(angle),
+            line[:, 0] * np.sin(angle),
+            np.broadcast_to(line[:, 1], (around, len(line))),
+        ],
+        axis=-1,
+    ).reshape(-1, 3)
+    return vertices, faces, np.arange(around) * len(line) + len(line) - 1
+
+
+class TestVisibility:
+    @pytest.mark.parametrize("shape", [shapes.sphere(2, 0.0), shapes.box(4)])
+    def test_all_of_a_convex_shape_can_be_seen(self, shape):
+        assert visible_share(*shape).min() > 0.97
+
+    @pytest.mark.parametrize("depth", [0.5, 2.0])
+    def test_from_the_bottom_of_a_well_one_sees_its_mouth(self, depth):
+        vertices, faces, bottom = well(depth=depth)
+        share = visible_share(vertices, faces)
+        # The view factor of a disk of radius 1 at this distance.
+        assert share[bottom].mean() == pytest.approx(1 / (1 + depth**2), abs=0.07)
+        outside = np.flatnonzero(np.hypot(*vertices[:, :2].T) > 1.39)
+        assert share[outside].min() > 0.97
+
+    def test_the_side_that_is_seen_better_counts(self):
+        vertices, faces, _ = well()
+        np.testing.assert_allclose(visible_share(vertices, faces[:, ::-1]), visible_share(vertices, faces))
+
+    def test_who_looks_from_above_sees_the_underside_badly(self):
+        vertices, faces = shapes.sphere(3, 0.0)
+        for up in ([0, 0, 1], [0, -3, 0]):
+            share = visible_share(vertices, faces, np.array(up))
+            height = vertices @ np.array(up) / np.linalg.norm(up)
+            # Integrals of (1 + z) / 2 by the cosine over the hemispheres of the top, the side and the underside.
+            np.testing.assert_allclose(share, 0.6 + 0.4 * height, atol=0.03)
+
+    def test_other_parts_hide_too(self):
+        ball, plate = shapes.sphere(3, 0.0), shapes.box(6, (4.0, 4.0, 0.1))
+        plate = plate[0] - plate[0].mean(axis=0) + [0, 0, 1.1], plate[1]
+        share = visible_share(*shapes.join(ball, plate))[: len(ball[0])]
+        assert share[np.argmax(ball[0][:, 2])] < 0.2
+        assert share[np.argmin(ball[0][:, 2])] > 0.97
+
+    def test_neither_numbers_nor_place_nor_size_matter(self):
+        vertices, faces = shapes.sphere(3, 0.6)
+        share = visible_share(vertices, faces)
+        assert share.min() < 0.95
+        for seed, size in ((1, 1e-6), (3, 1e6)):
+            moved, turned, new = shapes.renumber(vertices, faces, seed)
+            other = visible_share(size * (moved @ shapes.rotation(seed).T + [1, 2, 3]), turned)[new]
+            # A vertex on the edge of a pixel may fall to either side.
+            assert np.mean(np.abs(other - share) < 1e-6) > 0.99
+            assert np.abs(other - share).max() < 0.1
+
+    def test_more_directions_and_pixels_change_little(self, monkeypatch):
+        vertices, faces, _ = well()
+        share = visible_share(vertices, faces)
+        monkeypatch.setattr(visibility, "DIRECTIONS", 200)
+        monkeypatch.setattr(visibility, "PIXELS", 512)
+        assert np.sqrt(np.mean((visible_share(vertices, faces) - share) ** 2)) < 0.03
+
+    @pytest.mark.parametrize("up", [np.zeros(3), np.ones(2), np.array([0, np.nan, 1])])
+    def test_up_must_be_a_direction(self, up):
+        with pytest.raises(errors.OptionError, match="up is a direction"):
+            visible_share(*shapes.sphere(1), up)
+
+
+def test_ridges_bend_one_way_and_valleys_the_other():
+    mesh = TriangleMesh(*shapes.grid(12, 4, lambda x, y: 3 * np.abs(np.abs(x - 0.5) - 0.25)))
+    angles = dihedral_angles(mesh)
+    middle = mesh.vertices[mesh.edges].mean(axis=1)
+    along = np.ptp(mesh.vertices[mesh.edges][:, :, 0], axis=1) < 1e-9
+    inner = along & ~mesh.is_boundary_edge
+    bend = 2 * np.arctan(3)
+    np.testing.assert_allclose(angles[inner & np.isclose(middle[:, 0], 0.5)], bend)
+    for x in (0.25, 0.75):
+        np.testing.assert_allclose(angles[inner & np.isclose(middle[:, 0], x)], -bend)
+    assert np.count_nonzero(np.abs(angles) > 1e-9) == 3 * 4
+
+
+class TestCosts:
+    def test_without_constraints_they_are_lengths(self):
+        mesh = TriangleMesh(*shapes.sphere(2))
+        np.testing.assert_array_equal(edge_costs(mesh, lengths_of(mesh)), lengths_of(mesh))
+
+    def test_seams_of_a_box_run_along_its_edges_if_these_are_cheap(self):
+        mesh = TriangleMesh(*shapes.box(8, (1.0, 1.0, 1.0)))
+        corners = np.flatnonzero((np.abs(mesh.vertices - mesh.vertices.mean(axis=0)) > 0.49).all(axis=1))
+        assert len(corners) == 8
+        sharp = np.abs(dihedral_angles(mesh)) > 1
+        lengths = lengths_of(mesh)
+        # A tree of 7 of the 12 edges of the cube.
+        seams = find_seams(mesh, corners, edge_costs(mesh, lengths, creases=True))
+        assert sharp[seams].all()
+        assert lengths[seams].sum() == pytest.approx(7)
+        # Between opposite corners the way over the faces is shorter than that along three edges.
+        opposite = corners[
+            [0, np.argmax(np.linalg.norm(mesh.vertices[corners] - mesh.vertices[corners[0]], axis=1))]
+        ]
+        seams = find_seams(mesh, opposite, edge_costs(mesh, lengths, creases=True))
+        assert sharp[seams].all()
+        assert lengths[seams].sum() == pytest.approx(3)
+        assert lengths[find_seams(mesh, opposite, lengths)].sum() < 2.9
+
+    def test_full_creases_cost_a_tenth(self):
+        mesh = TriangleMesh(*shapes.box(4))
+        costs = edge_costs(mesh, lengths_of(mesh), creases=True) / lengths_of(mesh)
+        sharp = np.abs(dihedral_angles(mesh)) > 1
+        np.testing.assert_allclose(costs[sharp], 0.1)
+        np.testing.assert_allclose(costs[~sharp], 1.0)
+
+    def test_seams_hide(self):
+        mesh, cones = with_cones(shapes.genus(2), 5)
+        share, lengths = visible_share(mesh.vertices, mesh.faces), lengths_of(mesh)
+        costs = edge_costs(mesh, lengths, hiding=1)
+        plain, hidden = find_seams(mesh, cones, lengths), find_seams(mesh, cones, costs)
+        seen = [
+            np.average(share[mesh.edges[seams]].mean(axis=1), weights=lengths[seams])
+            for seams in (plain, hidden)
+        ]
+        assert seen[1] < seen[0] - 0.05
+        assert costs[hidden].sum() < costs[plain].sum()
+
+    def test_what_is_hidden_is_cheap(self):
+        vertices, faces, bottom = well(depth=3.0)
+        mesh = TriangleMesh(vertices, faces)
+        ratio = edge_costs(mesh, lengths_of(mesh), hiding=1) / lengths_of(mesh)
+        at_bottom = np.isin(mesh.edges, bottom).all(axis=1)
+        assert ratio[at_bottom].max() < 0.2
+        assert ratio.max() <= 1 + 1e-12
+        assert ratio.min() > 0
+        given = edge_costs(mesh, lengths_of(mesh), hiding=1, visibility=np.ones(len(vertices)))
+        valley = dihedral_angles(mesh) < -1e-3
+        assert (given[valley] < lengths_of(mesh)[valley]).all()
+        np.testing.assert_allclose(given[~valley], lengths_of(mesh)[~valley])
+        inside_out = TriangleMesh(vertices, faces[:, ::-1])
+        turned = edge_costs(inside_out, lengths_of(inside_out), hiding=1) / lengths_of(inside_out)
+        np.testing.assert_allclose(np.sort(turned), np.sort(ratio))
+
+    @pytest.mark.parametrize("kind", ["vertex", "edge"])
+    def test_seams_keep_to_what_the_user_makes_cheap(self, kind):
+        # A detour that is three times as long, at a tenth of the cost.
+        columns, rows = 20, 20
+        mesh, _ = with_cones(shapes.grid(columns, rows), 0)
+        at = lambda i, j: i * (rows + 1) + j  # noqa: E731
+        lane = [at(4, j) for j in range(4, 17)] + [at(i, 16) for i in range(4, 11)]
+        lane += [at(10, j) for j in range(4, 17)]
+        cheap = np.isin(np.arange(len(mesh.vertices)), lane)
+        if kind == "vertex":
+            weights = {"vertex_weights": np.where(cheap, 0.1, 1.0)}
+        else:
+            weights = {"edge_weights": np.where(cheap[mesh.edges].all(axis=1), 0.1, 1.0)}
+        # Far from the boundary, where leaving the grid is no way.
+        costs = edge_costs(mesh, lengths_of(mesh), **weights)
+        boundary = mesh.is_boundary_vertex[mesh.edges].any(axis=1)
+        costs[boundary] *= 100
+        seams = find_seams(mesh, np.array([at(4, 4), at(10, 4)]), costs)
+        inner = seams[~boundary[seams]]
+        on_lane = cheap[mesh.edges[inner]].all(axis=1)
+        assert on_lane.sum() >= 28  # of 30; corners are cut
+
+    def test_weights_of_zero_are_taken_for_small_ones(self):
+        mesh = TriangleMesh(*shapes.sphere(2))
+        weights = np.zeros(len(mesh.edges))
+        weights[:10] = 2.0
+        costs = edge_costs(mesh, lengths_of(mesh), edge_weights=weights)
+        np.testing.assert_allclose(costs[10:], lengths_of(mesh)[10:] * 2e-3)
+        assert cut_open(mesh, find_seams(mesh, np.array([3, 50, 80]), costs)).pieces == 1
+
+    @pytest.mark.parametrize(
+        ("constraints", "message"),
+        [
+            ({"hiding": np.inf}, "hiding must be a number from 0 to 10, not inf"),
+            (
+                {"vertex_weights": np.ones(3)},
+                r"vertex weights of seams must be 162 numbers, not of shape \(3,\)",
+            ),
+            ({"edge_weights": np.zeros(480)}, "not all 0; they are 0 to 0"),
+            ({"edge_weights": np.full(480, -1.0)}, "they are -1 to -1"),
+            ({"vertex_weights": np.full(162, np.nan)}, "must be finite"),
+        ],
+    )
+    def test_nonsense_is_refused(self, constraints, message):
+        mesh = TriangleMesh(*shapes.sphere(2))
+        with pytest.raises(errors.OptionError, match=message):
+            edge_costs(mesh, lengths_of(mesh), **constraints)
+
+    def test_costs_do_not_depend_on_numbers_place_or_size(self):
+        vertices, faces = SURFACES["genus 1"]
+        mesh = TriangleMesh(vertices, faces)
+        ratio = edge_costs(mesh, lengths_of(mesh), creases=True, hiding=1) / lengths_of(mesh)
+        for seed, size in ((1, 1e-6), (3, 1e6)):
+            moved, turned, new = shapes.renumber(vertices, faces, seed)
+            other = TriangleMesh(size * (moved @ shapes.rotation(seed).T + [1, 2, 3]), turned)
+            found = edge_costs(other, lengths_of(other), creases=True, hiding=1) / lengths_of(other)
+            ends = np.sort(new[mesh.edges], axis=1)
+            place = np.lexsort((ends[:, 1], ends[:, 0]))
+            same = np.lexsort((other.edges[:, 1], other.edges[:, 0]))
+            assert np.mean(np.isclose(found[same], ratio[place], rtol=1e-6)) > 0.98

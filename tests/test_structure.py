@@ -1,0 +1,152 @@
+"""The structure of the package: sizes that only go down, stages side by side, imports without circles."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections import defaultdict
+from graphlib import CycleError
+from pathlib import Path
+
+import pytest
+
+import coneflat
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
+from structure import (
+    STAGES,
+    Module,
+    imported_packages,
+    levels,
+    package_of,
+    read_modules,
+    size_of,
+    sizes,
+    total,
+)
+
+MODULES = read_modules()
+#: Lines of code per package, which only go down.
+CEILINGS = {
+    "": 120,
+    "__main__": 3,
+    "apps": 0,
+    "apps.ahead": 38,
+    "apps.batch": 408,
+    "apps.cli": 1550,
+    "apps.peers": 1463,
+    "apps.quads": 3356,
+    "apps.studio": 1780,
+    "apps.view": 1741,
+    "atlas": 1543,
+    "base": 349,
+    "cone_curve": 108,
+    "cones": 2062,
+    "evaluate": 195,
+    "flatten": 175,
+    "flattener": 35,
+    "geometry": 1756,
+    "io": 3062,
+    "layout": 2245,
+    "linalg": 468,
+    "measure": 828,
+    "measure_uv": 168,
+    "mesh": 715,
+    "metric": 991,
+    "options": 549,
+    "result": 97,
+    "sample": 5,
+    "seams": 178,
+    "source": 523,
+    "stages": 234,
+}
+#: The largest size of the core, and of everything.
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 166, 16_409, 267, 26_745
+CONSTANTS, KERNELS, NAMES, LEVELS = 318, 109, 30, 8
+#: Lines from which on a file may serve one other file alone.
+OWN_FILE = 80
+
+
+def is_core(name: str) -> bool:
+    return name.split(".")[0] not in ("apps", "__main__")
+
+
+def test_packages_are_within_their_ceilings():
+    found = {name: size.lines for name, size in sizes().items()}
+    assert {name: lines for name, lines in found.items() if lines > CEILINGS.get(name, 0)} == {}
+
+
+def test_the_whole_is_within_its_ceilings():
+    found = sizes()
+    core, everything = total(found, core=True), total(found, core=False)
+    assert (core.files <= CORE_FILES, core.lines <= CORE_LINES) == (True, True), core
+    assert (everything.files <= ALL_FILES, everything.lines <= ALL_LINES) == (True, True), everything
+    assert (everything.constants <= CONSTANTS, everything.kernels <= KERNELS) == (True, True), everything
+    assert len(coneflat.__all__) <= NAMES
+
+
+def test_packages_do_not_import_each_other_in_circles():
+    try:
+        found = levels(MODULES)
+    except CycleError as error:
+        pytest.fail(f"packages import each other in a circle: {' -> '.join(error.args[1])}")
+    assert max(level for name, level in found.items() if is_core(name)) <= LEVELS
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_stages_stand_side_by_side(stage: str):
+    assert imported_packages(MODULES)[stage] & {*STAGES, "options", "flatten"} == set()
+
+
+@pytest.mark.parametrize("name", sorted(name for name in MODULES if not is_core(name)))
+def test_applications_import_what_packages_export(name: str):
+    module = MODULES[name]
+    inside = {
+        other for other in module.imports | module.late_imports if is_core(other) and other.count(".") > 0
+    }
+    assert inside == set()
+
+
+@pytest.mark.parametrize("name", sorted(filter(is_core, MODULES)))
+def test_the_core_imports_no_application(name: str):
+    module = MODULES[name]
+    allowed = name in ("", "result", "__main__")
+    imported = set() if allowed else module.imports | module.late_imports
+    assert [other for other in imported if not is_core(other)] == []
+
+
+def test_a_file_for_one_other_is_large():
+    """But for formats, which have a file each."""
+    users = defaultdict(set)
+    for name, module in MODULES.items():
+        for other in module.imports | module.late_imports:
+            users[other].add(name)
+    small = {
+        name: size_of(module.path).lines
+        for name, module in MODULES.items()
+        if module.path.name != "__init__.py"
+        and len(users[name]) == 1
+        and not name.startswith("io.")
+        and len(module.path.read_text().split("\n")) <= OWN_FILE
+    }
+    assert small == {}
+
+
+def test_tests_mirror_the_packages():
+    tests = Path(__file__).parent
+    known = {package_of(name).replace(".", "/") for name in MODULES}
+    folders = {
+        path.parent.relative_to(tests).as_posix() for path in tests.rglob("test_*.py") if path.parent != tests
+    }
+    assert folders <= known
+
+
+def test_the_check_sees_what_it_should(tmp_path):
+    (tmp_path / "mesh.py").write_text("def late():\n    from .files import read\n")
+    (tmp_path / "files.py").write_text("from . import mesh\n")
+    found = read_modules(tmp_path)
+    assert found["mesh"] == Module("mesh", tmp_path / "mesh.py", frozenset(), frozenset({"files"}))
+    assert found["files"].imports == {"mesh"}
+    with pytest.raises(CycleError):
+        levels(found)
+    assert ast.parse((tmp_path / "mesh.py").read_text())
