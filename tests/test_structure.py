@@ -37,7 +37,7 @@ CEILINGS = {
     "apps.peers": 1463,
     "apps.quads": 3356,
     "apps.studio": 1780,
-    "apps.view": 1741,
+    "apps.view": 1749,
     "atlas": 1543,
     "base": 349,
     "cone_curve": 108,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 234,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 166, 16_409, 267, 26_745
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 166, 16_409, 267, 26_753
 CONSTANTS, KERNELS, NAMES, LEVELS = 318, 109, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

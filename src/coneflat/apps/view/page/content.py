@@ -51,11 +51,20 @@ def thin(
     # A cell holds about two triangles.
     size = float(np.sqrt(area / most))
     for _ in range(60):
-        new = _representatives(coordinates, kept, max(size, extent / CELLS))
-        corners = new[faces]
-        stay = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
-        # Where merging folds the plane, what runs forward covers all that what runs backward does.
-        stay[stay] = signed_double_areas(uv[corners[stay]]) * areas[stay] > 0
+        unmoved = kept
+        while True:
+            corners = _representatives(coordinates, unmoved, max(size, extent / CELLS))[faces]
+            stay = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+            folded = np.flatnonzero(stay)
+            folded = folded[signed_double_areas(uv[corners[folded]]) * areas[folded] <= 0]
+            # Where merging folds the plane, what runs forward covers all that what runs backward does; but a fold
+            # at an outline may reach over it, so the points there stay, too.
+            crossing = folded[kept[faces[folded]].any(axis=1) & ~unmoved[faces[folded]].all(axis=1)]
+            if not len(crossing):
+                break
+            unmoved = unmoved.copy()
+            unmoved[faces[crossing]] = True
+        stay[folded] = False
         count = int(stay.sum())
         if count <= most:
             chosen = np.flatnonzero(stay)
