@@ -15,11 +15,11 @@ from .base.progress import Stopwatch
 from .geometry.overlap import Overlaps
 from .measure.distortion import Distortion, curvature_errors, measure
 from .measure.guarantees import broken_promises
-from .measure.rotations import Rotations, measure_rotations
+from .measure.seam_data import Rotations, measure_rotations
 from .mesh.connectivity import TriangleMesh
 from .options import Options, settings
 from .result import Flattening
-from .source.numbering import result_numbering, turn_corners
+from .source.input_mesh import result_numbering, turn_corners
 from .stages import SolveStatistics
 
 if TYPE_CHECKING:

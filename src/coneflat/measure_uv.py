@@ -23,7 +23,7 @@ from .measure.report import MEASURES, path_text
 from .mesh.charts import joined_edges, label_charts
 from .mesh.check import CheckedMesh, check_mesh, left_out
 from .mesh.connectivity import TriangleMesh, corner_fans, end_corners
-from .source.numbering import at_unit_size
+from .source.input_mesh import at_unit_size
 
 #: Pairs of triangles that overlap, for each triangle and at least: beyond them areas are counted in pixels, as every
 #: triangle may lie on every other one.

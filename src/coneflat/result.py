@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
     from .io.mesh_file import MeshFile
     from .measure.distortion import Distortion
-    from .measure.rotations import Rotations
-    from .measure.seam_data import SeamData
+    from .measure.seam_data import Rotations, SeamData
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +196,7 @@ class Flattening:
             UnknownFormatError, MeshFileError: a file cannot be read or written.
         """
         from .apps.view.page.webpage import check_page, open_page, page_of, write_page
-        from .options.outputs import MOST_TRIANGLES
+        from .options.declared import MOST_TRIANGLES
 
         if path is not None:
             check_page(path)

@@ -9,7 +9,7 @@ import shapes
 from coneflat import check_mesh, errors, flatten
 from coneflat.geometry import corner_angles, edge_lengths
 from coneflat.geometry.handles import handle_loops, off_multiple, open_turning
-from coneflat.measure.rotations import measure_rotations
+from coneflat.measure.seam_data import measure_rotations
 
 QUARTER = np.pi / 2
 

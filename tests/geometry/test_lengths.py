@@ -8,8 +8,8 @@ import shapes
 
 from coneflat import TriangleMesh, check_mesh, errors
 from coneflat.geometry import edge_lengths
-from coneflat.geometry.lengths import check_lengths
-from coneflat.source.numbering import at_unit_size, lengths_of_input
+from coneflat.geometry.intrinsic import check_lengths
+from coneflat.source.input_mesh import at_unit_size, lengths_of_input
 
 TWO = TriangleMesh(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.0]]), np.array([[0, 1, 2], [1, 3, 2]]))
 #: Sides of the two triangles, each opposite its corner; they share the edge 1-2.

@@ -8,7 +8,7 @@ import pytest
 from coneflat.errors import ConeflatError, FaceIndexError, MeshFileError
 from coneflat.io import read_mesh, text
 from coneflat.io.obj_write import lines_of
-from coneflat.mesh.weld import weld
+from coneflat.mesh.check import weld
 
 OBJ = (
     b"\xef\xbb\xbf# C:\\models\\\r\no thing\r\nv 0 0 0\r\n  v 1 0.5 \\\r\n 1e-3 # a \\ b\r\nv 1 1 -0\r\nvt 0 0\r\n"

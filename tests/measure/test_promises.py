@@ -10,7 +10,7 @@ import shapes
 
 from coneflat import flatten
 from coneflat.apps.peers import flatten_by
-from coneflat.atlas.arrange import whole_turns
+from coneflat.atlas.pack import whole_turns
 from coneflat.errors import ArrayShapeError, FaceIndexError
 from coneflat.geometry import edge_lengths
 from coneflat.measure.distortion import measure

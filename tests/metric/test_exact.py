@@ -14,7 +14,7 @@ from coneflat.geometry.straight import straight_triangles
 from coneflat.metric.exact import double, exact_metric
 from coneflat.metric.hessian import HessianPattern
 from coneflat.metric.linear import scaled_lengths
-from coneflat.metric.newton import find_suspects
+from coneflat.metric.conformal import find_suspects
 
 
 def curvature_of(metric, is_boundary_vertex):

@@ -8,7 +8,7 @@ from spheres import cones_on, lengths_of, random_sphere
 
 from coneflat.geometry import cotangent_laplacian, cotangents
 from coneflat.metric.exact import exact_metric
-from coneflat.metric.preconditioner import conjugate_gradients, corrected
+from coneflat.metric.hessian import conjugate_gradients, corrected
 
 
 class Scaled:

@@ -11,7 +11,7 @@ from test_seams import SURFACES, lengths_of, with_cones
 
 from coneflat import TriangleMesh, errors
 from coneflat.geometry import visibility, visible_share
-from coneflat.geometry.normals import dihedral_angles
+from coneflat.geometry.triangles import dihedral_angles
 from coneflat.mesh import cut_open
 from coneflat.seams import edge_costs, find_seams
 

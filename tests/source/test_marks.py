@@ -8,8 +8,8 @@ import shapes
 
 import coneflat
 from coneflat import errors
-from coneflat.geometry.normals import dihedral_angles
 from coneflat.geometry.overlap import find_overlaps
+from coneflat.geometry.triangles import dihedral_angles
 from coneflat.mesh.connectivity import TriangleMesh, end_corners
 
 

@@ -1,10 +1,9 @@
 """Charts in the plane: how they are split and glued, how they lie, and their places in a texture."""
 
-from .arrange import arrange_charts
-from .chart_seams import ChartLayout, Seams
+from .charts import ChartLayout, Seams
 from .injective import injective_charts, separate_overlaps
 from .orient import orient_charts
-from .pack import Packed, pack_charts
+from .pack import Packed, arrange_charts, pack_charts
 from .split import overlap_layers, overlap_regions
 from .touch import part_touching
 

@@ -17,7 +17,7 @@ from ..base.progress import go_on
 from ..geometry.overlap import find_overlaps
 from ..geometry.planar import bounds, fill_bounds, signed_double_areas
 from ..mesh.connectivity import TriangleMesh
-from .chart_seams import ChartLayout, Seams, same_points
+from .charts import ChartLayout, Seams, same_points
 
 # Relative to the length of a seam edge: how far its two sides may be apart, moved together, to be glued.
 CONGRUENT = 1e-7

@@ -12,7 +12,7 @@ from ..geometry.overlap import overlaps_of_mesh
 from ..geometry.planar import signed_double_areas
 from ..mesh.connectivity import TriangleMesh
 from ..stages import Layout, SeamSpec
-from .chart_seams import ChartLayout, Seams
+from .charts import ChartLayout, Seams
 from .glue import glue_charts
 from .split import as_disk, split_overlaps, unpinched
 

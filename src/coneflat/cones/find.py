@@ -214,8 +214,7 @@ def _searched(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holo
         found = search.fewest(distortion, most) if count is None else search.best_of(count)
     else:
         from ..geometry.handles import open_turning
-        from .integer.align import align_handles
-        from .integer.search import quantise_cones
+        from .integer.search import align_handles, quantise_cones
 
         found = quantised = quantise_cones(
             search, spec.quantum, distortion=distortion, count=count, most=most

@@ -4,20 +4,26 @@ from .delaunay import euclidean_diagonal, intrinsic_delaunay, make_delaunay, rel
 from .handles import handle_loops
 from .intrinsic import IntrinsicTriangulation, halfedge_twins, intrinsic_triangulation
 from .nearest import Stars, slide_near, surface_distances
-from .normals import (
-    CREASE_COSINE,
-    corner_normals,
-    dihedral_angles,
-    face_normals,
-    unit_vectors,
-    vertex_normals,
-)
 from .operators import angle_defect, cotangent_laplacian, vertex_areas
 from .orientation import fill_orientations, orientation
 from .overlap import Overlaps, find_overlaps
 from .planar import as_complex, as_pairs, map_factors, sides_between, signed_angles, signed_double_areas
 from .straight import FlatTriangles, flat_triangles, straight_triangles
-from .triangles import corner_angles, cotangents, double_areas, edge_lengths, is_broken, mollify, slacks
+from .triangles import (
+    CREASE_COSINE,
+    corner_angles,
+    corner_normals,
+    cotangents,
+    dihedral_angles,
+    double_areas,
+    edge_lengths,
+    face_normals,
+    is_broken,
+    mollify,
+    slacks,
+    unit_vectors,
+    vertex_normals,
+)
 from .visibility import fill_nearest, visible_share
 
 __all__ = [

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..base.compiled import compiled
 from ..mesh.connectivity import TriangleMesh
-from .intrinsic import IntrinsicTriangulation, intrinsic_triangulation
-from .lengths import check_lengths
+from .intrinsic import IntrinsicTriangulation, check_lengths, intrinsic_triangulation
 
 
 @dataclass(frozen=True, eq=False)

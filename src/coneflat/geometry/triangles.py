@@ -11,11 +11,20 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats, dots
 from ..base.compiled import compiled
 from ..base.text import list_some, plural
 from ..errors import ArrayShapeError, DegenerateFaceError, FaceIndexError
-from ..mesh.connectivity import NEXT, PREVIOUS
+from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, corner_fans
+
+# Twice the area over the longest side squared. Lengths, rounded, know no smaller areas; the flattest triangles of
+# real scans have 1e-3.
+ZERO_AREA = 1e-7
+# What the triangle inequality is given to spare, in mean side lengths: enough for angles good to 1e-11.
+SLACK = 1e-5
+#: Cosine of the angle, about 53 degrees, by which faces bend at an edge that is drawn sharp: between the 42 degrees
+#: of an icosahedron, which stands for a ball, and the 60 of a hexagonal prism, which is meant to have edges.
+CREASE_COSINE = 0.6
 
 
 def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -99,13 +108,6 @@ def _perimeter(lengths: FloatArray) -> FloatArray:
     return perimeter
 
 
-# Twice the area over the longest side squared. Lengths, rounded, know no smaller areas; the flattest triangles of
-# real scans have 1e-3.
-ZERO_AREA = 1e-7
-# What the triangle inequality is given to spare, in mean side lengths: enough for angles good to 1e-11.
-SLACK = 1e-5
-
-
 def mollify(
     lengths: FloatArray, *, strict: bool = False, names: IntArray | None = None
 ) -> tuple[FloatArray, str | None]:
@@ -187,3 +189,55 @@ def fill_double_areas(lengths: FloatArray, areas: FloatArray) -> None:
             slack = slack_beside(lengths, t, i)
             product *= 0.0 if slack < 0.0 else slack  # what is no number stays so
         areas[t] = math.sqrt((lengths[t, 0] + lengths[t, 1] + lengths[t, 2]) * product) / 2
+
+
+def face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return (m, 3) normals of faces, as long as twice their areas."""
+    a, b, c = (np.take(vertices, faces[:, k], axis=0) for k in range(3))
+    return np.asarray(np.cross(b - a, c - a))
+
+
+def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return (n, 3) unit normals, each the mean of its faces' by area; 0 where there is none."""
+    return unit_vectors(sums_at(faces, face_normals(vertices, faces)[:, None], len(vertices)))
+
+
+def corner_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return (m, 3, 3) the unit normal at each corner: the mean by angle of faces joined to it across no crease."""
+    flat = unit_vectors(face_normals(vertices, faces))
+    pairs = TriangleMesh(vertices, faces).edge_halfedges
+    pairs = pairs[pairs[:, 1] >= 0]
+    smooth = pairs[dots(flat[pairs[:, 0] // 3], flat[pairs[:, 1] // 3]) > CREASE_COSINE]
+    count, fan = corner_fans(faces, smooth[:, 0], smooth[:, 1])
+    weights = flat[:, None, :] * corner_angles(edge_lengths(vertices, faces))[:, :, None]
+    return unit_vectors(sums_at(fan, weights, count))[fan]
+
+
+def sums_at(places: IntArray, vectors: FloatArray, count: int) -> FloatArray:
+    """Return (count, 3) for each place the sum of the vectors at it, of (m, 3) places and (m, 3 or 1, 3) vectors."""
+    each = np.broadcast_to(vectors, (*places.shape, 3))
+    return np.stack([np.bincount(places.ravel(), each[..., k].ravel(), count) for k in range(3)], axis=1)
+
+
+def unit_vectors(vectors: FloatArray) -> FloatArray:
+    """Return vectors of length one, of (k, 3) of any size; 0 for those without a direction."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        # Squares of the largest component's parts neither overflow nor vanish.
+        scaled = vectors / np.maximum(np.abs(vectors).max(axis=1, keepdims=True), np.finfo(float).tiny)
+        lengths = np.linalg.norm(scaled, axis=1, keepdims=True)
+    is_vector = np.isfinite(lengths) & (lengths > 0)
+    return np.where(is_vector, scaled / np.where(is_vector, lengths, 1), 0.0)
+
+
+def dihedral_angles(mesh: TriangleMesh) -> FloatArray:
+    """Return (e,) the angle between the normals of the faces beside each edge, radians; 0 on the boundary.
+
+    Where the faces run counterclockwise seen from outside, it is positive on ridges and negative in valleys.
+    """
+    normals = face_normals(mesh.vertices, mesh.faces)
+    one, two = normals[mesh.edge_faces[:, 0]], normals[mesh.edge_faces[:, 1]]
+    side = mesh.edge_halfedges[:, 0]
+    along = mesh.vertices[mesh.heads[side]] - mesh.vertices[mesh.tails[side]]
+    across = np.cross(one, two)
+    angles = np.arctan2(np.sqrt(dots(across, across)), dots(one, two))
+    return np.where(mesh.is_boundary_edge, 0.0, np.where(dots(across, along) < 0, -angles, angles))

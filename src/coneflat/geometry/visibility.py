@@ -10,7 +10,7 @@ from ..base.arrays import BoolArray, FloatArray, IntArray, dots
 from ..base.compiled import compiled
 from ..errors import OptionError
 from ..mesh.ties import own_axes
-from .normals import vertex_normals
+from .triangles import vertex_normals
 
 # Directions to look from, evenly spread, and pixels along the side of each picture.
 DIRECTIONS, PIXELS = 64, 256

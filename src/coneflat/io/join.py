@@ -18,8 +18,8 @@ from ..base.text import plural
 from ..errors import OptionError
 from ..geometry.triangulate import triangulate
 from ..mesh.check import is_left_out, left_out
+from ..mesh.check import weld as number_places
 from ..mesh.connectivity import label_components, sort_pairs
-from ..mesh.weld import weld as number_places
 from .mesh_file import MeshFile
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
-from ..geometry.normals import face_normals, sums_at, unit_vectors, vertex_normals
+from ..geometry.triangles import face_normals, sums_at, unit_vectors, vertex_normals
+from ..mesh.check import weld
 from ..mesh.polygons import polygon_of
-from ..mesh.weld import weld
 from .mesh_file import MeshFile
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from .atomic import as_path
 
 if TYPE_CHECKING:
     from ..measure.distortion import Distortion
-    from ..measure.rotations import Rotations
+    from ..measure.seam_data import Rotations
     from ..result import Flattening
 
 
@@ -140,7 +140,7 @@ def _distortion(reading: CheckedArrays, report: dict[str, Any], count: int) -> D
 
 
 def _rotations(report: dict[str, Any]) -> Rotations | None:
-    from ..measure.rotations import Rotations
+    from ..measure.seam_data import Rotations
 
     if report["rotation_deviation"] is None:
         return None

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.text import shown
 from ..errors import ConeflatError, EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
-from ..mesh.weld import weld as weld_vertices
+from ..mesh.check import weld as weld_vertices
 from .atomic import as_path, known_ending
 from .gltf.read import parse_gltf
 from .join import Joined, join_borders

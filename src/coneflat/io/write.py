@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from ..errors import OptionError, UnknownFormatError
-from ..options.outputs import FORMATS
+from ..options.declared import FORMATS
 from .atomic import atomic_write, checked_target
 from .gltf.write import write_glb
 from .npz import write_npz

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..base.arrays import BoolArray, FloatArray, IntArray, dots
 from ..base.compiled import compiled
 from ..errors import ArrayShapeError
-from ..geometry.lengths import check_lengths
+from ..geometry.intrinsic import check_lengths
 from ..geometry.overlap import Overlaps, overlaps_of_mesh
 from ..geometry.straight import place_triangles
 from ..mesh.charts import both_sides, joined_edges, label_charts

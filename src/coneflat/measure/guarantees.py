@@ -14,7 +14,7 @@ from ..geometry.overlap import Overlaps
 from ..geometry.planar import sides_between
 from ..mesh.connectivity import TriangleMesh
 from .distortion import angle_sum_errors, measure
-from .rotations import Rotations, seam_rotations
+from .seam_data import Rotations, seam_rotations
 
 if TYPE_CHECKING:
     from ..result import Flattening

@@ -10,13 +10,12 @@ from numpy.typing import ArrayLike
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats
 from ..base.text import list_some, plural
 from ..errors import ArrayShapeError, CurvatureError, NonFiniteError
-from ..geometry.intrinsic import IntrinsicTriangulation, double, intrinsic_triangulation
-from ..geometry.lengths import check_lengths
+from ..geometry.intrinsic import IntrinsicTriangulation, check_lengths, double, intrinsic_triangulation
 from ..geometry.straight import FlatTriangles, straight_triangles
 from ..geometry.triangles import double_areas
 from ..mesh.connectivity import TriangleMesh
-from .newton import ConformalProblem, State, find_scale
-from .preconditioner import Inverse
+from .conformal import ConformalProblem, State, find_scale
+from .hessian import Inverse
 
 # How far, in radians, prescribed curvatures may miss Gauss-Bonnet; decimals typed by hand are good to more.
 SUM_TOLERANCE = 1e-8

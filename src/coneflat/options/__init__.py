@@ -4,7 +4,10 @@ from ..base.defaults import LEAST_QUANTUM, MOST_PREFERENCE
 from .combined import Options
 from .declared import (
     CONES,
+    FORMATS,
+    MOST_TRIANGLES,
     PAPER,
+    SHOWS,
     WIDEST_CONE,
     ConeBounds,
     ConeNumber,
@@ -35,7 +38,6 @@ from .kinds import (
     as_whole,
     strength,
 )
-from .outputs import FORMATS, MOST_TRIANGLES, SHOWS
 from .reading import read_options, settings, takes
 
 __all__ = [

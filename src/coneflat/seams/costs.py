@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from ..base.arrays import FloatArray
 from ..base.defaults import MOST_PREFERENCE
 from ..errors import OptionError
-from ..geometry.normals import dihedral_angles
 from ..geometry.operators import at_safe_scale
+from ..geometry.triangles import dihedral_angles
 from ..geometry.visibility import visible_share
 from ..mesh.connectivity import TriangleMesh
 from ..stages import SeamSpec

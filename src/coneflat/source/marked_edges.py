@@ -9,14 +9,13 @@ import numpy as np
 from ..base.arrays import BoolArray, IntArray
 from ..base.text import list_some, plural
 from ..errors import OptionError, SeamError
-from ..geometry.normals import dihedral_angles
+from ..geometry.triangles import dihedral_angles
 from ..mesh.charts import point_seams
 from ..mesh.check import CheckedMesh
 from ..mesh.connectivity import TriangleMesh, label_components
 from ..mesh.ties import tie_key
 from ..options import Options
-from .input_mesh import InputMesh
-from .numbering import turn_corners
+from .input_mesh import InputMesh, turn_corners
 
 # Of a vertex: what its key adds to the size of a place.
 TIE_BREAK = 1e-6

@@ -20,9 +20,8 @@ from ..mesh.open_mesh import CutMesh, open_along
 from ..options import Options
 from ..stages import ConeSpec, MetricSpec, SeamSpec
 from .constraints import Constraints, locate_constraints
-from .input_mesh import InputMesh
+from .input_mesh import InputMesh, at_unit_size, lengths_of_input, turn_corners
 from .marked_edges import effective_marks, forbidden_edges, marked_edges, out_of_reach
-from .numbering import at_unit_size, lengths_of_input, turn_corners
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import pytest
 from browsing import NARROW, WIDE, Visit, thing
 
 from coneflat.apps.view.page.content import content_of
-from coneflat.options.outputs import SHOWS
+from coneflat.options.declared import SHOWS
 
 
 def colour_at(visit, u, v):

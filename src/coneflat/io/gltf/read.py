@@ -12,7 +12,7 @@ import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
 from ...errors import EmptyMeshError
-from ...mesh.weld import weld
+from ...mesh.check import weld
 from ..mesh_file import MeshFile
 from ..raw import triangle_offsets
 from .data import GltfData

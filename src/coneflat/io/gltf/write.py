@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from ...geometry.normals import vertex_normals
+from ...geometry.triangles import vertex_normals
 from ..normals import shading_normals, source_normals
 from ..texture import Texture
 from ..uv_split import split_at_seams

@@ -21,15 +21,15 @@ from ...base.arrays import (
 from ...base.text import plural
 from ...errors import ArrayShapeError, ConvergenceError, OptionError
 from ...geometry import double_areas, edge_lengths
-from ...geometry.lengths import check_lengths
+from ...geometry.intrinsic import check_lengths
 from ...geometry.planar import as_complex, as_pairs, signed_double_areas
 from ...geometry.straight import place_triangles
 from ...mesh.connectivity import TriangleMesh
 from .constraints import PointConstraints, check_constraints
+from .descent import TURNING_STRIDE, descend
 from .elements import Elements
 from .energies import Energy, StretchEnergy
 from .motions import find_motions
-from .newton import TURNING_STRIDE, descend
 
 # Part of the energy above the least that a step must promise to gain to be taken, and steps at most.
 TOLERANCE, STEPS = 1e-3, 100

@@ -14,8 +14,7 @@ from ..geometry.delaunay import make_delaunay
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..linalg import Factor, factorize
 from ..linalg.newton import HALVINGS, Limits, Point, minimise
-from .hessian import HessianPattern
-from .preconditioner import HeldInverse, Inverse, conjugate_gradients, corrected
+from .hessian import HeldInverse, HessianPattern, Inverse, conjugate_gradients, corrected
 
 # Residual, radians, below which nothing is left to gain: the rounding of a sum of a few angles.
 GOAL = 1e-13
