@@ -39,9 +39,9 @@ CEILINGS = {
     "apps.studio": 1780,
     "apps.view": 1749,
     "atlas": 1527,
-    "base": 349,
+    "base": 350,
     "cone_curve": 108,
-    "cones": 2054,
+    "cones": 2057,
     "evaluate": 195,
     "flatten": 175,
     "flattener": 35,
@@ -52,7 +52,7 @@ CEILINGS = {
     "measure": 823,
     "measure_uv": 168,
     "mesh": 712,
-    "metric": 984,
+    "metric": 986,
     "options": 551,
     "result": 96,
     "sample": 5,
@@ -61,8 +61,8 @@ CEILINGS = {
     "stages": 234,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 156, 16_362, 257, 26_706
-CONSTANTS, KERNELS, NAMES, LEVELS = 318, 109, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 156, 16_368, 257, 26_712
+CONSTANTS, KERNELS, NAMES, LEVELS = 321, 109, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

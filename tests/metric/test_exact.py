@@ -11,10 +11,10 @@ from coneflat import TriangleMesh, errors
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
 from coneflat.geometry.intrinsic import intrinsic_triangulation
 from coneflat.geometry.straight import straight_triangles
+from coneflat.metric.conformal import find_suspects
 from coneflat.metric.exact import double, exact_metric
 from coneflat.metric.hessian import HessianPattern
 from coneflat.metric.linear import scaled_lengths
-from coneflat.metric.conformal import find_suspects
 
 
 def curvature_of(metric, is_boundary_vertex):

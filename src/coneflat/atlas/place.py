@@ -18,8 +18,8 @@ from .charts import Outlines
 COLUMNS, COLUMNS_PER_CHART, MOST_CELLS = 500, 24.0, 4_000_000
 # Changes that are tried, and work that ends them earlier, in comparisons of runs of cells: about a second.
 TRIES, WORK = 300, 40_000_000
-# So few charts may keep to the right, too. Of more, that does harm.
-FEW = 5
+# So few charts may keep to the right, too, and one does in this part of the tries. Of more, that does harm.
+FEW, SET_ASIDE = 5, 0.3
 # Of more charts than MANY, those whose boxes differ by less than this factor count as alike.
 MANY, ALIKE = 1000, 1.02
 # The grid is so much wider than charts without gaps would need, and than the longest of them; no round number, so that
@@ -266,7 +266,7 @@ def _changed(way: Way, may: BoolArray, rng: np.random.Generator) -> Way:
     for chart in (rng.random(1 + int(2 * rng.random())) * count).astype(np.int64):
         shapes = slice(chart * turns, (chart + 1) * turns)
         allowed[shapes] = may[shapes] & (rng.random(turns) < rng.choice([0.3, 0.6, 1.0]))
-    if count <= FEW and rng.random() < 0.3:
+    if count <= FEW and rng.random() < SET_ASIDE:
         aside[int(rng.random() * count)] = rng.choice([0.0, rng.random(), 1.0])
     return Way(order, allowed, aside)
 

@@ -12,5 +12,7 @@ RESOLUTION, PADDING = 1024, 2.0
 # A preference for hidden places of 1 makes seams ten times cheaper; with a factor of more than 1e10, the
 # lengths of seams are beneath the rounding of their costs.
 MOST_PREFERENCE = 10.0
+# Radians, or shares, by which a number typed with seven digits is off.
+TYPED = 1e-6
 # Radians: finer quanta than this restrict nothing that could be told from none, as multiples are known to 1e-6.
 LEAST_QUANTUM = 1e-4

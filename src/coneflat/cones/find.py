@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from ..base.arrays import FloatArray
+from ..base.defaults import TYPED
 from ..base.progress import Stopwatch
 from ..base.text import plural
 from ..base.threads import HUGE
@@ -17,7 +18,7 @@ from ..mesh.ties import mesh_tie_key
 from ..stages import ConeSolution, ConeSpec, Surface
 from .given import cones_at, cones_with_curvature, fitted_cones
 from .greedy import greedy_cones
-from .solution import TYPED, check_enough, check_feasible
+from .solution import check_enough, check_feasible
 
 if TYPE_CHECKING:
     from .integer.search import QuantisedCones

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.defaults import TYPED
 from ..errors import CurvatureError
 from ..stages import ConeSolution
-from .solution import TYPED, GroundedLaplacian, target_from_log_scale
+from .solution import GroundedLaplacian, target_from_log_scale
 
 if TYPE_CHECKING:
     from .sparse.linear_model import LinearModel

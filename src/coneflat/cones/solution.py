@@ -15,8 +15,6 @@ FULL_TURN = 2 * np.pi
 # Values that differ by this share or less, and radians, are equal: symmetric surfaces have many that differ by rounding
 # only, and the first in the order of vertices is taken.
 TIE = 1e-9
-# Radians, or shares, by which a number typed with seven digits is off.
-TYPED = 1e-6
 
 
 class GroundedLaplacian:

@@ -84,7 +84,7 @@ def _upright(axes: FloatArray, up: FloatArray) -> FloatArray:
         raise OptionError(f"up is a direction, three numbers that are not all 0, not {up.tolist()}")
     up = up / length
     flat = axes - np.outer(axes @ up, up)
-    first = flat[np.argmax(np.linalg.norm(flat, axis=1) > 0.5)]
+    first = flat[np.argmax(np.linalg.norm(2 * flat, axis=1) > 1)]
     first = first / np.linalg.norm(first)
     return np.stack([first, np.cross(up, first), up])
 

@@ -47,7 +47,7 @@ def own_axes(vertices: FloatArray) -> FloatArray:
     for vector in (*_own_vectors(_centred(vertices)), *np.eye(3)):
         if vector is not None and len(axes) < 2:
             rest = vector - sum(axis * (axis @ vector) for axis in axes)
-            if np.linalg.norm(rest) > 0.5:
+            if np.linalg.norm(2 * rest) > 1:
                 axes.append(rest / np.linalg.norm(rest))
     return np.stack([axes[0], axes[1], np.cross(axes[0], axes[1])])
 

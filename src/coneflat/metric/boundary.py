@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
+from ..base.defaults import TYPED
 from ..errors import CurvatureError
 from ..mesh.connectivity import TriangleMesh
 
@@ -99,7 +100,7 @@ def prescribed_boundary(
     if len(corners):
         values[corners] = np.where(np.isnan(curvatures), needed / len(corners), curvatures)
         found = float(values.sum())
-        if abs(found - needed) > 1e-6:
+        if abs(found - needed) > TYPED:
             raise CurvatureError(
                 f"the corners' curvatures must sum to {needed / np.pi:.6g} pi, but sum to {found / np.pi:.6g} pi"
             )

@@ -12,6 +12,8 @@ from ..stages import ConeSolution, FlatMetric, SolveStatistics
 
 # Layouts square lengths: shorter ones are lost in double precision.
 LEAST_LENGTH = 1e-150
+# |x| below which three terms of a series are sinh(x) / x to rounding.
+SERIES = 1e-3
 
 
 def linear_flat_metric(
@@ -73,7 +75,7 @@ def scaled_lengths(
 
 def _sinhc(x: FloatArray) -> FloatArray:
     """Return sinh(x) / x."""
-    small = np.abs(x) < 1e-3  # the next term of the series is below 1e-16 there
+    small = np.abs(x) < SERIES
     safe = np.where(small, 1.0, x)
     result: FloatArray = np.where(small, 1 + x**2 / 6 * (1 + x**2 / 20), np.sinh(safe) / safe)
     return result

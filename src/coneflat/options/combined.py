@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..base.defaults import LEAST_QUANTUM
+from ..base.defaults import LEAST_QUANTUM, TYPED
 from ..errors import OptionError
 from .declared import WIDEST_CONE, AtlasOptions, ConeOptions, MetricOptions, RunOptions, SeamOptions
 
@@ -56,7 +56,7 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
                 yield "a straight boundary gets its corners from the search: use cones 'sparse'"
         if quantum is None and self.correct_handles:
             yield "rotations along handles are made whole for quantised cones only: give quantise, pi/2 say"
-        if quantum is not None and not LEAST_QUANTUM <= quantum <= 2 * math.pi * (1 + 1e-6):
+        if quantum is not None and not LEAST_QUANTUM <= quantum <= 2 * math.pi * (1 + TYPED):
             yield (
                 f"the quantum must be from {LEAST_QUANTUM:g} radians, below which it restricts nothing, to 2 pi, not "
                 f"{quantum:g}"

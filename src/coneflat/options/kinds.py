@@ -204,7 +204,7 @@ class Direction(Kind):
         direction = direction.astype(np.float64)
         largest = np.abs(direction).max()
         # The squared length of what is used must be neither 0 nor infinite in double precision.
-        x, y, z = (direction if 1e-100 < largest < 1e100 else direction / largest).tolist()
+        x, y, z = (direction if abs(np.frexp(largest)[1]) < 300 else direction / largest).tolist()
         return x, y, z
 
 

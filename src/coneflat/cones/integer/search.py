@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
-from ...base.defaults import DISTORTION, LEAST_QUANTUM
+from ...base.defaults import DISTORTION, LEAST_QUANTUM, TYPED
 from ...errors import CurvatureError, OptionError
 from ...geometry.handles import off_multiple
 from ...stages import ConeSolution
-from ..solution import FULL_TURN, TYPED
+from ..solution import FULL_TURN
 from ..sparse.dense_model import GAIN
 from ..sparse.exact_model import ROUNDS, WORTHWHILE
 from ..sparse.search import COARSE_DOUBT, ConeSearch

@@ -22,6 +22,8 @@ from .limits import Limits
 
 # A set must lower E^2 by this share to replace one of its size: rounding must not decide.
 GAIN = 1e-6
+# Part of a cone's own energy that the others must leave, or it depends on them.
+DEPENDENT = 1e-10
 # So many cones more that bring E^2 down by less than this factor are no use: bounds are in the way.
 STALL, STALLED = 10, 0.99
 
@@ -190,7 +192,7 @@ class DenseModel:
         change, which = np.full(len(members), np.inf), np.full(len(members), -1)
         diagonal, places = self.gram.diagonal(), np.flatnonzero(self._inside(members, fitted))
         remain, rows, kept = self._project(members[places])
-        is_moved = (places >= len(self.fixed)) & (kept * diagonal[members[places]] > 1e-10)
+        is_moved = (places >= len(self.fixed)) & (kept * diagonal[members[places]] > DEPENDENT)
         is_open = self.usable.copy()
         is_open[members] = False
         candidates = np.flatnonzero(is_open)

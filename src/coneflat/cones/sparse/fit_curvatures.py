@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
+from ..solution import TIE
 
 # What is added to the diagonal, as a share of its largest entry: cones on neighbouring vertices are nearly dependent.
 SMALLEST_PIVOT = 1e-13
@@ -32,7 +33,7 @@ def fit_curvatures(
     """
     has_sum = not math.isnan(total)
     if not len(slope):
-        return np.zeros(0), 0.0, not has_sum or abs(total) < 1e-9
+        return np.zeros(0), 0.0, not has_sum or abs(total) < TIE
     slack = 1e-12 * (1.0 + abs(total))
     feasible = not has_sum or bool(least.sum() - slack <= total <= most.sum() + slack)
     if not feasible:

@@ -10,7 +10,7 @@ import numpy as np
 from ...base.arrays import BoolArray, IntArray
 from ...base.text import plural
 from ...errors import CurvatureError, OptionError
-from ..solution import FULL_TURN
+from ..solution import FULL_TURN, TIE
 
 # More cones than these, beside the required ones, are not searched for: a seam through them all is no use.
 MOST_CONES = 200
@@ -74,7 +74,7 @@ class Limits:
     @property
     def fewest(self) -> int:
         """The least number of cones that can carry the total."""
-        if not self.has_sum or abs(self.total) < 1e-9:
+        if not self.has_sum or abs(self.total) < TIE:
             return 0
         bound = self.most if self.total > 0 else self.least
         return math.ceil(self.total / bound - 1e-9) if math.isfinite(bound) else 1
