@@ -135,7 +135,7 @@ def evaluate(
     curvature = _curvature(prepared, laid_out, numbering)
     cones = numbering.renumber([one.cones for one in laid_out])
     with watch("measure"):
-        layout, distortion = _measure(prepared, laid_out, mesh, layout, curvature, cones, options, overlaps)
+        layout, distortion = _measure(prepared, mesh, layout, curvature, cones, options, overlaps)
         rotations = _rotations(laid_out, layout.uv[layout.own], options)
     result = Flattening(
         vertices=numbering.positions,
@@ -231,7 +231,6 @@ def _curvature(prepared: Prepared, laid_out: Sequence[Layout], numbering: _Numbe
 
 def _measure(
     prepared: Prepared,
-    laid_out: Sequence[Layout],
     mesh: TriangleMesh,
     layout: _Layout,
     curvature: _Curvature,

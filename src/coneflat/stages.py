@@ -175,25 +175,6 @@ class RelaxSpec:
         return self.extent == "off" and not self.stretch
 
 
-@dataclass(frozen=True)
-class PackSpec:
-    """How charts are packed into a texture.
-
-    Attributes:
-        resolution: texels along a side.
-        padding: texels between charts.
-        tiles: UDIM tiles.
-        up: direction in space that is up in the texture, or None.
-        quantum: rotations of charts that keep seams turning by multiples of it, radians; None for any.
-    """
-
-    resolution: int
-    padding: float
-    tiles: int
-    up: tuple[float, float, float] | None
-    quantum: float | None
-
-
 @dataclass(eq=False)
 class Surface:
     """A connected mesh with n vertices and m faces, and the operators of its metric.

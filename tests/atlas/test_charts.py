@@ -7,10 +7,10 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_flow
 
 import coneflat
-from coneflat.atlas import ChartLayout, Seams, injective_charts, overlap_layers
+from coneflat.atlas import ChartLayout, Seams, injective_charts
 from coneflat.atlas.glue import glue_charts
 from coneflat.atlas.sheet import Sheet
-from coneflat.atlas.split import largest_layers, split_overlaps
+from coneflat.atlas.split import _label_ordered, _layers, largest_layers, split_overlaps
 from coneflat.geometry.overlap import find_overlaps
 from coneflat.mesh.charts import label_charts
 from coneflat.mesh.connectivity import TriangleMesh
@@ -195,22 +195,15 @@ class TestSplit:
         large = np.bincount(split_overlaps(points, faces, costs, areas, pairs, 0.2 * len(faces))).min()
         assert small < 0.2 * len(faces) <= large
 
-    def test_layers_are_disjoint_and_the_pairs_lie_between_them(self):
-        points, faces = spiral()
-        pairs = find_overlaps(points, faces).pairs
-        layers = overlap_layers(pairs, faces)
-        assert len(layers) == 1
-        one, other = layers[0]
-        assert not len(np.intersect1d(one, other))
-        assert (np.isin(pairs[:, 0], one) != np.isin(pairs[:, 0], other)).all()
-        assert overlap_layers(pairs[:0], faces) == []
-
     @pytest.mark.parametrize("seed", range(2))
-    def test_the_largest_layers_are_those_of_all_regions(self, seed):
+    def test_layers_are_disjoint_and_the_largest_of_all_regions(self, seed):
         """Of crumpled paper, whose overlaps are many, and some of them wound up."""
         disk, _, pairs = crumpled(18, seed)
         areas = np.random.default_rng(seed).uniform(1, 2, len(disk.faces))
-        every = overlap_layers(pairs, disk.faces)
+        count, region = _label_ordered(pairs, disk.faces)
+        # Each region is there twice, its layers in either order.
+        every = [_layers(pairs, np.flatnonzero(region == i)) for i in range(count)]
+        assert all(not len(np.intersect1d(one, other)) for one, other in every)
         assert len(every) > 2
         sizes = [min(areas[one].sum(), areas[other].sum()) for one, other in every]
         for found, largest in zip(

@@ -9,7 +9,7 @@ import shapes
 
 import coneflat
 from coneflat import errors
-from coneflat.atlas import overlap_regions, part_touching
+from coneflat.atlas import part_touching
 from coneflat.geometry import coverage
 from coneflat.geometry.orientation import fill_orientations
 from coneflat.geometry.overlap import find_overlaps, snug_boxes
@@ -187,7 +187,6 @@ def test_spiral_overlaps_if_its_pitch_is_less_than_its_width():
     points, faces = spiral(2.2, 0.9)
     overlaps = find_overlaps(points, faces)
     assert overlaps.fraction == pytest.approx(sampled(points[faces]), abs=2e-3)
-    assert overlap_regions(overlaps.pairs, faces)[0] == 1
     upside_down = find_overlaps(points, faces[:, ::-1])
     np.testing.assert_array_equal(upside_down.pairs, overlaps.pairs)
     assert upside_down.area == pytest.approx(overlaps.area, rel=1e-12)
@@ -223,7 +222,6 @@ def test_triangles_of_very_different_size():
     assert np.abs(apart).min() >= 53
     assert len(np.unique(overlaps.pairs)) == 2 * 2 * 6 * 100
     assert overlaps.fraction == pytest.approx(0.1, abs=5e-3)
-    assert overlap_regions(overlaps.pairs, faces)[0] == 1
 
 
 def test_renumbering_renumbers_the_pairs():
@@ -304,24 +302,6 @@ def test_long_triangles_askew(angle):
     np.testing.assert_array_equal(find_overlaps(corners).pairs, np.stack([expected, expected + 1], axis=1))
 
 
-def test_regions():
-    # Two strips that cross at two places, and a third that touches both.
-    strip, faces = shapes.grid(40, 2)
-    bar = strip[:, :2] * [10, 1]
-    arch = np.stack(
-        [5 + (3 + strip[:, 1]) * np.cos(np.pi * strip[:, 0]), 4 * np.sin(np.pi * strip[:, 0]) - 0.5], 1
-    )
-    points = np.concatenate([bar, arch, bar - [0, 1]])
-    triangles = np.concatenate([faces, faces + len(bar), faces + 2 * len(bar)])
-    pairs = find_overlaps(points, triangles).pairs
-    pairs = pairs[pairs[:, 1] < 2 * len(faces)]
-    count, region = overlap_regions(pairs, triangles)
-    assert count == 2
-    side = points[triangles[pairs[:, 0]]].mean(axis=1)[:, 0] > 5
-    assert (region[side] != region[~side][0]).all()
-    assert overlap_regions(pairs[:0], triangles)[0] == 0
-
-
 def test_overlaps_of_a_layout_begin_at_its_seams():
     result = coneflat.flatten(*shapes.genus(2), charts="one")
     overlaps = find_overlaps(result.uv, result.uv_faces)
@@ -330,12 +310,6 @@ def test_overlaps_of_a_layout_begin_at_its_seams():
     by_corner = find_overlaps(result.corner_uv)
     np.testing.assert_array_equal(by_corner.pairs, overlaps.pairs)
     assert by_corner.area == pytest.approx(overlaps.area, abs=1e-15)
-    # Only triangles at seams can be the first to overlap.
-    count, region = overlap_regions(overlaps.pairs, result.uv_faces)
-    mesh = coneflat.TriangleMesh(np.zeros((len(result.uv), 3)), result.uv_faces)
-    at_border = np.zeros(len(result.faces), dtype=bool)
-    at_border[mesh.edge_faces[mesh.is_boundary_edge, 0]] = True
-    assert set(region[at_border[overlaps.pairs].any(axis=1)].tolist()) == set(range(count))
 
 
 @pytest.mark.parametrize(
@@ -357,24 +331,3 @@ def test_bad_input_is_refused(points, triangles, kind, message):
 def test_bad_limit_is_refused():
     with pytest.raises(errors.OptionError, match="1 or more, not 0"):
         find_overlaps(np.zeros((1, 3, 2)), limit=0)
-
-
-@pytest.mark.parametrize(
-    ("pairs", "triangles", "kind", "message"),
-    [
-        ([0, 1], [[0, 1, 2]] * 2, errors.ArrayShapeError, r"shape \(k, 2\), not \(2,\)"),
-        ([["a", "b"]], [[0, 1, 2]] * 2, errors.ArrayShapeError, "pairs must be an array of numbers"),
-        (
-            [[0, 2]],
-            [[0, 1, 2]] * 2,
-            errors.FaceIndexError,
-            r"1 pair with an index outside 0\.\.1: 0; pair 0 is \(0, 2\)",
-        ),
-        ([[1, 0]], [[0, 1, 2]] * 2, errors.OptionError, "sorted"),
-        ([[0, 2], [0, 1]], [[0, 1, 2]] * 3, errors.OptionError, "sorted"),
-        ([[0, 1]], [[0, 1]], errors.ArrayShapeError, r"faces must have the shape \(m, 3\)"),
-    ],
-)
-def test_bad_pairs_are_refused(pairs, triangles, kind, message):
-    with pytest.raises(kind, match=message):
-        overlap_regions(pairs, triangles)

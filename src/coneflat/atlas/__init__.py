@@ -4,7 +4,6 @@ from .charts import ChartLayout, Seams
 from .injective import injective_charts, separate_overlaps
 from .orient import orient_charts
 from .pack import Packed, arrange_charts, pack_charts
-from .split import overlap_layers, overlap_regions
 from .touch import part_touching
 
 __all__ = [
@@ -14,8 +13,6 @@ __all__ = [
     "arrange_charts",
     "injective_charts",
     "orient_charts",
-    "overlap_layers",
-    "overlap_regions",
     "pack_charts",
     "part_touching",
     "separate_overlaps",

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..base.arrays import FloatArray, IntArray, as_faces, as_floats
+from ..base.arrays import FloatArray, IntArray
 from ..base.progress import go_on
-from ..base.text import list_some, plural
-from ..errors import ArrayShapeError, FaceIndexError, OptionError
 from ..mesh.connectivity import (
     NEXT,
     TriangleMesh,
@@ -126,61 +123,6 @@ def unpinched(mesh: TriangleMesh) -> TriangleMesh:
     vertices = np.empty((count, 2))
     vertices[fans] = mesh.vertices[mesh.faces]
     return TriangleMesh(vertices, fans)
-
-
-def overlap_regions(pairs: ArrayLike, triangles: ArrayLike) -> tuple[int, IntArray]:
-    """Return the number of regions where a layout overlaps itself, and (k,) the region of each pair.
-
-    Two pairs are neighbours where they have a triangle in common, and their other triangles share a side: the
-    overlap goes on across it. Where two layers have sides in common, it ends for this purpose.
-
-    Args:
-        pairs: (k, 2) as in `Overlaps`: sorted, the smaller index first.
-        triangles: (m, 3) the points at their corners, by which they share sides.
-
-    Raises:
-        MeshError: an array has the wrong shape, or an index is none of a triangle.
-        OptionError: the pairs are not sorted.
-    """
-    faces = as_faces(triangles, np.iinfo(np.int64).max)
-    ways = _checked_pairs(pairs, len(faces))
-    source, place = _steps(ways, faces)
-    return label_components(len(ways), source // 2, place // 2)
-
-
-def _checked_pairs(pairs: ArrayLike, count: int) -> IntArray:
-    """Return (k, 2) pairs of m triangles, if they are as `find_overlaps` has them."""
-    values = as_floats("pairs", pairs)
-    if values.ndim != 2 or values.shape[1] != 2:
-        raise ArrayShapeError(f"pairs must have the shape (k, 2), not {values.shape}")
-    bad = np.flatnonzero(~((values >= 0) & (values < count) & (values == np.floor(values))).all(axis=1))
-    if len(bad):
-        one, two = values[bad[0]]
-        raise FaceIndexError(
-            f"{plural(len(bad), 'pair')} with an index outside 0..{count - 1}: {list_some(bad)}; pair {bad[0]} is "
-            f"({one:g}, {two:g})"
-        )
-    known = values.astype(np.int64)
-    keys = known @ [count, 1]
-    if (known[:, 0] >= known[:, 1]).any() or (np.diff(keys) <= 0).any():
-        raise OptionError(
-            "pairs must be sorted, each once, the smaller index first, as find_overlaps returns them"
-        )
-    return known
-
-
-def overlap_layers(pairs: IntArray, triangles: IntArray) -> list[tuple[IntArray, IntArray]]:
-    """Return for each region the triangles of its two layers: sets that are connected, without a common member.
-
-    Where an overlap is wound up so that its layers go over into each other, they are one of its pairs.
-    """
-    if not len(pairs):
-        return []
-    count, label = _label_ordered(pairs, triangles)
-    order = sort_by_counting(label, count)
-    regions = np.split(order, np.cumsum(np.bincount(label, minlength=count))[:-1])
-    # An odd one is the same region in the other order.
-    return [_layers(pairs, members) for members in regions if members[0] % 2 == 0]
 
 
 def largest_layers(pairs: IntArray, triangles: IntArray, areas: FloatArray) -> tuple[IntArray, IntArray]:
