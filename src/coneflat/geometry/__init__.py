@@ -3,7 +3,6 @@
 from .delaunay import euclidean_diagonal, intrinsic_delaunay, make_delaunay, relink
 from .handles import handle_loops
 from .intrinsic import IntrinsicTriangulation, halfedge_twins, intrinsic_triangulation
-from .nearest import Stars, slide_near, surface_distances
 from .operators import angle_defect, cotangent_laplacian, vertex_areas
 from .orientation import fill_orientations, orientation
 from .overlap import Overlaps, find_overlaps
@@ -31,7 +30,6 @@ __all__ = [
     "FlatTriangles",
     "IntrinsicTriangulation",
     "Overlaps",
-    "Stars",
     "angle_defect",
     "as_complex",
     "as_pairs",
@@ -62,9 +60,7 @@ __all__ = [
     "signed_angles",
     "signed_double_areas",
     "slacks",
-    "slide_near",
     "straight_triangles",
-    "surface_distances",
     "unit_vectors",
     "vertex_areas",
     "vertex_normals",

@@ -22,9 +22,9 @@ from grid_maps import (
 from shapes import grid as rectangle
 
 from coneflat.apps.quads.extract import extract_quads
+from coneflat.apps.quads.nearest import surface_distances
 from coneflat.apps.quads.quality import measure_quads
 from coneflat.errors import GridError
-from coneflat.geometry.nearest import surface_distances
 
 
 def oriented_sides(quads):

@@ -13,12 +13,12 @@ from shapes import grid as rectangle
 from coneflat import flatten
 from coneflat.apps.quads.aligned import aligned, split_edges
 from coneflat.apps.quads.extract import extract_quads
+from coneflat.apps.quads.nearest import Stars, slide_near
 from coneflat.apps.quads.quad_mesh import least_jacobians
 from coneflat.apps.quads.quality import measure_quads
 from coneflat.apps.quads.smooth import smooth_quads
 from coneflat.apps.quads.untangle import lift_worst, untangled
 from coneflat.errors import OptionError
-from coneflat.geometry.nearest import Stars, slide_near
 from coneflat.geometry.planar import signed_double_areas
 from coneflat.geometry.triangles import double_areas, edge_lengths
 from coneflat.layout.relax.seam_chains import find_chains

@@ -10,7 +10,8 @@ import numpy as np
 
 from ... import TriangleMesh
 from ...base import FloatArray, dots
-from ...geometry import edge_lengths, surface_distances
+from ...geometry import edge_lengths
+from .nearest import surface_distances
 from .quad_mesh import QuadMesh, least_jacobians
 
 

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from ...base import BoolArray, FloatArray, IntArray, dots
 from ...errors import OptionError
-from ...geometry import Stars, slide_near
 from ...mesh import NEXT
 from .features import edge_indices
+from .nearest import Stars, slide_near
 from .options import ROUNDS
 from .quad_mesh import QuadMesh, least_jacobians
 from .untangle import lift_worst

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...base import BoolArray, FloatArray, IntArray, dots
-from ...geometry import Stars, slide_near
+from .nearest import Stars, slide_near
 from .quad_mesh import QuadMesh, least_jacobians
 
 

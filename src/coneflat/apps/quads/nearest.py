@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arrays import FloatArray, IntArray
-from ..base.compiled import compiled
+from ...base import FloatArray, IntArray, compiled
 
 # Triangles in a box of the lowest level.
 LEAF = 4
