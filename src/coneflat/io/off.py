@@ -11,8 +11,7 @@ import numpy as np
 
 from ..base.arrays import IntArray
 from ..errors import MeshFileError
-from .mesh_file import MeshFile
-from .raw import offsets_of
+from .mesh_file import MeshFile, offsets_of
 from .text import Growing, TextBlock, text_blocks
 
 # Normals follow the position, then colours and texture coordinates, so that these can be passed over; "4" and "n"

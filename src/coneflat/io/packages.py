@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import OptionError
-from .uv_split import split_at_seams
+from .split import split_at_seams
 
 if TYPE_CHECKING:
     from ..result import Flattening

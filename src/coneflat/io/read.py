@@ -13,17 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from ..base.text import shown
-from ..errors import ConeflatError, EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
+from ..errors import EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
 from ..mesh.weld import weld as weld_vertices
-from .atomic import as_path, known_ending
+from .files import PIPE, as_path, known_ending, read_bytes, read_input, readable
 from .gltf.read import parse_gltf
 from .join import Joined, join_borders
-from .mesh_file import MeshFile
-from .normals import usable_normals
+from .mesh_file import MeshFile, check_corners
 from .obj import parse_obj
 from .off import is_off, parse_off
 from .ply import parse_ply
-from .raw import PIPE, check_corners, read_bytes, read_input
+from .split import usable_normals
 from .stl import is_stl, parse_stl
 
 _READERS: dict[str, Callable[[Path, bytes], MeshFile]] = {
@@ -100,18 +99,10 @@ def read_mesh_from(
         raise UnknownFormatError(
             f"{ending!r} is no format that meshes are read from: {', '.join(INPUT_FORMATS)}"
         )
-    try:
+    with readable(path, f"{ending[1:].upper()} file"):
         with np.errstate(invalid="ignore"):  # coordinates that are no numbers are passed on
             mesh = _READERS[ending](path, content)
         check_corners(path, mesh)
-    except (ConeflatError, MemoryError):
-        raise
-    except Exception as error:
-        # Whatever a damaged file makes a parser do, the caller sees one kind of error.
-        reason = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())[:200]
-        raise MeshFileError(
-            f"{path} is not a readable {ending[1:].upper()} file: {reason or type(error).__name__}"
-        ) from error
     normal = None
     if mesh.normals is not None and mesh.normal is not None:
         normal = usable_normals(mesh.normals, mesh.normal)

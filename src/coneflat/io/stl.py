@@ -10,7 +10,6 @@ import numpy as np
 from ..base.arrays import FloatArray
 from ..errors import EmptyMeshError, MeshFileError
 from .mesh_file import MeshFile
-from .raw import triangle_offsets
 from .text import Growing, text_blocks
 
 _HEADER_BYTES = 84
@@ -48,7 +47,7 @@ def parse_stl(path: Path, content: bytes) -> MeshFile:
         raise MeshFileError(f"{path} is not an STL file: it is shorter than the header of one")
     if not len(points):
         raise EmptyMeshError(f"{path} has no faces")
-    return MeshFile(path, points, np.arange(len(points), dtype=np.int64), triangle_offsets(len(points) // 3))
+    return MeshFile(path, points, np.arange(len(points), dtype=np.int64), np.arange(0, len(points) + 1, 3))
 
 
 def _text_points(path: Path, content: bytes) -> FloatArray:

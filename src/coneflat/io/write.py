@@ -9,11 +9,11 @@ from typing import IO, TYPE_CHECKING
 
 from ..errors import OptionError, UnknownFormatError
 from ..options.outputs import FORMATS
-from .atomic import atomic_write, checked_target
+from .files import atomic_write, checked_target
 from .gltf.write import write_glb
 from .npz import write_npz
-from .obj_write import write_obj
-from .ply_write import write_ply
+from .obj import write_obj
+from .ply import write_ply
 from .texture import find_texture
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from ..errors import MeshFileError
 from ..measure.guarantees import DOUBLE, SINGLE, remeasured
 from ..mesh.polygons import polygon_of
 from .convex_pieces import find_pieces
-from .gltf.scene_write import scene_losses
+from .gltf.write import scene_losses
 
 if TYPE_CHECKING:
     from ..result import Flattening

@@ -1,4 +1,4 @@
-"""Writing a file so that it is there in full or not at all."""
+"""The content of files, and writing a file so that it is there in full or not at all."""
 
 from __future__ import annotations
 
@@ -6,14 +6,83 @@ import glob
 import os
 import secrets
 import shutil
+import stat
+import sys
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 from typing import IO, Any
 
-from ..errors import ConeflatError, MeshFileError, UnknownFormatError
-from .raw import PIPE
+from ..errors import ConeflatError, EmptyMeshError, MeshFileError, UnknownFormatError
+
+#: Stands for standard input, and for standard output.
+PIPE = Path("-")
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the content of a file.
+
+    Raises:
+        MeshFileError: there is no such file, it is a directory, or it may not be read.
+        EmptyMeshError: the file is empty.
+    """
+    try:
+        mode = path.stat().st_mode
+        # Devices, pipes and sockets may never end, or never begin: opening a pipe waits for who writes to it.
+        is_file = stat.S_ISREG(mode) or stat.S_ISDIR(mode)
+        content = path.read_bytes() if is_file else b""
+    except FileNotFoundError as error:
+        why = ": it is a link that leads nowhere" if path.is_symlink() else ""
+        raise MeshFileError(f"{path}: there is no such file{why}") from error
+    except (IsADirectoryError, PermissionError) as error:
+        reason = "is a folder, not a file" if os.path.isdir(path) else "may not be read (no permission)"
+        raise MeshFileError(f"{path} {reason}") from error
+    except (OSError, ValueError) as error:
+        raise MeshFileError(f"{path} cannot be read: {_reason(error)}") from error
+    if not is_file:
+        raise MeshFileError(
+            f"{path} is not a file but a device, a pipe or a socket; give - to read from a pipe"
+        )
+    if not content or content.isspace():
+        raise EmptyMeshError(f"{path} is empty")
+    return content
+
+
+def read_input() -> bytes:
+    """Return what comes in on standard input.
+
+    Raises:
+        MeshFileError: that is a terminal, or cannot be read.
+        EmptyMeshError: nothing comes in.
+    """
+    if sys.stdin is None or sys.stdin.isatty():
+        raise MeshFileError(
+            "- stands for a mesh on standard input, and there is none: pipe a file into the command"
+        )
+    try:
+        content = sys.stdin.buffer.read()
+    except OSError as error:
+        raise MeshFileError(f"standard input cannot be read: {_reason(error)}") from error
+    if not content or content.isspace():
+        raise EmptyMeshError("nothing came in on standard input")
+    return content
+
+
+@contextmanager
+def readable(path: Path, kind: str) -> Iterator[None]:
+    """Make one kind of error of whatever a damaged file makes a parser do; kind: what it should be, "PLY file".
+
+    Raises:
+        MeshFileError: the block ends by an exception that is neither of the package's own nor a lack of memory.
+    """
+    try:
+        yield
+    except (ConeflatError, MemoryError):
+        raise
+    except Exception as error:
+        reason = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())[:200]
+        raise MeshFileError(f"{path} is not a readable {kind}: {reason or type(error).__name__}") from error
 
 
 def as_path(path: object) -> Path:
@@ -43,6 +112,19 @@ def known_ending(path: Path, endings: Collection[str], what: str) -> str:
     return ending
 
 
+def moved_path(name: bytes, here: str, there: str) -> bytes:
+    """Return a path relative to another folder that leads where one relative to the first did; slashes part it."""
+    if os.path.isabs(name):
+        return name
+    full = os.path.join(os.fsencode(here), name)
+    try:
+        relative = os.path.relpath(full, os.fsencode(there))
+    except ValueError:
+        # On another drive nothing but the full path leads there.
+        relative = full
+    return relative.replace(os.fsencode(os.sep), b"/")
+
+
 def check_target(path: str | PathLike[str]) -> Path:
     """Return the file that a path names, links followed, if it looks as if it could be written.
 
@@ -57,21 +139,20 @@ def check_target(path: str | PathLike[str]) -> Path:
         target = Path(os.path.realpath(path))
         folder = target.parent
         if not folder.is_dir():
-            raise MeshFileError(f"{path} cannot be written: there is no folder {folder}; create it first")
-        if target.is_dir():
-            raise MeshFileError(f"{path} cannot be written: it is a folder")
-        if target.exists():
-            if not target.is_file():
-                raise MeshFileError(f"{path} cannot be written: it is not an ordinary file")
-            if not os.access(target, os.W_OK):
-                raise MeshFileError(f"{path} cannot be written: no permission to change it")
-        if not os.access(folder, os.W_OK):
-            raise MeshFileError(f"{path} cannot be written: no permission to write in {folder}")
-    except ConeflatError:
-        raise
+            reason = f"there is no folder {folder}; create it first"
+        elif target.is_dir():
+            reason = "it is a folder"
+        elif target.exists() and not target.is_file():
+            reason = "it is not an ordinary file"
+        elif target.exists() and not os.access(target, os.W_OK):
+            reason = "no permission to change it"
+        elif not os.access(folder, os.W_OK):
+            reason = f"no permission to write in {folder}"
+        else:
+            return target
     except (OSError, ValueError) as error:
-        raise _failure(path, error) from error
-    return target
+        raise MeshFileError(f"{path} cannot be written: {_reason(error)}") from error
+    raise MeshFileError(f"{path} cannot be written: {reason}")
 
 
 def checked_target(path: str | PathLike[str], endings: Collection[str], what: str) -> Path:
@@ -128,7 +209,7 @@ def atomic_write(path: str | PathLike[str], mode: str = "wb") -> Iterator[IO[Any
     except ConeflatError:
         raise
     except OSError as error:
-        raise _failure(as_path(path), error) from error
+        raise MeshFileError(f"{as_path(path)} cannot be written: {_reason(error)}") from error
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -143,10 +224,6 @@ def remove_unfinished(path: str | PathLike[str]) -> None:
     for left in target.parent.glob(_temporary(glob.escape(target.name[:100]), "?" * 12)):
         with suppress(OSError):
             left.unlink()
-
-
-def _failure(path: Path, error: Exception) -> MeshFileError:
-    return MeshFileError(f"{path} cannot be written: {_reason(error)}")
 
 
 def _reason(error: Exception) -> str:
