@@ -12,17 +12,16 @@ from .files import (
     remove_unfinished,
 )
 from .gltf.write import FOR_INDICES, FOR_VERTICES, MATERIAL, Glb, bounds
-from .input_mesh import as_input
 from .join import Joined
 from .mapped import Mapped, as_mapped, has_uv, of_file
 from .npz import CheckedArrays, number, read_archive, read_flattening
 from .obj import lines_of, parse_obj
+from .packages import as_input
 from .ply import write_parts
 from .read import INPUT_FORMATS, find_meshes, read_joined, read_mesh, read_mesh_from
 from .split import shading_normals, split_at_seams
 from .texture import CELLS, DARK_CELL, LIGHT_CELL, Texture, cell_side, check_cells, read_picture
-from .write import OUTPUT_FORMATS, check_output, write_flattening, write_measured, write_stream
-from .written import as_written
+from .write import OUTPUT_FORMATS, as_written, check_output, write_flattening, write_measured, write_stream
 
 __all__ = [
     "of_file",

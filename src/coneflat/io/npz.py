@@ -23,7 +23,6 @@ from ..errors import MeshFileError
 from .files import as_path, read_bytes, readable
 
 if TYPE_CHECKING:
-    from ..measure.distortion import Distortion
     from ..measure.rotations import Rotations
     from ..result import Flattening
 
@@ -70,10 +69,12 @@ def read_flattening(path: str | PathLike[str]) -> Flattening:
 
 
 def _flattening(reading: CheckedArrays) -> Flattening:
+    from ..measure.distortion import Distortion
+    from ..measure.report import MEASURES
     from ..result import Flattening
     from ..stages import SolveStatistics
 
-    path, arrays = reading.path, reading.arrays
+    path, arrays, floats, indices = reading.path, reading.arrays, reading.floats, reading.indices
     for name in _NAMES:
         if name not in arrays:
             what = "UVs" if name.startswith("uv") else "result of coneflat"
@@ -82,20 +83,25 @@ def _flattening(reading: CheckedArrays) -> Flattening:
             )
     report = json.loads(str(arrays["report"]))
     arrays.setdefault("prescribed", np.full(len(arrays["vertices"]), np.nan))
-    _check_report(report)
-    vertices, uv = reading.floats("vertices", (None, 3)), reading.floats("uv", (None, 2))
+    for name, kind in {"seconds": dict, "settings": dict, "notes": list}.items():
+        if not isinstance(report[name], kind):
+            raise ValueError(f"{name!r} of its report is a {type(report[name]).__name__}")
+    notes, efficiency = reading.notes(report), number(report["packing_efficiency"])
+    for value in report["seconds"].values():
+        number(value)
+    vertices, uv = floats("vertices", (None, 3)), floats("uv", (None, 2))
     n, u = len(vertices), len(uv)
-    faces = reading.indices("faces", (None, 3), n)
+    faces = indices("faces", (None, 3), n)
     m = len(faces)
-    uv_faces = reading.indices("uv_faces", (m, 3), u)
-    cones = reading.indices("cones", (None,), n)
+    uv_faces, cones = indices("uv_faces", (m, 3), u), indices("cones", (None,), n)
     if not m:
         raise MeshFileError(f"{path} is no result of coneflat: it has no faces")
     if not (np.isfinite(vertices).all() and np.isfinite(uv).all()):
         raise MeshFileError(f"{path} is no result of coneflat: it has positions or UVs that are not finite")
-    uv_scale = float(reading.floats("uv_scale", ()))
+    uv_scale = float(floats("uv_scale", ()))
     if not (np.isfinite(uv_scale) and uv_scale > 0):
         raise MeshFileError(f"{path} is no result of coneflat: its UV scale is {uv_scale:g}")
+    measures: dict[str, Any] = {name: number(report.get(name)) for name in MEASURES}
     return Flattening(
         vertices=vertices,
         faces=faces,
@@ -103,47 +109,25 @@ def _flattening(reading: CheckedArrays) -> Flattening:
         uv_faces=uv_faces,
         uv_scale=uv_scale,
         cones=cones,
-        curvatures=reading.floats("curvatures", (len(cones),)),
-        log_scale=reading.floats("log_scale", (n,)),
-        prescribed=reading.floats("prescribed", (n,)),
-        curvature_residual=reading.floats("curvature_residual", (n,)),
-        seams=reading.indices("seams", (None, 2), n),
-        packing_efficiency=number(report["packing_efficiency"]),
-        distortion=_distortion(reading, report, m),
+        curvatures=floats("curvatures", (len(cones),)),
+        log_scale=floats("log_scale", (n,)),
+        prescribed=floats("prescribed", (n,)),
+        curvature_residual=floats("curvature_residual", (n,)),
+        seams=indices("seams", (None, 2), n),
+        packing_efficiency=efficiency,
+        distortion=Distortion(
+            qc=floats("qc", (m,)), log_area_scale=floats("log_area_scale", (m,)), **measures
+        ),
         seconds=report["seconds"],
-        notes=tuple(report["notes"]),
+        notes=notes,
         settings=report["settings"],
         solve=SolveStatistics(
             **{field.name: number(report.get(field.name, field.default)) for field in fields(SolveStatistics)}
         ),
         rotations=_rotations(report),
-        vertex_origin=reading.indices("vertex_origin", (n,), None),
-        face_origin=reading.indices("face_origin", (m,), None),
-        lengths=reading.floats("lengths", (m, 3)) if "lengths" in arrays else None,
-    )
-
-
-def _check_report(report: Any) -> None:
-    """Raise ValueError if what a report says in words or lists is none of these."""
-    kinds = {"seconds": dict, "settings": dict, "notes": list}
-    for name, kind in kinds.items():
-        if not isinstance(report[name], kind):
-            raise ValueError(f"{name!r} of its report is a {type(report[name]).__name__}")
-    if not all(isinstance(one, str) for one in report["notes"]):
-        raise ValueError("its report has notes that are no text")
-    for value in (report["packing_efficiency"], *report["seconds"].values()):
-        number(value)
-
-
-def _distortion(reading: CheckedArrays, report: dict[str, Any], count: int) -> Distortion:
-    from ..measure.distortion import Distortion
-    from ..measure.report import MEASURES
-
-    numbers: dict[str, Any] = {name: number(report.get(name)) for name in MEASURES}
-    return Distortion(
-        qc=reading.floats("qc", (count,)),
-        log_area_scale=reading.floats("log_area_scale", (count,)),
-        **numbers,
+        vertex_origin=indices("vertex_origin", (n,), None),
+        face_origin=indices("face_origin", (m,), None),
+        lengths=floats("lengths", (m, 3)) if "lengths" in arrays else None,
     )
 
 
@@ -187,10 +171,10 @@ class CheckedArrays:
             MeshFileError: it has another shape, or is of no numbers.
         """
         values = self.arrays[name]
-        lengths = [
-            np.shape(values)[i : i + 1] == (length,) or length is None for i, length in enumerate(shape)
-        ]
-        if values.dtype.kind not in "iuf" or values.ndim != len(shape) or not all(lengths):
+        fits = len(shape) == values.ndim and all(
+            length in (None, given) for length, given in zip(shape, values.shape, strict=True)
+        )
+        if values.dtype.kind not in "iuf" or not fits:
             wanted = ", ".join("any" if length is None else f"{length}" for length in shape)
             raise MeshFileError(
                 f"{self.path}: {name!r} has the shape {values.shape} and the type {values.dtype}, not the shape "
@@ -219,9 +203,7 @@ class CheckedArrays:
         """
         values = self.floats(name, shape)
         end = 2**53 if bound is None else bound
-        if values.size and not (
-            values.min() >= least and values.max() < end and np.all(values == np.floor(values))
-        ):
+        if not np.all((values >= least) & (values < end) & (values == np.floor(values))):
             there = "indices can be" if bound is None else f"the {bound} there are"
             raise MeshFileError(f"{self.path}: {name!r} has indices beyond {there}")
         return values.astype(np.int64)
