@@ -81,7 +81,7 @@ class GltfData:
         if not isinstance(tree, dict):
             raise MeshFileError(f"{path} is not a glTF file: its JSON is no object")
         self.tree: dict[str, Any] = tree
-        version = str(self.entry(tree, "asset", dict, {}).get("version", "2.0"))
+        version = str(self.entry(tree, "asset", dict).get("version", "2.0"))
         if not version.startswith("2."):
             raise MeshFileError(f"{path} is glTF of version {version[:20]}; convert it to version 2.0")
         self._buffers = self._find_buffers(binary)
@@ -106,9 +106,9 @@ class GltfData:
         """
         raise MeshFileError(f"{self.path}: {reason}")
 
-    def entry(self, item: dict[str, Any], name: str, kind: type[Any], default: Any = None) -> Any:
-        """Return what an object has under a name, a list or an object; another kind of thing is refused."""
-        value = item.get(name, default) if isinstance(item, dict) else None
+    def entry(self, item: dict[str, Any], name: str, kind: type[Any]) -> Any:
+        """Return the list or the object that an object has under a name, or an empty one; others are refused."""
+        value = item.get(name, kind()) if isinstance(item, dict) else None
         if not isinstance(value, kind):
             self.fail(f"{name!r} is no {'list' if kind is list else 'object'} where there should be one")
         return value
@@ -124,10 +124,14 @@ class GltfData:
             self.fail(f"number {index} of its {name} is no object")
         return dict[str, Any](every[index])
 
+    def items(self, name: str) -> Iterator[dict[str, Any]]:
+        """Yield the objects of one of the tree's lists."""
+        return (self.item(name, i) for i in range(len(self.entry(self.tree, name, list))))
+
     def view(self, index: Any) -> memoryview:
         """Return the bytes of a buffer view."""
         view = self.item("bufferViews", index)
-        buffer = self._buffers[self._buffer_index(view.get("buffer"))]
+        buffer = self._buffer_of(view)
         start, length = self.count(view, "byteOffset", 0), self.count(view, "byteLength")
         if buffer is None:
             self.fail(f"buffer view {index} has no data")
@@ -165,14 +169,14 @@ class GltfData:
             rows = self._with_sparse(index, self.entry(item, "sparse", dict), rows, form.kind)
         return rows
 
-    def values(self, index: Any, columns: int | None = None) -> FloatArray:
+    def values(self, index: Any, columns: int) -> FloatArray:
         """Return (count, columns) an array of vectors as doubles; whole numbers that stand for fractions as these.
 
         Raises:
             MeshFileError: as of `raw`; or it has another number of columns.
         """
         form = self.accessor(index)
-        if form.columns != 1 or (columns is not None and form.rows != columns):
+        if form.columns != 1 or form.rows != columns:
             self.fail(f"accessor {index} has {form.rows * form.columns} numbers per element, not {columns}")
         numbers = np.ascontiguousarray(self.raw(index)).view(form.kind).astype(np.float64)
         if self.item("accessors", index).get("normalized") and form.kind.kind in "iu":
@@ -216,7 +220,7 @@ class GltfData:
     ) -> NDArray[np.uint8]:
         """Return an array with those elements replaced that the accessor lists."""
         count = self.count(sparse, "count")
-        where, new = self.entry(sparse, "indices", dict, {}), self.entry(sparse, "values", dict, {})
+        where, new = self.entry(sparse, "indices", dict), self.entry(sparse, "values", dict)
         form = COMPONENTS.get(self.count(where, "componentType"))
         if form is None or form[1] != "u":
             self.fail(f"the sparse indices of accessor {index} have an unknown type")
@@ -232,8 +236,7 @@ class GltfData:
         """Return the content of each buffer; None of one that only stands for compressed data."""
         known: dict[Path, bytes] = {}
         buffers: list[bytes | None] = []
-        for i in range(len(self.entry(self.tree, "buffers", list, []))):
-            item = self.item("buffers", i)
+        for i, item in enumerate(self.items("buffers")):
             uri, length = item.get("uri"), self.count(item, "byteLength")
             if uri is None:
                 found = binary if i == 0 else None
@@ -245,17 +248,14 @@ class GltfData:
                 self.fail(f"buffer {i} is at {uri[:60]!r}, and nothing is loaded from anywhere")
             else:
                 path = self.beside(uri)
-                found = known[path] if path in known else known.setdefault(path, self._external(path, i))
+                try:
+                    found = known[path] = known[path] if path in known else read_bytes(path)
+                except ConeflatError as error:
+                    raise MeshFileError(f"{self.path}: buffer {i} is not to be had: {error}") from error
             if found is not None and len(found) < length:
                 self.fail(f"buffer {i} has {len(found):,} of the {length:,} bytes it should have")
             buffers.append(found)
         return buffers
-
-    def _external(self, path: Path, index: int) -> bytes:
-        try:
-            return read_bytes(path)
-        except ConeflatError as error:
-            raise MeshFileError(f"{self.path}: buffer {index} is not to be had: {error}") from error
 
     def decoded(self, uri: str, what: str) -> bytes:
         """Return what a data URI holds."""
@@ -267,17 +267,16 @@ class GltfData:
         except (binascii.Error, ValueError) as error:
             raise MeshFileError(f"{self.path}: the data URI of {what} is broken: {error}") from error
 
-    def _buffer_index(self, index: Any) -> int:
-        self.item("buffers", index)
-        return int(index)
+    def _buffer_of(self, view: dict[str, Any]) -> bytes | None:
+        self.item("buffers", view.get("buffer"))
+        return self._buffers[view["buffer"]]
 
     def _refuse_compressed(self) -> None:
         """Refuse views of which there are compressed data only."""
-        for i in range(len(self.entry(self.tree, "bufferViews", list, []))):
-            view = self.item("bufferViews", i)
+        for view in self.items("bufferViews"):
+            extensions = self.entry(view, "extensions", dict)
             for name in COMPRESSED:
-                packed = self.entry(view, "extensions", dict, {}).get(name)
-                if packed is not None and self._buffers[self._buffer_index(view.get("buffer"))] is None:
+                if extensions.get(name) is not None and self._buffer_of(view) is None:
                     self.fail(f"its data are compressed ({name}); save it without compression")
 
 
@@ -325,17 +324,16 @@ def check_references(data: GltfData) -> None:
         MeshFileError, KeyError, TypeError, AttributeError: respectively.
     """
     for name in _LISTS:
-        for i in range(len(data.entry(data.tree, name, list, []))):
-            item = data.item(name, i)
-            data.entry(item, "extensions", dict, {})
+        for i, item in enumerate(data.items(name)):
+            data.entry(item, "extensions", dict)
             if name == "bufferViews":
                 data.view(i)
             elif name == "meshes":
-                data.entry(item, "primitives", list, [])
+                data.entry(item, "primitives", list)
             elif name == "nodes" and "mesh" in item:
                 data.item("meshes", item["mesh"])
     for name in ("extensionsUsed", "extensionsRequired"):
-        data.entry(data.tree, name, list, [])
+        data.entry(data.tree, name, list)
     for name, index in _references(data):
         data.item(name, index)
     for accessor in accessors_of_arrays(data.tree):
@@ -356,12 +354,12 @@ def _references(data: GltfData) -> Iterator[tuple[str, Any]]:
         "skins": {"skeleton": "nodes"},
     }
     for kind, names in singles.items():
-        for item in entry(tree, kind, list, []):
+        for item in entry(tree, kind, list):
             yield from ((to, item[name]) for name, to in names.items() if name in item)
     for kind, name in (("scenes", "nodes"), ("nodes", "children"), ("skins", "joints")):
-        for item in entry(tree, kind, list, []):
-            yield from (("nodes", node) for node in entry(item, name, list, []))
-    for mesh in entry(tree, "meshes", list, []):
+        for item in entry(tree, kind, list):
+            yield from (("nodes", node) for node in entry(item, name, list))
+    for mesh in entry(tree, "meshes", list):
         yield from (("materials", one["material"]) for one in mesh["primitives"] if "material" in one)
 
 

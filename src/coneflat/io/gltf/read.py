@@ -96,7 +96,7 @@ class _Reading:
         self._parts: list[ScenePart] = []
         self._vertices: list[FloatArray] = [np.empty((0, 3))]
         self._corners: list[IntArray] = [np.empty(0, np.int64)]
-        self._count = self._corner_count = 0
+        self._count = self._taken = 0
         self._blocks = [0]
         self._uvs, self._normals = _Rows(2), _Rows(3)
 
@@ -109,11 +109,10 @@ class _Reading:
         data = self.data
         linear = matrix[:3, :3]
         is_mirrored = bool(np.linalg.det(linear) < 0)
-        placed: dict[
-            Any, tuple[int, int]
-        ] = {}  # of each array of positions, the first vertex and their number
-        for index, primitive in enumerate(data.entry(data.item("meshes", mesh), "primitives", list, [])):
-            attributes = data.entry(primitive, "attributes", dict, {})
+        # Of each array of positions, the first vertex and their number.
+        placed: dict[Any, tuple[int, int]] = {}
+        for index, primitive in enumerate(data.entry(data.item("meshes", mesh), "primitives", list)):
+            attributes = data.entry(primitive, "attributes", dict)
             position = attributes.get("POSITION")
             if position is None:
                 continue
@@ -123,13 +122,13 @@ class _Reading:
                 continue
             if position not in placed:
                 points = data.values(position, 3)
-                self._take(len(points), 0)
+                self._take(len(points))
                 placed[position] = (self._count, len(points))
                 self._vertices.append(points @ linear.T + matrix[:3, 3])
                 self._count += len(points)
             first, count = placed[position]
             self._check_copied(primitive, count)
-            self._take(0, len(corners))
+            self._take(len(corners))
             if is_mirrored:
                 # The specification turns the winding under a mirroring node (Section 3.7.4).
                 corners = corners.reshape(-1, 3)[:, ::-1].reshape(-1)
@@ -167,28 +166,26 @@ class _Reading:
     def _check_copied(self, primitive: dict[str, Any], count: int) -> None:
         """Refuse arrays that are there for some of the vertices only, or not at all."""
         data = self.data
-        for each in (primitive["attributes"], *data.entry(primitive, "targets", list, [])):
+        for each in (primitive["attributes"], *data.entry(primitive, "targets", list)):
             for name, index in each.items():
                 if len(data.raw(index)) < count:
                     data.fail(f"a primitive has {name} for {len(data.raw(index))} of its {count} vertices")
 
-    def _take(self, vertices: int, corners: int) -> None:
-        """Count what a part adds, before it is added."""
-        self._corner_count += corners + vertices
-        if self._corner_count > self._most:
+    def _take(self, count: int) -> None:
+        """Count the vertices or corners that a part adds, before it is added."""
+        self._taken += count
+        if self._taken > self._most:
             self.data.fail(
                 f"its scene shows meshes so often that there are over {self._most:,} corners, many times what the "
                 "file holds; write each mesh once"
             )
 
     def _refuse_packed(self, primitive: dict[str, Any], position: Any) -> None:
-        packed = DRACO in self.data.entry(primitive, "extensions", dict, {})
+        packed = DRACO in self.data.entry(primitive, "extensions", dict)
         item = self.data.item("accessors", position)
         if item.get("bufferView") is None and (packed or item.get("sparse") is None):
-            how = (
-                f"are compressed ({DRACO}); save it without compression" if packed else "are not in the file"
-            )
-            self.data.fail(f"the positions of a mesh {how}")
+            save = f"are compressed ({DRACO}); save it without compression"
+            self.data.fail(f"the positions of a mesh {save if packed else 'are not in the file'}")
 
 
 class _Rows:
@@ -251,7 +248,7 @@ def shown_nodes(data: GltfData) -> Iterator[tuple[int, FloatArray]]:
         seen.add(index)
         matrix = above @ _local(data, node)
         yield index, matrix
-        stack += [(child, matrix) for child in reversed(data.entry(node, "children", list, []))]
+        stack += [(child, matrix) for child in reversed(data.entry(node, "children", list))]
 
 
 def triangle_corners(data: GltfData, primitive: dict[str, Any], count: int) -> IntArray:
@@ -281,15 +278,12 @@ def triangle_corners(data: GltfData, primitive: dict[str, Any], count: int) -> I
 
 def _roots(data: GltfData) -> list[Any]:
     if data.tree.get("scenes"):
-        return list(data.entry(data.item("scenes", data.tree.get("scene", 0)), "nodes", list, []))
-    count = len(data.entry(data.tree, "nodes", list, []))
+        return list(data.entry(data.item("scenes", data.tree.get("scene", 0)), "nodes", list))
+    nodes = list(data.items("nodes"))
     children = {
-        child
-        for i in range(count)
-        for child in data.entry(data.item("nodes", i), "children", list, [])
-        if isinstance(child, int)
+        child for node in nodes for child in data.entry(node, "children", list) if isinstance(child, int)
     }
-    return [i for i in range(count) if i not in children]
+    return [i for i in range(len(nodes)) if i not in children]
 
 
 def _local(data: GltfData, node: dict[str, Any]) -> FloatArray:

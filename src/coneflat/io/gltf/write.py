@@ -142,9 +142,7 @@ def bounds(values: NDArray[Any]) -> dict[str, Any]:
     return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
 
 
-def write_glb(
-    result: Flattening, stream: IO[bytes], texture: Texture | None = None, folder: Path | None = None
-) -> None:
+def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None, folder: Path) -> None:
     """Write a result as GLB.
 
     Of a mesh that was read from a glTF scene, that is the scene with new UVs. Else it has one mesh, with a two-sided
@@ -156,7 +154,7 @@ def write_glb(
         result: what to write.
         stream: a binary file.
         texture: the image of the material; None for a light grey, or the scene's own materials.
-        folder: where the file will be, for paths of images that are not to be had; by default the current one.
+        folder: where the file will be, for paths of images that are not to be had.
 
     Raises:
         MeshFileError: it is larger than GLB can be.
@@ -165,7 +163,7 @@ def write_glb(
     if scene is None:
         glb = _one_mesh(result, texture)
     else:
-        glb = scene_with_uvs(result, scene, Path() if folder is None else folder, texture)
+        glb = scene_with_uvs(result, scene, folder, texture)
     glb.write(stream)
 
 
