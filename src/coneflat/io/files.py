@@ -12,10 +12,12 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeAlias
 
 from ..errors import ConeflatError, EmptyMeshError, MeshFileError, UnknownFormatError
 
+#: How users name files.
+PathName: TypeAlias = "str | PathLike[str]"
 #: Stands for standard input, and for standard output.
 PIPE = Path("-")
 
@@ -125,7 +127,7 @@ def moved_path(name: bytes, here: str, there: str) -> bytes:
     return relative.replace(os.fsencode(os.sep), b"/")
 
 
-def check_target(path: str | PathLike[str]) -> Path:
+def check_target(path: PathName) -> Path:
     """Return the file that a path names, links followed, if it looks as if it could be written.
 
     Raises:
@@ -155,7 +157,7 @@ def check_target(path: str | PathLike[str]) -> Path:
     raise MeshFileError(f"{path} cannot be written: {reason}")
 
 
-def checked_target(path: str | PathLike[str], endings: Collection[str], what: str) -> Path:
+def checked_target(path: PathName, endings: Collection[str], what: str) -> Path:
     """Return a path if a file can be expected to be written there that has one of some endings, see `known_ending`.
 
     Raises:
@@ -181,7 +183,7 @@ def make_folder(path: Path) -> None:
 
 
 @contextmanager
-def atomic_write(path: str | PathLike[str], mode: str = "wb") -> Iterator[IO[Any]]:
+def atomic_write(path: PathName, mode: str = "wb") -> Iterator[IO[Any]]:
     """Open a file that appears under its name only when it is complete.
 
     The content goes to a temporary file in the same folder, which takes the name at the end of the block; if
@@ -218,7 +220,7 @@ def _temporary(name: str, mark: str) -> str:
     return f".{name[:100]}.{mark}.tmp"
 
 
-def remove_unfinished(path: str | PathLike[str]) -> None:
+def remove_unfinished(path: PathName) -> None:
     """Remove what a process that was killed while it wrote a file has left of it."""
     target = Path(os.path.realpath(path))
     for left in target.parent.glob(_temporary(glob.escape(target.name[:100]), "?" * 12)):

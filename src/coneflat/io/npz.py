@@ -11,7 +11,6 @@ import zipfile
 from collections.abc import Callable, Iterable
 from dataclasses import fields
 from io import BytesIO
-from os import PathLike
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, TypeVar
 
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError
-from .files import as_path, read_bytes, readable
+from .files import PathName, as_path, read_bytes, readable
 
 if TYPE_CHECKING:
     from ..measure.rotations import Rotations
@@ -59,7 +58,7 @@ def write_npz(result: Flattening, stream: IO[bytes]) -> None:
     np.savez(stream, **arrays)
 
 
-def read_flattening(path: str | PathLike[str]) -> Flattening:
+def read_flattening(path: PathName) -> Flattening:
     """Return a result that was written as .npz; what it says of the file it came from is not kept.
 
     Raises:

@@ -31,15 +31,8 @@ if TYPE_CHECKING:
 _OTHER, _VERTEX, _FACE, _TEXTURE, _NORMAL, _ELEMENT, _COMMENTED_FACE = range(7)
 #: By the first two characters of a line, as a 16-bit number, what it is.
 _KINDS = np.full(1 << 16, _OTHER, np.uint8)
-for _head, _kind in (
-    (b"v ", _VERTEX),
-    (b"f ", _FACE),
-    (b"l ", _ELEMENT),
-    (b"p ", _ELEMENT),
-    (b"vt", _TEXTURE),
-    (b"vn", _NORMAL),
-):
-    _KINDS[int.from_bytes(_head, "big")] = _kind
+_HEADS = {b"v ": _VERTEX, b"f ": _FACE, b"l ": _ELEMENT, b"p ": _ELEMENT, b"vt": _TEXTURE, b"vn": _NORMAL}
+_KINDS[[int.from_bytes(head, "big") for head in _HEADS]] = [*_HEADS.values()]
 _TEXTURE_INDICES = re.compile(rb"(#[^\r\n]*)|/[-+0-9]*")
 _MATERIALS = re.compile(rb"(?m)^([ \t]*mtllib[ \t]+)([^\r\n]*?)(?=[ \t]*\r?$)")
 #: Lines written at a time: their numbers take some MB as Python has them.
@@ -81,8 +74,14 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
     for block in text_blocks(path, content, continued=True):
         kinds = _KINDS[block.heads()]
         points = block.words(np.flatnonzero(kinds == _VERTEX), first=1).points()
-        counts, given, texture, normal = _faces(block, kinds)
-        above = len(vertices) + np.cumsum(kinds == _VERTEX)[kinds == _FACE]
+        rows = np.flatnonzero(kinds == _FACE)
+        words = block.words(rows, first=1)
+        counts = words.counts
+        if len(rows) and counts.min() < 3:
+            i = int(np.argmax(counts < 3))
+            block.fail(int(rows[i]), f"a face needs at least 3 corners, but has {counts[i]}")
+        given, texture, normal = words.corners()
+        above = len(vertices) + np.cumsum(kinds == _VERTEX)[rows]
         for polygon, text in _texts(block, kinds, newline):
             gaps[len(sizes) + polygon] += text
         vertices.add(points[:, :3])
@@ -91,14 +90,14 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
             colours.add(points[:, 3:6])
         sizes.add(counts)
         if texture is not None:
-            beyond = len(uv) + np.cumsum(kinds == _TEXTURE)[kinds == _FACE]
+            beyond = len(uv) + np.cumsum(kinds == _TEXTURE)[rows]
             counted = np.repeat(beyond, counts) + texture
             # A number that counts back beyond the first is no sign that there is none, as -1 is.
             texture = np.where(texture < 0, np.where(counted < 0, -2, counted), texture - 1)
         uv.add(_uv_points(block, np.flatnonzero(kinds == _TEXTURE)))
         shade = normal
         if normal is not None:
-            beyond = len(directions) + np.cumsum(kinds == _NORMAL)[kinds == _FACE]
+            beyond = len(directions) + np.cumsum(kinds == _NORMAL)[rows]
             shade = np.where(normal < 0, np.repeat(beyond, counts) + normal + 1, normal)
         directions.add(_directions(block, np.flatnonzero(kinds == _NORMAL)))
         for known, found, none in ((textures, texture, -1), (normals, normal, 0), (shading, shade, 0)):
@@ -144,18 +143,6 @@ def _uv_points(block: TextBlock, rows: IntArray) -> FloatArray:
     has_v = words.counts > 1
     points[has_v, 1] = numbers[first[has_v] + 1]
     return points
-
-
-def _faces(
-    block: TextBlock, kinds: NDArray[np.uint8]
-) -> tuple[IntArray, IntArray, IntArray | None, IntArray | None]:
-    """Return (p,) sizes of a block's polygons, (c,) vertex numbers, UVs and normals of their corners."""
-    rows = np.flatnonzero(kinds == _FACE)
-    words = block.words(rows, first=1)
-    if len(rows) and words.counts.min() < 3:
-        i = int(np.argmax(words.counts < 3))
-        block.fail(int(rows[i]), f"a face needs at least 3 corners, but has {words.counts[i]}")
-    return words.counts, *words.corners()
 
 
 def _directions(block: TextBlock, rows: IntArray) -> FloatArray:
@@ -300,9 +287,8 @@ def _relocated(text: ObjText, old: Path, new: Path) -> ObjText:
         names = match[2]
         # Several names may stand on a line, and so may one name with blanks; the folder tells.
         is_one = os.path.exists(os.path.join(os.fsencode(here), names))
-        return match[1] + b" ".join(
-            moved_path(name, here, there) for name in ([names] if is_one else names.split())
-        )
+        parts = [names] if is_one else names.split()
+        return match[1] + b" ".join(moved_path(name, here, there) for name in parts)
 
     gaps = {i: _MATERIALS.sub(line, gap) if b"mtllib" in gap else gap for i, gap in text.gaps.items()}
     return replace(text, gaps=gaps)

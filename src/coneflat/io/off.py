@@ -37,9 +37,8 @@ def parse_off(path: Path, content: bytes) -> MeshFile:
     lines = 0
     for block in text_blocks(path, content, begin):
         rows = np.flatnonzero(block.counts)
-        of_vertices, of_faces = np.clip(
-            [vertex_count - lines, vertex_count + face_count - lines], 0, len(rows)
-        )
+        ends = np.array([vertex_count, vertex_count + face_count]) - lines
+        of_vertices, of_faces = np.clip(ends, 0, len(rows))
         points = block.words(rows[:of_vertices]).points()
         vertices.add(points[:, :3])
         if has_normals and points.shape[1] >= 6:

@@ -58,13 +58,11 @@ def as_input(mesh: Any, faces: ArrayLike | None = None) -> InputMesh:
 
 
 def _from_meshio(mesh: Any) -> InputMesh:
-    surfaces = [
-        np.asarray(block.data) for block in mesh.cells if block.type in ("triangle", "quad", "polygon")
-    ]
-    if not surfaces:
+    known = [block for block in mesh.cells if block.type in ("triangle", "quad", "polygon")]
+    if not known:
         kinds = ", ".join(sorted({str(block.type) for block in mesh.cells})) or "none"
         raise ArrayShapeError(f"the mesh has no triangles, quads or polygons; its cells are: {kinds}")
-    return _from_polygons(mesh.points, [row for block in surfaces for row in block.tolist()])
+    return _from_polygons(mesh.points, [row for block in known for row in np.asarray(block.data).tolist()])
 
 
 def _from_pyvista(mesh: Any) -> InputMesh:

@@ -57,13 +57,9 @@ class _Element:
     @cached_property
     def steps(self) -> list[tuple[int, struct.Struct | None]]:
         """Of each property, the bytes of the value or of an item, and what reads a list's length."""
-        return [
-            (
-                np.dtype(p.kind).itemsize,
-                struct.Struct(p.count) if p.count else None,
-            )
-            for p in self.properties
-        ]
+        sizes = (np.dtype(p.kind).itemsize for p in self.properties)
+        counts = (struct.Struct(p.count) if p.count else None for p in self.properties)
+        return list(zip(sizes, counts, strict=True))
 
 
 def parse_ply(path: Path, content: bytes) -> MeshFile:
@@ -208,9 +204,8 @@ class _EndOfFile(Exception):
 def _decode(content: bytes, start: int, element: _Element, wanted: list[int]) -> tuple[list[Column], int]:
     """Return the wanted columns of an element, a list as two (lengths, items), and where it ends."""
     lists = [i for i, p in enumerate(element.properties) if p.count]
-    lengths = dict(
-        zip(lists, _row(content, start, element)[1] if element.length else [0] * len(lists), strict=True)
-    )
+    first = _row(content, start, element)[1] if element.length else [0] * len(lists)
+    lengths = dict(zip(lists, first, strict=True))
     fields: list[tuple[str, str] | tuple[str, str, int]] = []
     for i, p in enumerate(element.properties):
         fields += [(f"n{i}", p.count), (f"p{i}", p.kind, lengths[i])] if p.count else [(f"p{i}", p.kind)]

@@ -7,7 +7,6 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy as np
 from ..base.text import shown
 from ..errors import EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
 from ..mesh.weld import weld as weld_vertices
-from .files import PIPE, as_path, known_ending, read_bytes, read_input, readable
+from .files import PIPE, PathName, as_path, known_ending, read_bytes, read_input, readable
 from .gltf.read import parse_gltf
 from .join import Joined, join_borders
 from .mesh_file import MeshFile, check_corners
@@ -40,7 +39,7 @@ _WELDED_BY_DEFAULT = {".stl", ".gltf", ".glb"}
 INPUT_FORMATS = tuple(_READERS)
 
 
-def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
+def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
     """Return the mesh of a file, with its polygons, in the file's own order of vertices and faces.
 
     The format follows the path's ending, in any case: .obj, .ply, .stl, .off, .gltf, .glb. Of a glTF scene
@@ -74,7 +73,7 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
 
 
 def read_mesh_from(
-    content: bytes, name: str | PathLike[str], weld: bool | None = None, ending: str | None = None
+    content: bytes, name: PathName, weld: bool | None = None, ending: str | None = None
 ) -> MeshFile:
     """Return the mesh that the content of a file is; see `read_mesh`.
 
@@ -168,7 +167,7 @@ def find_meshes(pattern: str) -> list[str]:
     return matches
 
 
-def read_joined(path: str | PathLike[str], weld: bool | None = None) -> Joined:
+def read_joined(path: PathName, weld: bool | None = None) -> Joined:
     """Return the mesh of a file, closed where nobody could want it open.
 
     Args:

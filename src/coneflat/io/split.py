@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from ..result import Flattening
 
 _SMOOTHING = re.compile(rb"(?m)^[ \t]*s[ \t]+(\S+)")
-_FLAT = (b"off", b"0")
 
 
 class CornerNormals(NamedTuple):
@@ -130,7 +129,7 @@ def _smoothing_groups(source: MeshFile) -> IntArray | None:
         if names:
             name = names[-1].lower()
             starts.append(polygon)
-            groups.append(0 if name in _FLAT else known.setdefault(name, len(known) + 1))
+            groups.append(0 if name in (b"off", b"0") else known.setdefault(name, len(known) + 1))
     of_polygon = np.repeat(groups, np.diff([*starts, len(source.offsets) - 1]))
     if len(starts) == 1 or (of_polygon[0] > 0 and np.all(of_polygon == of_polygon[0])):
         return None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from io import BytesIO
-from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,28 +10,21 @@ import numpy as np
 from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError, OptionError
 from ..geometry.planar import signed_double_areas
-from .files import as_path, read_bytes, readable
+from .files import PathName, as_path, read_bytes, readable
 
 if TYPE_CHECKING:
     from ..result import Flattening
 
+#: A light, slightly cool grey.
 LIGHT_CELL = (0.86, 0.87, 0.89)
-"""A light, slightly cool grey."""
-
+#: Blue, so that red and black marks stand out.
 DARK_CELL = (0.34, 0.46, 0.62)
-"""Blue, so that red and black marks stand out."""
-
+#: Cells in a row that is as long as the square root of the area: about 20 across a ball.
 CELLS = 36
-"""Cells in a row that is as long as the square root of the area: about 20 across a ball."""
-
-CHECKER = "checker"
-"""The name that stands for the checkerboard."""
-
+#: The formats that glTF knows, and their names there.
 EMBEDDED = {"PNG": "image/png", "JPEG": "image/jpeg"}
-"""The formats that glTF knows, and their names there."""
-
+#: A page with a picture that has more is slow to open.
 MOST_BYTES = 32 * 2**20
-"""A page with a picture that has more is slow to open."""
 
 _BEGINNINGS = {
     b"\x89PNG\r\n\x1a\n": "image/png",
@@ -71,7 +63,7 @@ def check_cells(cells: float) -> None:
         raise OptionError(f"the number of cells of the checkerboard must be positive, not {cells:g}")
 
 
-def find_texture(texture: str | PathLike[str], result: Flattening | None = None) -> Texture | None:
+def find_texture(texture: PathName, result: Flattening | None = None) -> Texture | None:
     """Return the texture that is meant: the checkerboard for a result, or an image file's.
 
     PNG and JPEG files are taken as they are; others that Pillow reads become PNG.
@@ -88,7 +80,7 @@ def find_texture(texture: str | PathLike[str], result: Flattening | None = None)
         from PIL import Image
     except ImportError as error:
         raise OptionError('textures need Pillow: pip install "coneflat[figures]"') from error
-    if isinstance(texture, str) and texture == CHECKER:
+    if isinstance(texture, str) and texture == "checker":
         return None if result is None else _checkerboard(result, Image)
     path = as_path(texture)
     content = read_bytes(path)
@@ -106,7 +98,7 @@ def image_kind(content: bytes) -> str | None:
     return next((kind for beginning, kind in _BEGINNINGS.items() if content.startswith(beginning)), None)
 
 
-def read_picture(path: str | PathLike[str]) -> Texture:
+def read_picture(path: PathName) -> Texture:
     """Return a PNG, JPEG, GIF or WebP file as it is: browsers read them. The content counts, not the ending.
 
     Raises:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from os import PathLike
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
@@ -19,7 +18,7 @@ from ..measure.guarantees import DOUBLE, SINGLE, remeasured
 from ..mesh.polygons import polygon_of
 from ..options.outputs import FORMATS
 from .convex_pieces import find_pieces
-from .files import atomic_write, checked_target
+from .files import PathName, atomic_write, checked_target
 from .gltf.write import scene_losses, write_glb
 from .npz import write_npz
 from .obj import write_obj
@@ -37,7 +36,7 @@ SMALLEST, LARGEST = 1e-15, 1e18
 _MATERIAL = re.compile(rb"^[ \t]*usemtl\s", re.MULTILINE)
 
 
-def check_output(path: str | PathLike[str], texture: str | PathLike[str] | None = None) -> Path:
+def check_output(path: PathName, texture: PathName | None = None) -> Path:
     """Return the path if `write_flattening` can be expected to succeed with it and a texture.
 
     Worth asking before long work.
@@ -55,9 +54,7 @@ def check_output(path: str | PathLike[str], texture: str | PathLike[str] | None 
     return path
 
 
-def write_flattening(
-    result: Flattening, path: str | PathLike[str], texture: str | PathLike[str] | None = None
-) -> Path:
+def write_flattening(result: Flattening, path: PathName, texture: PathName | None = None) -> Path:
     """Write a flattened mesh, in full or not at all, and return the path.
 
     The format follows the path's ending, in any case. An .obj keeps the polygons, groups, materials and
@@ -79,17 +76,13 @@ def write_flattening(
     return _write(result, path, texture)[0]
 
 
-def write_measured(
-    result: Flattening, path: str | PathLike[str], texture: str | PathLike[str] | None = None
-) -> Flattening:
+def write_measured(result: Flattening, path: PathName, texture: PathName | None = None) -> Flattening:
     """Write a flattened mesh as `write_flattening` does, and return it as the file holds it; see `as_written`."""
     written, stored = _write(result, path, texture)
     return as_written(stored, written.suffix.lower())
 
 
-def _write(
-    result: Flattening, path: str | PathLike[str], texture: str | PathLike[str] | None
-) -> tuple[Path, Flattening]:
+def _write(result: Flattening, path: PathName, texture: PathName | None) -> tuple[Path, Flattening]:
     """Write a flattened mesh, and return the path and the arrays that were written."""
     path = check_output(path, texture)
     with atomic_write(path) as stream:
@@ -101,7 +94,7 @@ def write_stream(
     result: Flattening,
     stream: IO[bytes],
     ending: str,
-    texture: str | PathLike[str] | None = None,
+    texture: PathName | None = None,
     folder: Path | None = None,
 ) -> Flattening:
     """Write a flattened mesh to a binary stream, and return the arrays that were written; see `write_flattening`.
@@ -135,7 +128,7 @@ def write_stream(
     return stored
 
 
-def _check_texture(name: object, ending: str, texture: str | PathLike[str] | None) -> None:
+def _check_texture(name: object, ending: str, texture: PathName | None) -> None:
     if texture is not None and ending != ".glb":
         raise OptionError(f"only .glb files carry a texture, and {name} is none")
 

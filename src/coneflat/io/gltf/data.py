@@ -16,7 +16,7 @@ import math
 import struct
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn, TypeAlias
 from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
@@ -26,6 +26,11 @@ from ...base.arrays import FloatArray, IntArray
 from ...errors import ConeflatError, MeshFileError
 from ..files import read_bytes
 
+#: An object of the JSON.
+Item: TypeAlias = dict[str, Any]
+#: (k, b) the bytes of the elements of an array.
+ByteRows: TypeAlias = NDArray[np.uint8]
+#: The types of numbers.
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 #: Rows and columns of an element.
 SHAPES = {
@@ -80,14 +85,13 @@ class GltfData:
             raise MeshFileError(f"{path} is not a readable glTF file: its JSON is broken: {error}") from error
         if not isinstance(tree, dict):
             raise MeshFileError(f"{path} is not a glTF file: its JSON is no object")
-        self.tree: dict[str, Any] = tree
+        self.tree: Item = tree
         version = str(self.entry(tree, "asset", dict).get("version", "2.0"))
         if not version.startswith("2."):
             raise MeshFileError(f"{path} is glTF of version {version[:20]}; convert it to version 2.0")
         self._buffers = self._find_buffers(binary)
-        self.total_bytes = len(content) + sum(
-            map(len, {id(one): one for one in self._buffers if one is not None}.values())
-        )
+        different = {id(one): len(one) for one in self._buffers if one is not None}
+        self.total_bytes = len(content) + sum(different.values())
         self._refuse_compressed()
         self._check_names()
 
@@ -106,14 +110,14 @@ class GltfData:
         """
         raise MeshFileError(f"{self.path}: {reason}")
 
-    def entry(self, item: dict[str, Any], name: str, kind: type[Any]) -> Any:
+    def entry(self, item: Item, name: str, kind: type[Any]) -> Any:
         """Return the list or the object that an object has under a name, or an empty one; others are refused."""
         value = item.get(name, kind()) if isinstance(item, dict) else None
         if not isinstance(value, kind):
             self.fail(f"{name!r} is no {'list' if kind is list else 'object'} where there should be one")
         return value
 
-    def item(self, name: str, index: Any) -> dict[str, Any]:
+    def item(self, name: str, index: Any) -> Item:
         """Return an object of one of the tree's lists, such as "meshes"."""
         every = self.tree.get(name, [])
         if not isinstance(every, list):
@@ -122,9 +126,9 @@ class GltfData:
             self.fail(f"{str(index)[:20]} is none of its {len(every)} {name}")
         if not isinstance(every[index], dict):
             self.fail(f"number {index} of its {name} is no object")
-        return dict[str, Any](every[index])
+        return Item(every[index])
 
-    def items(self, name: str) -> Iterator[dict[str, Any]]:
+    def items(self, name: str) -> Iterator[Item]:
         """Yield the objects of one of the tree's lists."""
         return (self.item(name, i) for i in range(len(self.entry(self.tree, name, list))))
 
@@ -150,7 +154,7 @@ class GltfData:
             self.fail(f"accessor {index} has an unknown type")
         return Accessor(np.dtype(kind), *shape, self.count(item, "count"))
 
-    def raw(self, index: Any) -> NDArray[np.uint8]:
+    def raw(self, index: Any) -> ByteRows:
         """Return (count, b) the bytes of each element of an array.
 
         Raises:
@@ -190,7 +194,7 @@ class GltfData:
             self.fail(f"accessor {index} holds no indices")
         return np.ascontiguousarray(self.raw(index)).view(form.kind).reshape(-1).astype(np.int64)
 
-    def count(self, item: dict[str, Any], name: str, default: int | None = None) -> int:
+    def count(self, item: Item, name: str, default: int | None = None) -> int:
         """Return a whole number, 0 and up, that an object has."""
         value = item.get(name, default)
         if not isinstance(value, int) or isinstance(value, bool) or value < 0:
@@ -201,9 +205,7 @@ class GltfData:
         """Return the file that a reference relative to this one means."""
         return self.path.parent / unquote(uri)
 
-    def _rows(
-        self, index: Any, item: dict[str, Any], count: int, size: int, stride: int | None = None
-    ) -> NDArray[np.uint8]:
+    def _rows(self, index: Any, item: Item, count: int, size: int, stride: int | None = None) -> ByteRows:
         """Return (count, size) bytes of a buffer view that an accessor, or a part of it, names."""
         data = self.view(item.get("bufferView"))
         start = self.count(item, "byteOffset", 0)
@@ -215,9 +217,7 @@ class GltfData:
             self.fail(f"accessor {index} ends at {end:,} of the {len(data):,} bytes of its buffer view")
         return np.ndarray((count, size), np.uint8, data, start, (step, 1))
 
-    def _with_sparse(
-        self, index: Any, sparse: dict[str, Any], rows: NDArray[np.uint8], kind: np.dtype[Any]
-    ) -> NDArray[np.uint8]:
+    def _with_sparse(self, index: Any, sparse: Item, rows: ByteRows, kind: np.dtype[Any]) -> ByteRows:
         """Return an array with those elements replaced that the accessor lists."""
         count = self.count(sparse, "count")
         where, new = self.entry(sparse, "indices", dict), self.entry(sparse, "values", dict)
@@ -267,7 +267,7 @@ class GltfData:
         except (binascii.Error, ValueError) as error:
             raise MeshFileError(f"{self.path}: the data URI of {what} is broken: {error}") from error
 
-    def _buffer_of(self, view: dict[str, Any]) -> bytes | None:
+    def _buffer_of(self, view: Item) -> bytes | None:
         self.item("buffers", view.get("buffer"))
         return self._buffers[view["buffer"]]
 
@@ -280,14 +280,11 @@ class GltfData:
                     self.fail(f"its data are compressed ({name}); save it without compression")
 
 
-def numbers(data: GltfData, item: dict[str, Any], name: str, default: list[float]) -> FloatArray:
+def numbers(data: GltfData, item: Item, name: str, default: list[float]) -> FloatArray:
     """Return a list of as many finite numbers as the default has."""
     values = item.get(name, default)
-    if (
-        not isinstance(values, list)
-        or len(values) != len(default)
-        or not all(isinstance(value, (int, float)) and math.isfinite(value) for value in values)
-    ):
+    count = len(values) if isinstance(values, list) else -1
+    if count != len(default) or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in values):
         data.fail(f"the {name} of a node is not {len(default)} numbers")
     return np.array(values, dtype=np.float64)
 
@@ -363,7 +360,7 @@ def _references(data: GltfData) -> Iterator[tuple[str, Any]]:
         yield from (("materials", one["material"]) for one in mesh["primitives"] if "material" in one)
 
 
-def accessors_of_arrays(tree: dict[str, Any]) -> Iterator[int]:
+def accessors_of_arrays(tree: Item) -> Iterator[int]:
     """Yield the accessors that meshes, skins and animations name."""
     for mesh in tree.get("meshes", []):
         for one in mesh["primitives"]:
@@ -380,17 +377,16 @@ def accessors_of_arrays(tree: dict[str, Any]) -> Iterator[int]:
             yield from (sampler[name] for name in ("input", "output") if name in sampler)
 
 
-def views_of_images(tree: dict[str, Any]) -> Iterator[int]:
+def views_of_images(tree: Item) -> Iterator[int]:
     """Yield the buffer views of images."""
     return (image["bufferView"] for image in tree.get("images", []) if "bufferView" in image)
 
 
-def view_owners(accessor: dict[str, Any]) -> list[dict[str, Any]]:
+def view_owners(accessor: Item) -> list[Item]:
     """Return the parts of an accessor that have a buffer view."""
     sparse = accessor.get("sparse", {})
-    return [
-        one for one in (accessor, sparse.get("indices", {}), sparse.get("values", {})) if "bufferView" in one
-    ]
+    parts = (accessor, sparse.get("indices", {}), sparse.get("values", {}))
+    return [one for one in parts if "bufferView" in one]
 
 
 def numbers_in_extensions(tree: Any) -> Iterator[int]:
@@ -399,11 +395,8 @@ def numbers_in_extensions(tree: Any) -> Iterator[int]:
     while stack:
         item, is_inside = stack.pop()
         if isinstance(item, dict):
-            stack += [
-                (value, is_inside or key == "extensions")
-                for key, value in item.items()
-                if key not in _NO_ARRAYS
-            ]
+            kept = ((key, value) for key, value in item.items() if key not in _NO_ARRAYS)
+            stack += [(value, is_inside or key == "extensions") for key, value in kept]
         elif isinstance(item, list):
             stack += [(value, is_inside) for value in item]
         elif is_inside and isinstance(item, int):

@@ -18,7 +18,7 @@ from ...base.arrays import FloatArray, IntArray
 from ...errors import EmptyMeshError
 from ...mesh.weld import weld
 from ..mesh_file import MeshFile
-from .data import GltfData, check_references, numbers
+from .data import GltfData, Item, check_references, numbers
 
 DRACO = "KHR_draco_mesh_compression"
 #: A scene may show its meshes so often that it has as many corners in all,
@@ -163,7 +163,7 @@ class _Reading:
             scene=GltfScene(self.data, tuple(self._parts), tuple(self._blocks)),
         )
 
-    def _check_copied(self, primitive: dict[str, Any], count: int) -> None:
+    def _check_copied(self, primitive: Item, count: int) -> None:
         """Refuse arrays that are there for some of the vertices only, or not at all."""
         data = self.data
         for each in (primitive["attributes"], *data.entry(primitive, "targets", list)):
@@ -180,7 +180,7 @@ class _Reading:
                 "file holds; write each mesh once"
             )
 
-    def _refuse_packed(self, primitive: dict[str, Any], position: Any) -> None:
+    def _refuse_packed(self, primitive: Item, position: Any) -> None:
         packed = DRACO in self.data.entry(primitive, "extensions", dict)
         item = self.data.item("accessors", position)
         if item.get("bufferView") is None and (packed or item.get("sparse") is None):
@@ -251,7 +251,7 @@ def shown_nodes(data: GltfData) -> Iterator[tuple[int, FloatArray]]:
         stack += [(child, matrix) for child in reversed(data.entry(node, "children", list))]
 
 
-def triangle_corners(data: GltfData, primitive: dict[str, Any], count: int) -> IntArray:
+def triangle_corners(data: GltfData, primitive: Item, count: int) -> IntArray:
     """Return (3 m,) the vertices of the triangles of a primitive that has `count` vertices; none of lines and points.
 
     Raises:
@@ -280,13 +280,12 @@ def _roots(data: GltfData) -> list[Any]:
     if data.tree.get("scenes"):
         return list(data.entry(data.item("scenes", data.tree.get("scene", 0)), "nodes", list))
     nodes = list(data.items("nodes"))
-    children = {
-        child for node in nodes for child in data.entry(node, "children", list) if isinstance(child, int)
-    }
+    named = (child for node in nodes for child in data.entry(node, "children", list))
+    children = {child for child in named if isinstance(child, int)}
     return [i for i in range(len(nodes)) if i not in children]
 
 
-def _local(data: GltfData, node: dict[str, Any]) -> FloatArray:
+def _local(data: GltfData, node: Item) -> FloatArray:
     """Return (4, 4) the transform of a node in that above it."""
     if "matrix" in node:
         return numbers(data, node, "matrix", [0.0] * 16).reshape(4, 4).T

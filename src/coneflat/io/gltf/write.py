@@ -28,6 +28,7 @@ from ..texture import Texture, image_kind
 from .data import (
     COMPRESSED,
     GltfData,
+    Item,
     accessors_of_arrays,
     keys_of,
     numbers_in_extensions,
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 
 #: What a view holds, for the graphics card.
 FOR_VERTICES, FOR_INDICES = 34962, 34963
-MATERIAL: dict[str, Any] = {
+MATERIAL: Item = {
     "name": "coneflat",
     "doubleSided": True,
     "pbrMetallicRoughness": {
@@ -62,19 +63,19 @@ class Glb:
         tree: the JSON.
     """
 
-    def __init__(self, tree: dict[str, Any]) -> None:
+    def __init__(self, tree: Item) -> None:
         self.tree = tree
         self._pieces: list[bytes] = []
         self._length = 0
         self._free: defaultdict[str, deque[int]] = defaultdict(deque)
 
-    def free(self, kind: str, number: int, stub: dict[str, Any]) -> None:
+    def free(self, kind: str, number: int, stub: Item) -> None:
         """Let what is new have a number of a list, such as "accessors"; `stub` stands there until then."""
         self.tree[kind][number] = stub
         # Taken from the end, so that what is new stands in the order in which it is written.
         self._free[kind].appendleft(number)
 
-    def add(self, kind: str, item: dict[str, Any]) -> int:
+    def add(self, kind: str, item: Item) -> int:
         """Put something new into a list, and return its number there: one that is free, or the next."""
         every = self.tree.setdefault(kind, [])
         if self._free[kind]:
@@ -96,7 +97,7 @@ class Glb:
         view = {"buffer": 0, "byteOffset": self.append(content), "byteLength": len(content), **more}
         return self.add("bufferViews", view)
 
-    def add_array(self, rows: NDArray[Any], form: dict[str, Any], target: int | None = None) -> int:
+    def add_array(self, rows: NDArray[Any], form: Item, target: int | None = None) -> int:
         """Return the number of a new accessor of (k, c) values, or of their bytes, with what else is said of it."""
         content = np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1)
         more = {} if target is None else {"target": target}
@@ -110,10 +111,8 @@ class Glb:
     def add_material(self, texture: Texture) -> int:
         """Return the number of a new material that shows an image."""
         image = self.add("images", {"bufferView": self.add_view(texture.content), "mimeType": texture.kind})
-        shown = {
-            "baseColorFactor": [1.0] * 4,
-            "baseColorTexture": {"index": self.add("textures", {"source": image})},
-        }
+        colour = {"index": self.add("textures", {"source": image})}
+        shown = {"baseColorFactor": [1.0] * 4, "baseColorTexture": colour}
         plain = MATERIAL["pbrMetallicRoughness"]
         return self.add("materials", MATERIAL | {"pbrMetallicRoughness": plain | shown})
 
@@ -137,7 +136,7 @@ class Glb:
         stream.writelines(self._pieces)
 
 
-def bounds(values: NDArray[Any]) -> dict[str, Any]:
+def bounds(values: NDArray[Any]) -> Item:
     """Return what an accessor of positions says of their box."""
     return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
 
@@ -173,7 +172,7 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
     normals = split.normals
     if normals is None:
         normals = shading_normals(vertex_normals(result.vertices, result.faces))[split.own]
-    primitive: dict[str, Any] = {"attributes": {}, "indices": 0, "material": 0}
+    primitive: Item = {"attributes": {}, "indices": 0, "material": 0}
     glb = Glb(
         {
             "asset": {"version": "2.0", "generator": "coneflat"},
@@ -229,15 +228,14 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
     _keep_the_rest(glb, data)
     _embed_images(glb, data, folder)
     material = None if texture is None else glb.add_material(texture)
-    parts, first = scene.parts, 0
-    for part, target, before, faces in zip(
-        parts, targets, old, _faces_of_parts(parts, result.face_corners), strict=True
-    ):
-        corners = part.corners[result.face_corners[faces] - first], result.uv_faces[faces]
+    owned, first = _faces_of_parts(scene.parts, result.face_corners), 0
+    for part, target, before, faces in zip(scene.parts, targets, old, owned, strict=True):
+        vertices, points = part.corners[result.face_corners[faces] - first], result.uv_faces[faces]
         first += len(part.corners)
         if part.is_mirrored:
-            corners = corners[0][:, ::-1], corners[1][:, ::-1]
-        _fill(glb, data, target, before, corners, result.uv)
+            vertices, points = vertices[:, ::-1], points[:, ::-1]
+        if len(vertices):
+            _fill(glb, data, target, before, vertices.reshape(-1), points.reshape(-1), result.uv)
         if material is not None:
             target["material"] = material
     _drop_empty(glb, targets)
@@ -276,7 +274,7 @@ def scene_losses(result: Flattening) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _own_primitives(tree: dict[str, Any], scene: GltfScene) -> list[dict[str, Any]]:
+def _own_primitives(tree: Item, scene: GltfScene) -> list[Item]:
     """Return the primitive of each part, after a copy was made of meshes that another node has."""
     meshes, nodes = tree["meshes"], tree["nodes"]
     first_node: dict[int, int] = {}
@@ -318,34 +316,22 @@ def _keep_the_rest(glb: Glb, data: GltfData) -> None:
 
 
 def _fill(
-    glb: Glb,
-    data: GltfData,
-    target: dict[str, Any],
-    before: dict[str, Any],
-    corners: tuple[IntArray, IntArray],
-    uv: FloatArray,
+    glb: Glb, data: GltfData, target: Item, before: Item, vertices: IntArray, points: IntArray, uv: FloatArray
 ) -> None:
     """Write the triangles of a primitive, whose corners are these of its vertices and these points of the plane."""
-    vertices, points = corners
-    if not len(vertices):
-        return
     pairs, number = np.unique(vertices * len(uv) + points, return_inverse=True)
     own, point = np.divmod(pairs, len(uv))
 
     def gathered(arrays: dict[str, int]) -> dict[str, int]:
-        return {
-            name: _gathered(glb, data, index, own, name == "POSITION")
-            for name, index in arrays.items()
-            if name != UV
-        }
+        kept = ((name, index) for name, index in arrays.items() if name != UV)
+        return {name: _gathered(glb, data, index, own, name == "POSITION") for name, index in kept}
 
     target["attributes"] = gathered(before["attributes"])
     # v points down in glTF.
     flat = (uv[point] * [1, -1] + [0, 1]).astype("<f4")
     target["attributes"][UV] = glb.add_array(flat, {"componentType": 5126, "type": "VEC2"}, FOR_VERTICES)
-    target["indices"] = glb.add_array(
-        number.astype("<u4").reshape(-1, 1), {"componentType": 5125, "type": "SCALAR"}, FOR_INDICES
-    )
+    corners = number.astype("<u4").reshape(-1, 1)
+    target["indices"] = glb.add_array(corners, {"componentType": 5125, "type": "SCALAR"}, FOR_INDICES)
     if "targets" in before:
         target["targets"] = [gathered(one) for one in before["targets"]]
     if before.get("mode", Mode.TRIANGLES) != Mode.TRIANGLES:
@@ -356,7 +342,7 @@ def _gathered(glb: Glb, data: GltfData, index: int, own: IntArray, has_bounds: b
     """Return the number of an array of some elements of another one."""
     old = data.item("accessors", index)
     rows = np.take(data.raw(index), own, axis=0)
-    kept: dict[str, Any] = {key: old[key] for key in _KEPT if key in old}
+    kept: Item = {key: old[key] for key in _KEPT if key in old}
     if has_bounds:
         kept |= bounds(rows.view(data.accessor(index).kind))
     return glb.add_array(rows, kept, FOR_VERTICES)
@@ -381,7 +367,7 @@ def _embed_images(glb: Glb, data: GltfData, folder: Path) -> None:
         image |= {"bufferView": glb.add_view(content), "mimeType": kind}
 
 
-def _drop_empty(glb: Glb, targets: list[dict[str, Any]]) -> None:
+def _drop_empty(glb: Glb, targets: list[Item]) -> None:
     """Leave out primitives of which the repair left nothing, and meshes without any."""
     empty = {id(target) for target in targets if not target["attributes"]}
     if not empty:
@@ -399,7 +385,7 @@ def _drop_empty(glb: Glb, targets: list[dict[str, Any]]) -> None:
         mesh["primitives"] = left
 
 
-def _forget_extensions(tree: dict[str, Any]) -> None:
+def _forget_extensions(tree: Item) -> None:
     """Take compressions that are no more from the lists of extensions."""
     used = set(keys_of(tree))
     for name in ("extensionsUsed", "extensionsRequired"):
