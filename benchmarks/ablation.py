@@ -24,7 +24,7 @@ from coneflat.base.threads import using_threads
 from coneflat.cones import only_choice, open_search
 from coneflat.cones.sparse import aggregation, dense_model, exact_model, linear_model
 from coneflat.cones.sparse import search as cone_search
-from coneflat.io.input_mesh import as_input
+from coneflat.io import as_input
 from coneflat.options import Options
 from coneflat.source import Source
 from coneflat.stages import Surface

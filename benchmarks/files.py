@@ -23,7 +23,7 @@ import numpy as np
 from common import best_time, cases, model, peak_memory, shapes
 
 from coneflat import flatten, read_mesh
-from coneflat.io.obj_write import lines_of
+from coneflat.io import lines_of
 
 #: By name: the input to read and the ending of the output to write, where there are such.
 FORMATS = {

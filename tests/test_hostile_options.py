@@ -12,7 +12,7 @@ import shapes
 import coneflat
 from coneflat import errors
 from coneflat.base.defaults import LEAST_QUANTUM
-from coneflat.io.input_mesh import as_input
+from coneflat.io import as_input
 from coneflat.seams import find_seams
 
 # What no option is.

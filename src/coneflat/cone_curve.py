@@ -15,7 +15,7 @@ from .cones import only_choice, open_search
 from .errors import OptionError
 from .geometry import double_areas
 from .geometry.operators import area_distortion, weighted_areas
-from .io.input_mesh import as_input
+from .io.packages import as_input
 from .options import CurveOptions, FindOptions, Options, read_options, takes
 from .source.parts import Part, Source
 from .stages import ConeSolution, Surface

@@ -21,7 +21,7 @@ from .errors import CurvatureError, MetricError, SeamError
 from .evaluate import evaluate
 from .geometry.operators import weighted_areas
 from .geometry.overlap import NOT_LOOKED_FOR
-from .io.input_mesh import as_input
+from .io.packages import as_input
 from .layout import free_seams, lay_out, relax_layouts
 from .mesh.connectivity import TriangleMesh
 from .metric import find_metric, loop_rotations

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from .base.arrays import FloatArray
 from .cones import close_search
 from .flatten import Early, flatten_source
-from .io.input_mesh import as_input
+from .io.packages import as_input
 from .mesh.connectivity import TriangleMesh
 from .options import Options, read_options
 from .result import Flattening

@@ -125,7 +125,7 @@ class Flattening:
         Raises:
             MeshFileError: the file cannot hold numbers so large.
         """
-        from .io.written import as_written
+        from .io.write import as_written
 
         return as_written(self, ending)
 

@@ -13,7 +13,7 @@ from shapes import hill, join, sphere
 import coneflat
 from coneflat import check_mesh
 from coneflat.io import read_mesh
-from coneflat.io.written import as_written
+from coneflat.io.write import as_written
 from coneflat.measure.distortion import measure
 
 trimesh = pytest.importorskip("trimesh")

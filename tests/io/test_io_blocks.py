@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from coneflat.errors import ConeflatError, FaceIndexError, MeshFileError
-from coneflat.io import read_mesh, text
-from coneflat.io.obj_write import lines_of
+from coneflat.io import lines_of, read_mesh, text
 from coneflat.mesh.check import weld
 
 OBJ = (

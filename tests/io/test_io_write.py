@@ -16,7 +16,7 @@ import coneflat
 from coneflat.errors import MeshFileError, OptionError
 from coneflat.geometry.triangulate import triangulate
 from coneflat.io import read_mesh, write_flattening
-from coneflat.io.checker import DARK_CELL, LIGHT_CELL
+from coneflat.io.texture import DARK_CELL, LIGHT_CELL
 
 
 @pytest.fixture

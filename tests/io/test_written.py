@@ -14,8 +14,7 @@ from coneflat.errors import MeshFileError
 from coneflat.geometry.overlap import find_overlaps
 from coneflat.geometry.planar import signed_double_areas
 from coneflat.io.convex_pieces import merge_convex
-from coneflat.io.write import write_measured
-from coneflat.io.written import stored_in_glb
+from coneflat.io.write import stored_in_glb, write_measured
 from coneflat.mesh.connectivity import TriangleMesh
 
 trimesh = pytest.importorskip("trimesh")

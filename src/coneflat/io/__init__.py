@@ -1,31 +1,27 @@
 """Reading meshes from files, and writing flattened meshes to them."""
 
-from .archive import CheckedArrays, number, read_archive
-from .atomic import (
+from .files import (
+    PIPE,
     as_path,
     atomic_write,
     check_target,
     checked_target,
     known_ending,
     make_folder,
+    read_bytes,
     remove_unfinished,
 )
-from .checker import CELLS, DARK_CELL, LIGHT_CELL, cell_side, check_cells
-from .gltf.glb import FOR_INDICES, FOR_VERTICES, MATERIAL, Glb, bounds
-from .input_mesh import as_input
+from .gltf.write import FOR_INDICES, FOR_VERTICES, MATERIAL, Glb, bounds
 from .join import Joined
 from .mapped import Mapped, as_mapped, has_uv, of_file
-from .normals import shading_normals
-from .npz import read_flattening
-from .obj import parse_obj
-from .obj_write import lines_of
-from .ply_write import write_parts
-from .raw import PIPE, read_bytes
+from .npz import CheckedArrays, number, read_archive, read_flattening
+from .obj import lines_of, parse_obj
+from .packages import as_input
+from .ply import write_parts
 from .read import INPUT_FORMATS, find_meshes, read_joined, read_mesh, read_mesh_from
-from .texture import Texture, read_picture
-from .uv_split import split_at_seams
-from .write import OUTPUT_FORMATS, check_output, write_flattening, write_measured, write_stream
-from .written import as_written
+from .split import shading_normals, split_at_seams
+from .texture import CELLS, DARK_CELL, LIGHT_CELL, Texture, cell_side, check_cells, read_picture
+from .write import OUTPUT_FORMATS, as_written, check_output, write_flattening, write_measured, write_stream
 
 __all__ = [
     "of_file",

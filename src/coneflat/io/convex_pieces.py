@@ -6,7 +6,7 @@ Readers split polygons into triangles by themselves, mostly into fans. Of a conv
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -61,34 +61,23 @@ def find_pieces(uv: FloatArray, uv_faces: IntArray, offsets: IntArray, face_corn
     whole = polygons.are_whole(points)
     height = heights(sides_between(uv[triples]))
     # What is upside down as a whole is so in fans, too, and no better in pieces.
-    not_left, not_right = (np.zeros(len(sizes), dtype=bool) for _ in range(2))
-    not_left[at[~(height > CONVEX)]] = not_right[at[~(height < -CONVEX)]] = True
-    split = np.flatnonzero(not_left & not_right)
+    split = np.intersect1d(at[~(height > CONVEX)], at[~(height < -CONVEX)])
     whole[split] = False
     if whole.all():
         return Pieces(loops, points[loops], sizes, np.arange(len(sizes)), split)
     kept = np.repeat(whole, sizes)
-    parts = [_Part(loops[kept], points[loops[kept]], sizes[whole], np.flatnonzero(whole))]
-    parts.append(_convex_parts(uv, uv_faces, face_corners, polygons.owner, ~whole))
-    corners, flat, counts, names = (np.concatenate(each) for each in zip(*parts, strict=True))
+    intact = (loops[kept], points[loops[kept]], sizes[whole], np.flatnonzero(whole))
+    parts = _convex_parts(uv, uv_faces, face_corners, polygons.owner, ~whole)
+    corners, flat, counts, names = map(np.concatenate, zip(intact, parts, strict=True))
     order = np.argsort(names, kind="stable")
     rows = np.argsort(np.repeat(names, counts), kind="stable")
     return Pieces(corners[rows], flat[rows], counts[order], names[order], split)
 
 
-class _Part(NamedTuple):
-    """Some of the polygons: the first four attributes of `Pieces`."""
-
-    corners: IntArray
-    points: IntArray
-    sizes: IntArray
-    polygons: IntArray
-
-
 def _convex_parts(
     uv: FloatArray, uv_faces: IntArray, face_corners: IntArray, owner: IntArray, chosen: BoolArray
-) -> _Part:
-    """Return what is left of the chosen polygons, in convex pieces."""
+) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Return what is left of the chosen polygons, in convex pieces: the first four attributes of `Pieces`."""
     faces = np.flatnonzero(chosen[owner])
     faces = faces[np.argsort(owner[faces], kind="stable")]
     names, first = np.unique(owner[faces], return_index=True)
@@ -101,7 +90,7 @@ def _convex_parts(
         polygons += [name] * len(loops)
     rows = np.array([node for loop in pieces for node in loop], dtype=np.int64).reshape(-1, 2)
     sizes = np.array([len(loop) for loop in pieces], dtype=np.int64)
-    return _Part(rows[:, 0], rows[:, 1], sizes, np.array(polygons, dtype=np.int64))
+    return rows[:, 0], rows[:, 1], sizes, np.array(polygons, dtype=np.int64)
 
 
 def merge_convex(uv: FloatArray, loops: list[Loop]) -> list[Loop]:

@@ -162,8 +162,7 @@ def join_borders(mesh: MeshFile) -> Joined:
 def _border(tails: IntArray, heads: IntArray, count: int) -> IntArray:
     """Return the half-edges of edges that have no other."""
     order, first = sort_pairs(tails, heads, count)
-    last = np.append(first[1:], True)
-    return np.sort(order[first & last])
+    return np.sort(order[first & np.append(first[1:], True)])
 
 
 def _opposite(
@@ -193,39 +192,27 @@ def _inconsistent(tails: IntArray, heads: IntArray, count: int) -> BoolArray:
     if not again.any():
         return np.zeros(count, dtype=bool)
     _, component = label_components(count, tails, heads)
-    is_bad = np.zeros(count, dtype=bool)
-    is_bad[component[tails[again]]] = True
-    bad: BoolArray = is_bad[component]
-    return bad
+    return np.isin(component, component[tails[again]])
 
 
 def _repeated(tails: IntArray, heads: IntArray, count: int) -> BoolArray:
     """Return (3m,) half-edges whose tail and head are those of another one, too."""
-    keys = tails * count + heads
-    order = np.argsort(keys, kind="stable")
-    same = keys[order][1:] == keys[order][:-1]
-    repeated = np.zeros(len(keys), dtype=bool)
-    repeated[order[1:][same]] = True
-    repeated[order[:-1][same]] = True
-    return repeated
+    _, number, counts = np.unique(tails * count + heads, return_inverse=True, return_counts=True)
+    return np.asarray(counts[number.reshape(-1)] > 1)
 
 
 def _merged(tails: IntArray, heads: IntArray, one: IntArray, two: IntArray, count: int) -> IntArray:
     """Return (n,) for each vertex the first of those that become one by joining half-edges."""
-    number, label = label_components(
+    _, label = label_components(
         count, np.concatenate([tails[one], heads[one]]), np.concatenate([heads[two], tails[two]])
     )
-    first = np.empty(number, dtype=np.int64)
-    first[label[::-1]] = np.arange(count)[::-1]
-    return np.asarray(first[label])
+    return np.asarray(np.unique(label, return_index=True)[1][label])
 
 
 def _spoilt(tails: IntArray, heads: IntArray, bad: BoolArray, count: int) -> BoolArray:
     """Return (n,) the vertices at which the joining does harm, beside components that were bad before."""
-    harm = _repeated(tails, heads, count) & ~bad[tails]
     # Of three corners one side is enough to tell that two are the same.
-    harm |= (tails == heads) & ~bad[tails]
+    harm = (_repeated(tails, heads, count) | (tails == heads)) & ~bad[tails]
     spoilt = np.zeros(count, dtype=bool)
-    spoilt[tails[harm]] = True
-    spoilt[heads[harm]] = True
+    spoilt[tails[harm]] = spoilt[heads[harm]] = True
     return spoilt

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces
 from ..errors import ArrayShapeError, MissingUVError
 from ..mesh.polygons import fan_corners
-from .input_mesh import as_input
 from .join import Joined
 from .mesh_file import MeshFile
+from .packages import as_input
 
 if TYPE_CHECKING:
     from ..result import Flattening

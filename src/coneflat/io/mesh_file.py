@@ -8,12 +8,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..base.arrays import FloatArray, IntArray
+from ..errors import EmptyMeshError, FaceIndexError, MeshFileError
 from ..geometry.triangulate import triangulate
-from ..mesh.polygons import COLOURS
+from ..mesh.polygons import COLOURS, first_bad_corner
 
 if TYPE_CHECKING:
-    from .gltf.scene import GltfScene
+    from .gltf.read import GltfScene
     from .obj import ObjText
 
 
@@ -67,3 +70,37 @@ class MeshFile:
             DegenerateFaceError, FaceIndexError: a polygon has fewer than 3 corners, or a corner no vertex.
         """
         return triangulate(self.vertices, self.corners, self.offsets)[0]
+
+
+def check_corners(path: Path, mesh: MeshFile) -> None:
+    """Refuse a mesh without vertices or faces, with a face of fewer than 3 corners, or a bad index.
+
+    Raises:
+        EmptyMeshError, MeshFileError, FaceIndexError: respectively.
+    """
+    count = len(mesh.vertices)
+    check_filled(path, count, len(mesh.offsets) - 1)
+    sizes = np.diff(mesh.offsets)
+    if sizes.min() < 3:
+        i = int(np.argmax(sizes < 3))
+        raise MeshFileError(f"{path}: face {i} has {sizes[i]} corners, but a face needs at least 3")
+    c = first_bad_corner(mesh.corners, count)
+    if c is not None:
+        i = int(np.searchsorted(mesh.offsets, c, side="right")) - 1
+        raise FaceIndexError(
+            f"{path}: face {i} names vertex {mesh.corners[c]}, but there are {count} vertices, from 0 on"
+        )
+
+
+def check_filled(path: Path, vertices: int, faces: int) -> None:
+    """Raise EmptyMeshError if a file has no vertices, or no faces."""
+    for count, name in ((vertices, "vertices"), (faces, "faces")):
+        if count <= 0:
+            raise EmptyMeshError(f"{path} has no {name}")
+
+
+def offsets_of(sizes: IntArray) -> IntArray:
+    """Return (p + 1,) the offsets of polygons of (p,) sizes."""
+    offsets = np.zeros(len(sizes) + 1, dtype=np.int64)
+    np.cumsum(sizes, out=offsets[1:])
+    return offsets

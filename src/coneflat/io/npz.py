@@ -1,23 +1,29 @@
-"""Results as NumPy archives: every array, and the report as JSON."""
+"""NumPy archives: results as these, and reading them array by array, each checked, lest they are damaged.
+
+A result has every array, and its report as JSON.
+"""
 
 from __future__ import annotations
 
 import json
+import math
+import zipfile
+from collections.abc import Callable, Iterable
 from dataclasses import fields
-from os import PathLike
-from typing import IO, TYPE_CHECKING, Any
+from io import BytesIO
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError
-from .archive import CheckedArrays, number, read_archive
-from .atomic import as_path
+from .files import PathName, as_path, read_bytes, readable
 
 if TYPE_CHECKING:
-    from ..measure.distortion import Distortion
     from ..measure.seam_data import Rotations
     from ..result import Flattening
-
 
 #: The arrays that make a result. The others of an archive, those of `SeamData`, follow from them.
 _NAMES = (
@@ -52,7 +58,7 @@ def write_npz(result: Flattening, stream: IO[bytes]) -> None:
     np.savez(stream, **arrays)
 
 
-def read_flattening(path: str | PathLike[str]) -> Flattening:
+def read_flattening(path: PathName) -> Flattening:
     """Return a result that was written as .npz; what it says of the file it came from is not kept.
 
     Raises:
@@ -62,10 +68,12 @@ def read_flattening(path: str | PathLike[str]) -> Flattening:
 
 
 def _flattening(reading: CheckedArrays) -> Flattening:
+    from ..measure.distortion import Distortion
+    from ..measure.report import MEASURES
     from ..result import Flattening
     from ..stages import SolveStatistics
 
-    path, arrays = reading.path, reading.arrays
+    path, arrays, floats, indices = reading.path, reading.arrays, reading.floats, reading.indices
     for name in _NAMES:
         if name not in arrays:
             what = "UVs" if name.startswith("uv") else "result of coneflat"
@@ -74,20 +82,25 @@ def _flattening(reading: CheckedArrays) -> Flattening:
             )
     report = json.loads(str(arrays["report"]))
     arrays.setdefault("prescribed", np.full(len(arrays["vertices"]), np.nan))
-    _check_report(report)
-    vertices, uv = reading.floats("vertices", (None, 3)), reading.floats("uv", (None, 2))
+    for name, kind in {"seconds": dict, "settings": dict, "notes": list}.items():
+        if not isinstance(report[name], kind):
+            raise ValueError(f"{name!r} of its report is a {type(report[name]).__name__}")
+    notes, efficiency = reading.notes(report), number(report["packing_efficiency"])
+    for value in report["seconds"].values():
+        number(value)
+    vertices, uv = floats("vertices", (None, 3)), floats("uv", (None, 2))
     n, u = len(vertices), len(uv)
-    faces = reading.indices("faces", (None, 3), n)
+    faces = indices("faces", (None, 3), n)
     m = len(faces)
-    uv_faces = reading.indices("uv_faces", (m, 3), u)
-    cones = reading.indices("cones", (None,), n)
+    uv_faces, cones = indices("uv_faces", (m, 3), u), indices("cones", (None,), n)
     if not m:
         raise MeshFileError(f"{path} is no result of coneflat: it has no faces")
     if not (np.isfinite(vertices).all() and np.isfinite(uv).all()):
         raise MeshFileError(f"{path} is no result of coneflat: it has positions or UVs that are not finite")
-    uv_scale = float(reading.floats("uv_scale", ()))
+    uv_scale = float(floats("uv_scale", ()))
     if not (np.isfinite(uv_scale) and uv_scale > 0):
         raise MeshFileError(f"{path} is no result of coneflat: its UV scale is {uv_scale:g}")
+    measures: dict[str, Any] = {name: number(report.get(name)) for name in MEASURES}
     return Flattening(
         vertices=vertices,
         faces=faces,
@@ -95,47 +108,25 @@ def _flattening(reading: CheckedArrays) -> Flattening:
         uv_faces=uv_faces,
         uv_scale=uv_scale,
         cones=cones,
-        curvatures=reading.floats("curvatures", (len(cones),)),
-        log_scale=reading.floats("log_scale", (n,)),
-        prescribed=reading.floats("prescribed", (n,)),
-        curvature_residual=reading.floats("curvature_residual", (n,)),
-        seams=reading.indices("seams", (None, 2), n),
-        packing_efficiency=number(report["packing_efficiency"]),
-        distortion=_distortion(reading, report, m),
+        curvatures=floats("curvatures", (len(cones),)),
+        log_scale=floats("log_scale", (n,)),
+        prescribed=floats("prescribed", (n,)),
+        curvature_residual=floats("curvature_residual", (n,)),
+        seams=indices("seams", (None, 2), n),
+        packing_efficiency=efficiency,
+        distortion=Distortion(
+            qc=floats("qc", (m,)), log_area_scale=floats("log_area_scale", (m,)), **measures
+        ),
         seconds=report["seconds"],
-        notes=tuple(report["notes"]),
+        notes=notes,
         settings=report["settings"],
         solve=SolveStatistics(
             **{field.name: number(report.get(field.name, field.default)) for field in fields(SolveStatistics)}
         ),
         rotations=_rotations(report),
-        vertex_origin=reading.indices("vertex_origin", (n,), None),
-        face_origin=reading.indices("face_origin", (m,), None),
-        lengths=reading.floats("lengths", (m, 3)) if "lengths" in arrays else None,
-    )
-
-
-def _check_report(report: Any) -> None:
-    """Raise ValueError if what a report says in words or lists is none of these."""
-    kinds = {"seconds": dict, "settings": dict, "notes": list}
-    for name, kind in kinds.items():
-        if not isinstance(report[name], kind):
-            raise ValueError(f"{name!r} of its report is a {type(report[name]).__name__}")
-    if not all(isinstance(one, str) for one in report["notes"]):
-        raise ValueError("its report has notes that are no text")
-    for value in (report["packing_efficiency"], *report["seconds"].values()):
-        number(value)
-
-
-def _distortion(reading: CheckedArrays, report: dict[str, Any], count: int) -> Distortion:
-    from ..measure.distortion import Distortion
-    from ..measure.report import MEASURES
-
-    numbers: dict[str, Any] = {name: number(report.get(name)) for name in MEASURES}
-    return Distortion(
-        qc=reading.floats("qc", (count,)),
-        log_area_scale=reading.floats("log_area_scale", (count,)),
-        **numbers,
+        vertex_origin=indices("vertex_origin", (n,), None),
+        face_origin=indices("face_origin", (m,), None),
+        lengths=floats("lengths", (m, 3)) if "lengths" in arrays else None,
     )
 
 
@@ -147,3 +138,153 @@ def _rotations(report: dict[str, Any]) -> Rotations | None:
     settings = report["settings"]
     quantum = settings.get("quantise", settings.get("quantum"))  # as it was called at first
     return Rotations(quantum, report["rotation_deviation"], tuple(report["handle_deviations"]))
+
+
+Made = TypeVar("Made")
+
+#: Results are not packed; programs that pack them gain a factor of a few.
+_MOST_UNPACKED = 30
+
+
+class CheckedArrays:
+    """Arrays of an archive, each of which must be what it should be there.
+
+    Attributes:
+        path: the archive.
+        arrays: by name, as they are.
+    """
+
+    def __init__(self, path: Path, arrays: dict[str, NDArray[Any]]) -> None:
+        self.path, self.arrays = path, arrays
+
+    def need(self, names: Iterable[str], what: str) -> None:
+        """Raise MeshFileError if arrays are missing; what: the file is to hold."""
+        for name in names:
+            if name not in self.arrays:
+                raise MeshFileError(f"{self.path} holds no {what}: {name!r} is missing")
+
+    def floats(self, name: str, shape: tuple[int | None, ...]) -> FloatArray:
+        """Return an array of numbers of a shape; None stands for any length.
+
+        Raises:
+            MeshFileError: it has another shape, or is of no numbers.
+        """
+        values = self.arrays[name]
+        fits = len(shape) == values.ndim and all(
+            length in (None, given) for length, given in zip(shape, values.shape, strict=True)
+        )
+        if values.dtype.kind not in "iuf" or not fits:
+            wanted = ", ".join("any" if length is None else f"{length}" for length in shape)
+            raise MeshFileError(
+                f"{self.path}: {name!r} has the shape {values.shape} and the type {values.dtype}, not the shape "
+                f"({wanted}) and a type of numbers"
+            )
+        return values.astype(np.float64)
+
+    def finite(self, name: str, shape: tuple[int | None, ...]) -> FloatArray:
+        """Return an array of finite numbers of a shape.
+
+        Raises:
+            MeshFileError: it has another shape, or numbers that are not finite.
+        """
+        values = self.floats(name, shape)
+        if not np.isfinite(values).all():
+            raise MeshFileError(f"{self.path}: {name!r} has numbers that are not finite")
+        return values
+
+    def indices(
+        self, name: str, shape: tuple[int | None, ...], bound: int | None, least: int = 0
+    ) -> IntArray:
+        """Return an array of whole numbers from `least` up to a bound, or to what an index can be.
+
+        Raises:
+            MeshFileError: it has another shape, or numbers beyond.
+        """
+        values = self.floats(name, shape)
+        end = 2**53 if bound is None else bound
+        if not np.all((values >= least) & (values < end) & (values == np.floor(values))):
+            there = "indices can be" if bound is None else f"the {bound} there are"
+            raise MeshFileError(f"{self.path}: {name!r} has indices beyond {there}")
+        return values.astype(np.int64)
+
+    def notes(self, report: dict[str, Any]) -> tuple[str, ...]:
+        """Return the notes of a report.
+
+        Raises:
+            ValueError: they are no list of texts.
+        """
+        notes = report["notes"]
+        if not isinstance(notes, list) or not all(isinstance(note, str) for note in notes):
+            raise ValueError("its report has notes that are no text")
+        return tuple(notes)
+
+    def report(self) -> dict[str, Any]:
+        """Return what the archive says in JSON, of which all numbers are finite or None.
+
+        Raises:
+            ValueError: it is none.
+        """
+        report = json.loads(str(self.arrays["report"]))
+        if not isinstance(report, dict):
+            raise ValueError(f"its report is a {type(report).__name__}")
+        return report
+
+
+def number(value: Any) -> Any:
+    """Return a number of a report; JSON has no NaN, for which it has None.
+
+    Raises:
+        ValueError: it is none.
+    """
+    if value is not None and not isinstance(value, (int, float)):
+        raise ValueError(f"its report has {str(value)[:20]!r} for a number")
+    return math.nan if value is None else value
+
+
+def read_archive(path: Path, names: Iterable[str], made: Callable[[CheckedArrays], Made]) -> Made:
+    """Return what is made of the arrays of an .npz file; others than those named are left unread.
+
+    Raises:
+        MeshFileError: the file is not there, may not be read, or is damaged.
+    """
+    content = read_bytes(path)
+    with readable(path, "NPZ file"):
+        return made(CheckedArrays(path, _arrays(path, content, names)))
+
+
+def _arrays(path: Path, content: bytes, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+    """Return the arrays of some names, none of which is larger than it can be in a file of this size.
+
+    NumPy allocates what the header of an array asks for, and unpacks whatever an archive holds.
+    """
+    arrays: dict[str, NDArray[Any]] = {}
+    left = _MOST_UNPACKED * len(content)
+    with zipfile.ZipFile(BytesIO(content)) as archive:
+        for name in names:
+            try:
+                member = archive.getinfo(f"{name}.npy")
+            except KeyError:
+                continue
+            left -= member.file_size
+            if left < 0:
+                raise MeshFileError(
+                    f"{path} unpacks to more than {_MOST_UNPACKED} times its size: it is no result"
+                )
+            with archive.open(member) as stream:
+                arrays[name] = _array(stream.read())
+    return arrays
+
+
+def _array(content: bytes) -> NDArray[Any]:
+    """Return the array that a .npy file holds."""
+    stream = BytesIO(content)
+    version = np.lib.format.read_magic(stream)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, is_fortran, kind = read(stream)
+    if kind.hasobject:
+        raise ValueError("it holds Python objects")
+    count = math.prod(shape)
+    if min(shape, default=0) < 0 or count * kind.itemsize != len(content) - stream.tell():
+        raise ValueError(f"an array of the shape {shape} is not as large as it should be")
+    values = np.frombuffer(content, kind, count, stream.tell()) if count else np.empty(0, kind)
+    return values.reshape(shape, order="F" if is_fortran else "C")

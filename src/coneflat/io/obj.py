@@ -1,4 +1,4 @@
-"""Reading Wavefront OBJ.
+"""Wavefront OBJ: reading it, and writing the input's own text with new texture coordinates.
 
 An own parser, because no library keeps all of what the output has to reproduce: the file's numbering of
 vertices, its polygons, groups, materials and comments.
@@ -6,37 +6,37 @@ vertices, its polygons, groups, materials and comments.
 
 from __future__ import annotations
 
+import os
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import FloatArray, IntArray
-from ..errors import EmptyMeshError, FaceIndexError, MeshFileError
+from ..errors import FaceIndexError, MeshFileError
 from ..mesh.polygons import COLOURS, first_bad_corner
-from .mesh_file import MeshFile
-from .raw import NO_UV, offsets_of
+from .convex_pieces import find_pieces
+from .files import moved_path
+from .mesh_file import MeshFile, check_filled, offsets_of
 from .text import Growing, TextBlock, newline_of, text_blocks
+
+if TYPE_CHECKING:
+    from ..result import Flattening
 
 _OTHER, _VERTEX, _FACE, _TEXTURE, _NORMAL, _ELEMENT, _COMMENTED_FACE = range(7)
 #: By the first two characters of a line, as a 16-bit number, what it is.
 _KINDS = np.full(1 << 16, _OTHER, np.uint8)
-for _head, _kind in (
-    (b"v ", _VERTEX),
-    (b"f ", _FACE),
-    (b"l ", _ELEMENT),
-    (b"p ", _ELEMENT),
-    (b"vt", _TEXTURE),
-    (b"vn", _NORMAL),
-):
-    _KINDS[int.from_bytes(_head, "big")] = _kind
-#: Instead of the number of a UV point that counts back beyond the first.
-_NO_SUCH_UV = -2
+_HEADS = {b"v ": _VERTEX, b"f ": _FACE, b"l ": _ELEMENT, b"p ": _ELEMENT, b"vt": _TEXTURE, b"vn": _NORMAL}
+_KINDS[[int.from_bytes(head, "big") for head in _HEADS]] = [*_HEADS.values()]
 _TEXTURE_INDICES = re.compile(rb"(#[^\r\n]*)|/[-+0-9]*")
+_MATERIALS = re.compile(rb"(?m)^([ \t]*mtllib[ \t]+)([^\r\n]*?)(?=[ \t]*\r?$)")
+#: Lines written at a time: their numbers take some MB as Python has them.
+_LINES = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,14 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
     for block in text_blocks(path, content, continued=True):
         kinds = _KINDS[block.heads()]
         points = block.words(np.flatnonzero(kinds == _VERTEX), first=1).points()
-        counts, given, texture, normal = _faces(block, kinds)
-        above = len(vertices) + np.cumsum(kinds == _VERTEX)[kinds == _FACE]
+        rows = np.flatnonzero(kinds == _FACE)
+        words = block.words(rows, first=1)
+        counts = words.counts
+        if len(rows) and counts.min() < 3:
+            i = int(np.argmax(counts < 3))
+            block.fail(int(rows[i]), f"a face needs at least 3 corners, but has {counts[i]}")
+        given, texture, normal = words.corners()
+        above = len(vertices) + np.cumsum(kinds == _VERTEX)[rows]
         for polygon, text in _texts(block, kinds, newline):
             gaps[len(sizes) + polygon] += text
         vertices.add(points[:, :3])
@@ -84,27 +90,24 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
             colours.add(points[:, 3:6])
         sizes.add(counts)
         if texture is not None:
-            beyond = len(uv) + np.cumsum(kinds == _TEXTURE)[kinds == _FACE]
+            beyond = len(uv) + np.cumsum(kinds == _TEXTURE)[rows]
             counted = np.repeat(beyond, counts) + texture
-            # A number that counts back beyond the first is no sign that there is none.
-            texture = np.where(texture < 0, np.where(counted < 0, _NO_SUCH_UV, counted), texture - 1)
+            # A number that counts back beyond the first is no sign that there is none, as -1 is.
+            texture = np.where(texture < 0, np.where(counted < 0, -2, counted), texture - 1)
         uv.add(_uv_points(block, np.flatnonzero(kinds == _TEXTURE)))
         shade = normal
         if normal is not None:
-            beyond = len(directions) + np.cumsum(kinds == _NORMAL)[kinds == _FACE]
+            beyond = len(directions) + np.cumsum(kinds == _NORMAL)[rows]
             shade = np.where(normal < 0, np.repeat(beyond, counts) + normal + 1, normal)
         directions.add(_directions(block, np.flatnonzero(kinds == _NORMAL)))
-        for known, found, none in ((textures, texture, NO_UV), (normals, normal, 0), (shading, shade, 0)):
+        for known, found, none in ((textures, texture, -1), (normals, normal, 0), (shading, shade, 0)):
             if found is not None:
                 known.add(np.full(len(corners) - len(known), none))
                 known.add(found)
         # A negative number counts back from the vertices that stand above the face.
         corners.add(np.where(given < 0, np.repeat(above, counts) + given, given - 1))
-    if not len(vertices):
-        raise EmptyMeshError(f"{path} has no vertices")
-    if not len(sizes):
-        raise EmptyMeshError(f"{path} has no faces")
-    for known, none in ((textures, NO_UV), (normals, 0), (shading, 0)):
+    check_filled(path, len(vertices), len(sizes))
+    for known, none in ((textures, -1), (normals, 0), (shading, 0)):
         if len(known):
             known.add(np.full(len(corners) - len(known), none))
     has_colours = len(colours) == len(vertices)
@@ -140,18 +143,6 @@ def _uv_points(block: TextBlock, rows: IntArray) -> FloatArray:
     has_v = words.counts > 1
     points[has_v, 1] = numbers[first[has_v] + 1]
     return points
-
-
-def _faces(
-    block: TextBlock, kinds: NDArray[np.uint8]
-) -> tuple[IntArray, IntArray, IntArray | None, IntArray | None]:
-    """Return (p,) sizes of a block's polygons, (c,) vertex numbers, UVs and normals of their corners."""
-    rows = np.flatnonzero(kinds == _FACE)
-    words = block.words(rows, first=1)
-    if len(rows) and words.counts.min() < 3:
-        i = int(np.argmax(words.counts < 3))
-        block.fail(int(rows[i]), f"a face needs at least 3 corners, but has {words.counts[i]}")
-    return words.counts, *words.corners()
 
 
 def _directions(block: TextBlock, rows: IntArray) -> FloatArray:
@@ -192,7 +183,7 @@ def _check_corners(path: Path, content: bytes, mesh: MeshFile) -> None:
         raise FaceIndexError(f"{path}, line {line}: a face names vertex {given}, but {known}")
     if mesh.texture is None or mesh.uv is None:
         return
-    c = first_bad_corner(np.where(mesh.texture == NO_UV, 0, mesh.texture), len(mesh.uv))
+    c = first_bad_corner(np.where(mesh.texture == -1, 0, mesh.texture), len(mesh.uv))
     if c is not None:
         line, given = _corner_line(path, content, c, 1)
         raise FaceIndexError(
@@ -211,3 +202,93 @@ def _corner_line(path: Path, content: bytes, c: int, part: int) -> tuple[int, in
             return block.line_number(row), 0 if numbers is None else int(numbers[c])
         c -= int(words.counts.sum())
     raise AssertionError("there is no such corner")
+
+
+def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
+    """Write a result as OBJ.
+
+    If the mesh was read from an OBJ file, every line of that file stands in its place, but for its old
+    texture coordinates: the new ones are put before the first face, and each face line names them beside the
+    file's own vertex and normal numbers. Polygons stay polygons, those whose orientation was repaired run the
+    other way, and those that the repair dropped are left out. A polygon that is not convex in the plane, is cut
+    by a seam, or was dropped in part, is written in convex pieces. Of another file, what is written are its
+    vertices, polygons and normals. Paths of material libraries are made to fit `folder`.
+
+    Args:
+        result: what to write.
+        stream: a binary file.
+        folder: where the file will be, for paths of material libraries.
+    """
+    source, text = result.source, ObjText({}, None, b"\n")
+    vertices, faces, face_corners = result.vertices, result.faces, result.face_corners
+    normals = None
+    if source is not None and face_corners is not None:
+        vertices, offsets, numbers = source.vertices, source.offsets, source.corners + 1
+        if source.obj is not None:
+            # Its own vertices stand in the text, those that were merged as well.
+            numbers = numbers if source.unwelded is None else source.unwelded + 1
+            text = _relocated(source.obj, source.path.parent, folder)
+        elif source.normals is not None and source.normal is not None:
+            normals, text = source.normals, replace(text, normals=source.normal + 1)
+    else:
+        source, numbers = None, faces.reshape(-1) + 1
+        offsets = np.arange(0, len(numbers) + 1, 3)
+        face_corners = np.arange(len(numbers)).reshape(-1, 3)
+    to_write = find_pieces(result.uv, result.uv_faces, offsets, face_corners)
+    columns = [numbers[to_write.corners], to_write.points + 1]
+    if text.normals is not None:
+        columns.append(text.normals[to_write.corners])
+    newline, last = text.newline, len(offsets) - 1
+    if source is None or source.obj is None:
+        stream.writelines(lines_of("v", vertices, newline))
+    if normals is not None:
+        stream.writelines(lines_of("vn", normals, newline))
+    before = sorted({0, last, *text.gaps})
+    begins = np.searchsorted(to_write.polygons, before).tolist()
+    starts = np.concatenate(([0], np.cumsum(to_write.sizes)))
+    for place, begin, end in zip(before, begins, [*begins[1:], len(to_write.sizes)], strict=True):
+        stream.write(_ended(text.gaps.get(place, b""), newline, place == last))
+        if place == 0:
+            stream.writelines(lines_of("vt", result.uv, newline))
+        for first in range(begin, end, _LINES):
+            stop = min(first + _LINES, end)
+            rows = np.stack([column[starts[first] : starts[stop]] for column in columns], axis=1)
+            stream.write(_face_lines(to_write.sizes[first:stop], rows, newline))
+
+
+def lines_of(begin: str, rows: FloatArray | IntArray, newline: bytes) -> Iterator[bytes]:
+    """Yield a text with a line for each of (r, k) rows: the fewest digits from which the same numbers are read."""
+    line = begin + " %r" * rows.shape[1] + newline.decode()
+    for i in range(0, len(rows), _LINES):
+        block = rows[i : i + _LINES]
+        yield (line * len(block) % tuple(block.ravel().tolist())).encode()
+
+
+def _face_lines(sizes: IntArray, rows: IntArray, newline: bytes) -> bytes:
+    """Return the lines of faces, with one row of numbers for each corner; a normal of 0 is none."""
+    corner, end = " " + "/".join(["%d"] * rows.shape[1]), newline.decode()
+    lines = "".join(["f" + corner * size + end for size in sizes.tolist()])
+    text = (lines % tuple(rows.ravel().tolist())).encode()
+    return text.replace(b"/0 ", b" ").replace(b"/0" + newline, newline)
+
+
+def _ended(text: bytes, newline: bytes, is_last: bool) -> bytes:
+    """Return text that a line can follow."""
+    return text + newline if text and not is_last and not text.endswith((b"\n", b"\r")) else text
+
+
+def _relocated(text: ObjText, old: Path, new: Path) -> ObjText:
+    """Return the text with its material libraries named relative to another folder."""
+    here, there = os.path.realpath(old), os.path.realpath(new)
+    if here == there:
+        return text
+
+    def line(match: re.Match[bytes]) -> bytes:
+        names = match[2]
+        # Several names may stand on a line, and so may one name with blanks; the folder tells.
+        is_one = os.path.exists(os.path.join(os.fsencode(here), names))
+        parts = [names] if is_one else names.split()
+        return match[1] + b" ".join(moved_path(name, here, there) for name in parts)
+
+    gaps = {i: _MATERIALS.sub(line, gap) if b"mtllib" in gap else gap for i, gap in text.gaps.items()}
+    return replace(text, gaps=gaps)

@@ -11,8 +11,7 @@ import numpy as np
 
 from ..base.arrays import IntArray
 from ..errors import MeshFileError
-from .mesh_file import MeshFile
-from .raw import offsets_of
+from .mesh_file import MeshFile, offsets_of
 from .text import Growing, TextBlock, text_blocks
 
 # Normals follow the position, then colours and texture coordinates, so that these can be passed over; "4" and "n"
@@ -33,25 +32,24 @@ def parse_off(path: Path, content: bytes) -> MeshFile:
         MeshFileError: the file is not OFF, is shorter than its header promises, or has text for a number.
     """
     vertex_count, face_count, begin, has_normals = _header(path, content)
-    normals = Growing(np.float64, 3)
-    vertices, sizes, corners = Growing(np.float64, 3), Growing(np.int64), Growing(np.int64)
+    vertices, normals = Growing(np.float64, 3), Growing(np.float64, 3)
+    sizes, corners = Growing(np.int64), Growing(np.int64)
     lines = 0
     for block in text_blocks(path, content, begin):
         rows = np.flatnonzero(block.counts)
-        of_vertices, of_faces = np.clip(
-            [vertex_count - lines, vertex_count + face_count - lines], 0, len(rows)
-        )
+        ends = np.array([vertex_count, vertex_count + face_count]) - lines
+        of_vertices, of_faces = np.clip(ends, 0, len(rows))
         points = block.words(rows[:of_vertices]).points()
         vertices.add(points[:, :3])
         if has_normals and points.shape[1] >= 6:
             normals.add(points[:, 3:6])
-        for whole, new in zip((sizes, corners), _polygons(block, rows[of_vertices:of_faces]), strict=True):
-            whole.add(new)
+        counts, named = _polygons(block, rows[of_vertices:of_faces])
+        sizes.add(counts)
+        corners.add(named)
         lines += len(rows)
     if lines < vertex_count:
         raise MeshFileError(f"{path} ends after {lines} of the {vertex_count} vertices it promises")
-    if lines < vertex_count + face_count:
-        held = lines - vertex_count
+    if (held := lines - vertex_count) < face_count:
         raise MeshFileError(f"{path} ends after {held} of the {face_count} faces it promises")
     mesh = MeshFile(path, vertices.done(), corners.done(), offsets_of(sizes.done()))
     if len(normals) < vertex_count or not vertex_count:
@@ -68,10 +66,9 @@ def _polygons(block: TextBlock, rows: IntArray) -> tuple[IntArray, IntArray]:
     short = (words.counts != sizes) | (sizes < 3)
     if short.any():
         i = int(np.argmax(short))
-        reason = f"a face of {sizes[i]} corners names {words.counts[i]} vertices"
         if sizes[i] < 3:
-            reason = f"a face needs at least 3 corners, but has {sizes[i]}"
-        block.fail(int(rows[i]), reason)
+            block.fail(int(rows[i]), f"a face needs at least 3 corners, but has {sizes[i]}")
+        block.fail(int(rows[i]), f"a face of {sizes[i]} corners names {words.counts[i]} vertices")
     return sizes, corners
 
 

@@ -1,17 +1,99 @@
-"""Results as meshes of other packages, which are imported when they are asked for."""
+"""Meshes from arrays, files and the mesh classes of other packages, and results as meshes of these.
+
+Other packages are imported when they are asked for.
+"""
 
 from __future__ import annotations
 
 from importlib import import_module
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..errors import OptionError
-from .uv_split import split_at_seams
+from ..errors import ArrayShapeError, OptionError
+from ..geometry.triangulate import triangulate
+from ..source.input_mesh import InputMesh
+from .mesh_file import MeshFile, offsets_of
+from .split import split_at_seams
 
 if TYPE_CHECKING:
     from ..result import Flattening
+
+
+def as_input(mesh: Any, faces: ArrayLike | None = None) -> InputMesh:
+    """Return the triangles of whatever the user has.
+
+    Args:
+        mesh: vertices (n, 3) if `faces` is given; else a path, a `MeshFile`, a pair (vertices, faces), or
+            an object like those of trimesh (`vertices`, `faces`), meshio (`points`, `cells`) or pyvista
+            (`points`, `faces`).
+        faces: (m, 3) vertex indices.
+
+    Raises:
+        ArrayShapeError: it is none of these.
+    """
+    if faces is not None:
+        return InputMesh(mesh, faces)
+    if isinstance(mesh, (str, PathLike)):
+        from . import read_mesh
+
+        mesh = read_mesh(mesh)
+    if isinstance(mesh, MeshFile):
+        triangles, corners = triangulate(mesh.vertices, mesh.corners, mesh.offsets)
+        return InputMesh(mesh.vertices, triangles, mesh, corners)
+    if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
+        return InputMesh(mesh[0], mesh[1])
+    if hasattr(mesh, "points") and hasattr(mesh, "cells") and not hasattr(mesh, "n_points"):
+        return _from_meshio(mesh)
+    if hasattr(mesh, "points") and hasattr(mesh, "faces"):
+        return _from_pyvista(mesh)
+    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
+        return InputMesh(mesh.vertices, mesh.faces)
+    raise ArrayShapeError(
+        f"cannot read a mesh from {type(mesh).__name__}: give vertices and faces, a file's path, or a mesh of "
+        "trimesh, meshio or pyvista (for pyvista, a surface: extract_surface())"
+    )
+
+
+def _from_meshio(mesh: Any) -> InputMesh:
+    known = [block for block in mesh.cells if block.type in ("triangle", "quad", "polygon")]
+    if not known:
+        kinds = ", ".join(sorted({str(block.type) for block in mesh.cells})) or "none"
+        raise ArrayShapeError(f"the mesh has no triangles, quads or polygons; its cells are: {kinds}")
+    return _from_polygons(mesh.points, [row for block in known for row in np.asarray(block.data).tolist()])
+
+
+def _from_pyvista(mesh: Any) -> InputMesh:
+    padded = np.asarray(mesh.faces)
+    if padded.ndim == 2:  # not padded: rows of one size
+        return InputMesh(mesh.points, padded)
+    if padded.size and padded.size % 4 == 0 and (padded[::4] == 3).all():
+        return InputMesh(mesh.points, padded.reshape(-1, 4)[:, 1:])
+    polygons, position = [], 0
+    while position < padded.size:
+        size = int(padded[position])
+        end = position + 1 + size
+        if size < 1 or end > padded.size:
+            raise ArrayShapeError(
+                f"the flat array of faces is broken at {position}: a face of {size} corners with "
+                f"{padded.size - position - 1} numbers left"
+            )
+        polygons.append(padded[position + 1 : end].tolist())
+        position = end
+    return _from_polygons(mesh.points, polygons)
+
+
+def _from_polygons(points: ArrayLike, polygons: list[list[int]]) -> InputMesh:
+    vertices = np.asarray(points, dtype=np.float64)
+    if vertices.ndim == 2 and vertices.shape[1] == 2:  # meshes of the plane
+        vertices = np.column_stack([vertices, np.zeros(len(vertices))])
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise ArrayShapeError(f"points must have the shape (n, 3), not {vertices.shape}")
+    offsets = offsets_of(np.array([len(polygon) for polygon in polygons], dtype=np.int64))
+    corners = np.array([v for polygon in polygons for v in polygon], dtype=np.int64)
+    return InputMesh(vertices, triangulate(vertices, corners, offsets)[0])
 
 
 def to_trimesh(result: Flattening) -> Any:

@@ -1,4 +1,4 @@
-"""Reading PLY, text and binary, with its polygons.
+"""PLY: reading it, text and binary, with its polygons, and writing it.
 
 An own reader, since polygons, all numbers of vertices and the UVs of corners are to survive, and what a header promises
 is not to be believed before it is found.
@@ -7,33 +7,34 @@ is not to be believed before it is found.
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import IO, TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import FloatArray, IntArray
-from ..errors import EmptyMeshError, MeshFileError
+from ..errors import MeshFileError
 from ..mesh.polygons import COLOURS
-from .mesh_file import MeshFile
-from .raw import NO_UV, offsets_of
+from .mesh_file import MeshFile, check_filled, offsets_of
+from .split import source_normals, split_at_seams
 from .text import Growing, text_blocks
 
+if TYPE_CHECKING:
+    from ..result import Flattening
+
+#: The code of each type, both numpy's and struct's.
 _TYPES = {
-    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
-    "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
-    "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
+    "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d",
+    "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q",
+    "float32": "f", "float64": "d",
 }  # fmt: skip
 #: One property of an element, all rows of it.
 Column: TypeAlias = "np.ndarray[tuple[int, ...], np.dtype[Any]]"
 
-_STRUCT = {
-    "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
-    "f4": "f", "f8": "d",
-}  # fmt: skip
-_NORMAL = ("nx", "ny", "nz")
 _CORNERS = ("vertex_indices", "vertex_index")
 #: What programs call a vertex's UV point, and the list of those of a face's corners: u, v, u, v, ...
 _VERTEX_UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("u0", "v0"))
@@ -56,13 +57,9 @@ class _Element:
     @cached_property
     def steps(self) -> list[tuple[int, struct.Struct | None]]:
         """Of each property, the bytes of the value or of an item, and what reads a list's length."""
-        return [
-            (
-                np.dtype(p.kind).itemsize,
-                struct.Struct(p.count[0] + _STRUCT[p.count[1:]]) if p.count else None,
-            )
-            for p in self.properties
-        ]
+        sizes = (np.dtype(p.kind).itemsize for p in self.properties)
+        counts = (struct.Struct(p.count) if p.count else None for p in self.properties)
+        return list(zip(sizes, counts, strict=True))
 
 
 def parse_ply(path: Path, content: bytes) -> MeshFile:
@@ -77,10 +74,10 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
         # As an array of doubles the text is read by the same code as the binary forms; doubles hold every
         # index a file can have.
         content, start = _text_values(path, content, start), 0
-    vertices: FloatArray | None = None
-    properties: dict[str, FloatArray] = {}
-    polygons: tuple[IntArray, IntArray] | None = None
-    corner_uv: tuple[IntArray, FloatArray] | None = None
+    vertices: FloatArray = np.empty((0, 3))
+    sizes: IntArray = np.empty(0, np.int64)
+    corners, properties, missing = sizes, dict[str, FloatArray](), {"vertex", "face"}
+    texture, uv = None, None
     for element in elements:
         wanted = _wanted(path, element)
         try:
@@ -94,32 +91,32 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
             vertices = np.stack([np.asarray(c, np.float64) for c in columns[:3]], axis=1)
             properties = {name: _shade(name, c) for name, c in zip(names[3:], columns[3:], strict=True)}
         elif element.name == "face":
-            polygons = (columns[0].astype(np.int64), _whole(path, columns[1]))
-            corner_uv = _corner_uv(path, polygons[0], *columns[2:]) if columns[2:] else None
-        if vertices is not None and polygons is not None:
+            sizes, corners = columns[0].astype(np.int64), _whole(path, columns[1])
+            texture, uv = _corner_uv(path, sizes, *columns[2:]) if columns[2:] else (None, None)
+        missing.discard(element.name)
+        if not missing:
             break
-    if vertices is None or not len(vertices):
-        raise EmptyMeshError(f"{path} has no vertices")
-    if polygons is None or not len(polygons[0]):
-        raise EmptyMeshError(f"{path} has no faces")
-    normals = None
-    if all(name in properties for name in _NORMAL):
-        normals = np.stack([properties[name] for name in _NORMAL], axis=1)
-    mesh = MeshFile(
+    check_filled(path, len(vertices), len(sizes))
+
+    def together(names: tuple[str, ...]) -> FloatArray | None:
+        found = [properties[name] for name in names if name in properties]
+        return np.stack(found, axis=1) if len(found) == len(names) else None
+
+    if uv is None or not len(uv):
+        uv = next((points for pair in _VERTEX_UV if (points := together(pair)) is not None), None)
+        texture = None if uv is None else corners
+    normals = together(("nx", "ny", "nz"))
+    return MeshFile(
         path,
         vertices,
-        polygons[1],
-        offsets_of(polygons[0]),
+        corners,
+        offsets_of(sizes),
         properties=properties,
+        texture=texture,
+        uv=uv,
         normals=normals,
-        normal=None if normals is None else polygons[1],
+        normal=None if normals is None else corners,
     )
-    if corner_uv is not None and len(corner_uv[1]):
-        return replace(mesh, texture=corner_uv[0], uv=corner_uv[1])
-    for pair in _VERTEX_UV:
-        if all(name in properties for name in pair):
-            return replace(mesh, texture=mesh.corners, uv=np.stack([properties[n] for n in pair], axis=1))
-    return mesh
 
 
 def _corner_uv(path: Path, sizes: IntArray, counts: Column, numbers: Column) -> tuple[IntArray, FloatArray]:
@@ -136,7 +133,7 @@ def _corner_uv(path: Path, sizes: IntArray, counts: Column, numbers: Column) -> 
             "needs two for each corner"
         )
     has_uv = np.repeat(counts != 0, sizes)
-    texture = np.where(has_uv, np.cumsum(has_uv) - 1, NO_UV)
+    texture = np.where(has_uv, np.cumsum(has_uv) - 1, -1)
     return texture, np.asarray(numbers, np.float64).reshape(-1, 2)
 
 
@@ -207,9 +204,8 @@ class _EndOfFile(Exception):
 def _decode(content: bytes, start: int, element: _Element, wanted: list[int]) -> tuple[list[Column], int]:
     """Return the wanted columns of an element, a list as two (lengths, items), and where it ends."""
     lists = [i for i, p in enumerate(element.properties) if p.count]
-    lengths = dict(
-        zip(lists, _row(content, start, element)[1] if element.length else [0] * len(lists), strict=True)
-    )
+    first = _row(content, start, element)[1] if element.length else [0] * len(lists)
+    lengths = dict(zip(lists, first, strict=True))
     fields: list[tuple[str, str] | tuple[str, str, int]] = []
     for i, p in enumerate(element.properties):
         fields += [(f"n{i}", p.count), (f"p{i}", p.kind, lengths[i])] if p.count else [(f"p{i}", p.kind)]
@@ -293,7 +289,7 @@ def _stored(element: _Element, form: str) -> _Element:
     order = ">" if form == "binary_big_endian" else "<"
 
     def kind(code: str) -> str:
-        return "<f8" if form == "ascii" else order + code
+        return "<d" if form == "ascii" else order + code
 
     stored = [_Property(p.name, kind(p.kind), p.count and kind(p.count)) for p in element.properties]
     return replace(element, properties=tuple(stored))
@@ -306,3 +302,74 @@ def _whole(path: Path, corners: Column) -> IntArray:
         odd = corners[np.argmax(numbers != corners)]
         raise MeshFileError(f"{path}: a face names vertex {odd}, which is not a whole number")
     return numbers
+
+
+def write_ply(result: Flattening, stream: IO[bytes]) -> None:
+    """Write a result as binary little-endian PLY, coordinates as doubles.
+
+    Every vertex has its UV as `s` and `t`, and as `source_vertex` the vertex of the input that it came from;
+    where the mesh was cut there are several of the same. If the input has normals or colours, so have they. Vertices
+    without a face are left out.
+
+    Args:
+        result: what to write.
+        stream: a binary file.
+    """
+    mesh = split_at_seams(result, source_normals(result))
+    doubles = {"x y z": mesh.vertices}
+    if mesh.normals is not None:
+        doubles["nx ny nz"] = mesh.normals
+    doubles["s t"] = mesh.uv
+    names = " ".join(doubles).split()
+    colours = _colours(result, mesh.own)
+    kind = [("doubles", "<f8", len(names)), ("source_vertex", "<i4"), ("colours", "u1", colours.shape[1])]
+    vertices = np.empty(len(mesh.vertices), kind)
+    vertices["doubles"] = np.concatenate(list(doubles.values()), axis=1)
+    vertices["source_vertex"] = mesh.origin
+    vertices["colours"] = colours
+    properties = [
+        *(f"double {name}" for name in names),
+        "int source_vertex",
+        *(f"uchar {name}" for name in COLOURS[: colours.shape[1]]),
+    ]
+    write_parts(stream, "flattened by coneflat", properties, vertices, mesh.faces)
+
+
+def write_parts(
+    stream: IO[bytes], comment: str, properties: Sequence[str], vertices: NDArray[Any], faces: IntArray
+) -> None:
+    """Write vertices and faces as binary little-endian PLY.
+
+    Args:
+        stream: a binary file.
+        comment: a line of the header.
+        properties: of a vertex: "double x", say.
+        vertices: (n, ...) as they lie in the file, with these properties.
+        faces: (m, k) vertex indices.
+    """
+    rows = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", faces.shape[1])])
+    rows["count"] = faces.shape[1]
+    rows["corners"] = faces
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"comment {comment}",
+        f"element vertex {len(vertices)}",
+        *(f"property {one}" for one in properties),
+        f"element face {len(faces)}",
+        "property list uchar int vertex_indices",
+        "end_header",
+    ]
+    stream.write(("\n".join(header) + "\n").encode("ascii"))
+    stream.write(vertices.data)
+    stream.write(rows.data)
+
+
+def _colours(result: Flattening, vertices: IntArray) -> NDArray[np.uint8]:
+    """Return (k, 3) the colours that the file gives vertices of the result, 0 to 255; (k, 0) if it gives none."""
+    source = result.source
+    if source is None or result.face_corners is None or not source.has_colours:
+        return np.empty((len(vertices), 0), np.uint8)
+    number = np.arange(len(result.vertices)) if result.vertex_origin is None else result.vertex_origin
+    shades = np.stack([source.properties[name][number[vertices]] for name in COLOURS], axis=1)
+    return np.round(255 * np.clip(np.nan_to_num(shades), 0, 1)).astype(np.uint8)

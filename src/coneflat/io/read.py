@@ -7,23 +7,21 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
 from ..base.text import shown
-from ..errors import ConeflatError, EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
+from ..errors import EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
 from ..mesh.check import weld as weld_vertices
-from .atomic import as_path, known_ending
+from .files import PIPE, PathName, as_path, known_ending, read_bytes, read_input, readable
 from .gltf.read import parse_gltf
 from .join import Joined, join_borders
-from .mesh_file import MeshFile
-from .normals import usable_normals
+from .mesh_file import MeshFile, check_corners
 from .obj import parse_obj
 from .off import is_off, parse_off
 from .ply import parse_ply
-from .raw import PIPE, check_corners, read_bytes, read_input
+from .split import usable_normals
 from .stl import is_stl, parse_stl
 
 _READERS: dict[str, Callable[[Path, bytes], MeshFile]] = {
@@ -41,7 +39,7 @@ _WELDED_BY_DEFAULT = {".stl", ".gltf", ".glb"}
 INPUT_FORMATS = tuple(_READERS)
 
 
-def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
+def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
     """Return the mesh of a file, with its polygons, in the file's own order of vertices and faces.
 
     The format follows the path's ending, in any case: .obj, .ply, .stl, .off, .gltf, .glb. Of a glTF scene
@@ -75,7 +73,7 @@ def read_mesh(path: str | PathLike[str], weld: bool | None = None) -> MeshFile:
 
 
 def read_mesh_from(
-    content: bytes, name: str | PathLike[str], weld: bool | None = None, ending: str | None = None
+    content: bytes, name: PathName, weld: bool | None = None, ending: str | None = None
 ) -> MeshFile:
     """Return the mesh that the content of a file is; see `read_mesh`.
 
@@ -100,18 +98,10 @@ def read_mesh_from(
         raise UnknownFormatError(
             f"{ending!r} is no format that meshes are read from: {', '.join(INPUT_FORMATS)}"
         )
-    try:
+    with readable(path, f"{ending[1:].upper()} file"):
         with np.errstate(invalid="ignore"):  # coordinates that are no numbers are passed on
             mesh = _READERS[ending](path, content)
         check_corners(path, mesh)
-    except (ConeflatError, MemoryError):
-        raise
-    except Exception as error:
-        # Whatever a damaged file makes a parser do, the caller sees one kind of error.
-        reason = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())[:200]
-        raise MeshFileError(
-            f"{path} is not a readable {ending[1:].upper()} file: {reason or type(error).__name__}"
-        ) from error
     normal = None
     if mesh.normals is not None and mesh.normal is not None:
         normal = usable_normals(mesh.normals, mesh.normal)
@@ -177,7 +167,7 @@ def find_meshes(pattern: str) -> list[str]:
     return matches
 
 
-def read_joined(path: str | PathLike[str], weld: bool | None = None) -> Joined:
+def read_joined(path: PathName, weld: bool | None = None) -> Joined:
     """Return the mesh of a file, closed where nobody could want it open.
 
     Args:

@@ -10,19 +10,15 @@ import numpy as np
 from ..base.arrays import FloatArray
 from ..errors import EmptyMeshError, MeshFileError
 from .mesh_file import MeshFile
-from .raw import triangle_offsets
 from .text import Growing, text_blocks
 
-_HEADER_BYTES = 84
+_HEADER = np.dtype([("comment", "S80"), ("count", "<u4")])
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def is_stl(content: bytes) -> bool:
     """Return whether a file is one of STL, by its first word or by a length that is just that of its triangles."""
-    if re.match(rb"\s*solid\s", content, re.IGNORECASE):
-        return True
-    promised = int.from_bytes(content[80:84], "little")
-    return len(content) == _HEADER_BYTES + promised * _TRIANGLE.itemsize
+    return bool(re.match(rb"\s*solid\s", content, re.IGNORECASE)) or len(content) == _promised(content)[1]
 
 
 def parse_stl(path: Path, content: bytes) -> MeshFile:
@@ -32,23 +28,30 @@ def parse_stl(path: Path, content: bytes) -> MeshFile:
         MeshFileError: the file is neither, or it is cut short.
         EmptyMeshError: it has no triangle.
     """
-    promised = int.from_bytes(content[80:84], "little") if len(content) >= _HEADER_BYTES else -1
-    needed = _HEADER_BYTES + promised * _TRIANGLE.itemsize
+    promised, needed = _promised(content)
     is_text = re.match(rb"\s*solid", content, re.IGNORECASE) is not None
     # Binary files may begin with "solid" too, so an exact fit decides before the first word does.
-    if promised >= 0 and (len(content) == needed or (len(content) > needed and not is_text)):
-        triangles = np.frombuffer(content, _TRIANGLE, promised, _HEADER_BYTES)
+    if len(content) == needed or (len(content) > needed > 0 and not is_text):
+        triangles = np.frombuffer(content, _TRIANGLE, promised, _HEADER.itemsize)
         points = triangles["corners"].reshape(-1, 3).astype(np.float64)
     elif is_text:
         points = _text_points(path, content)
-    elif promised >= 0:
-        held = (len(content) - _HEADER_BYTES) // _TRIANGLE.itemsize
+    elif needed:
+        held = (len(content) - _HEADER.itemsize) // _TRIANGLE.itemsize
         raise MeshFileError(f"{path} ends after {held} of the {promised} triangles its header promises")
     else:
         raise MeshFileError(f"{path} is not an STL file: it is shorter than the header of one")
     if not len(points):
         raise EmptyMeshError(f"{path} has no faces")
-    return MeshFile(path, points, np.arange(len(points), dtype=np.int64), triangle_offsets(len(points) // 3))
+    return MeshFile(path, points, np.arange(len(points)), np.arange(0, len(points) + 1, 3))
+
+
+def _promised(content: bytes) -> tuple[int, int]:
+    """Return how many triangles a binary file promises, and its bytes with these; 0, 0 if it has no header."""
+    if len(content) < _HEADER.itemsize:
+        return 0, 0
+    promised = int(np.frombuffer(content, _HEADER, 1)["count"][0])
+    return promised, _HEADER.itemsize + promised * _TRIANGLE.itemsize
 
 
 def _text_points(path: Path, content: bytes) -> FloatArray:

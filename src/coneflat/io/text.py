@@ -9,7 +9,7 @@ import re
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NoReturn, overload
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,11 +36,6 @@ _CONTINUATION = re.compile(rb"\\(?:\r\n|[\r\n])")
 _FLOAT = re.compile(rb"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|inf(?:inity)?|nan)", re.IGNORECASE)
 _INTEGER = re.compile(rb"[-+]?\d+")
 _CORNER = re.compile(rb"[-+]?\d+(?:/(?:[-+]?\d+)?){0,2}")
-
-
-def line_number(content: bytes, position: int) -> int:
-    """Return the number of the line, from 1, that begins at a position."""
-    return 1 + len(content[:position].splitlines())
 
 
 def newline_of(content: bytes) -> bytes:
@@ -100,9 +95,8 @@ class TextBlock:
         filled = np.flatnonzero(self.counts)
         starts = self._word_starts[self._first_words[filled]]
         second = self._codes[starts + 1]
-        heads[filled] = self._codes[starts].astype(np.int64) << 8 | np.where(
-            _is_blank(second), ord(" "), second
-        )
+        heads[filled] = self._codes[starts].astype(np.int64) << 8
+        heads[filled] |= np.where(_is_blank(second), ord(" "), second)
         return heads
 
     def beginning_with(self, word: bytes) -> IntArray:
@@ -137,7 +131,7 @@ class TextBlock:
 
     def line_number(self, row: int) -> int:
         """Return the number of a line in the file, from 1."""
-        return line_number(self._content, self._begin + int(self.line_starts[row]))
+        return 1 + len(self._content[: self._begin + int(self.line_starts[row])].splitlines())
 
 
 class Words:
@@ -231,7 +225,7 @@ class Words:
 def _plain_lines(text: bytes, comments: bool, continued: bool) -> bytes:
     """Return lines with blanks for all that is no word, at the same places; each ends with one newline."""
     if text.startswith(_BOM):
-        text = _blanks(text[: len(_BOM)]) + text[len(_BOM) :]
+        text = text.replace(_BOM, b"   ", 1)
     if continued and b"\\" in text:
         # The backslash at the end of a comment is text, often that of a Windows path.
         text = _CONTINUATION.sub(_blanks, _COMMENT_LINE.sub(_blanks, text))
@@ -242,14 +236,10 @@ def _plain_lines(text: bytes, comments: bool, continued: bool) -> bytes:
     return text if text.endswith(b"\n") else text + b"\n"
 
 
-def _blanks(text: bytes | re.Match[bytes]) -> bytes:
-    return b" " * len(text if isinstance(text, bytes) else text[0])
+def _blanks(match: re.Match[bytes]) -> bytes:
+    return b" " * len(match[0])
 
 
-@overload
-def _numbers(text: bytes, count: int, kind: type[np.float64]) -> FloatArray | None: ...
-@overload
-def _numbers(text: bytes, count: int, kind: type[np.int64]) -> IntArray | None: ...
 def _numbers(text: bytes, count: int, kind: type[np.generic]) -> NDArray[Any] | None:
     """Return (count,) the words of a text as numbers, or None if a word is none."""
     if count == 0:

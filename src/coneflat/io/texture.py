@@ -1,32 +1,30 @@
-"""Images that GLB files carry as textures, and pages as pictures."""
+"""The checkerboard that shows what a flattening does, and images: textures of GLB files, pictures of pages."""
 
 from __future__ import annotations
 
 from io import BytesIO
-from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError, OptionError
-from .atomic import as_path
-from .checker import DARK_CELL, LIGHT_CELL, cell_side
-from .raw import read_bytes
+from ..geometry.planar import signed_double_areas
+from .files import PathName, as_path, read_bytes, readable
 
 if TYPE_CHECKING:
     from ..result import Flattening
 
-CHECKER = "checker"
-"""The name that stands for the checkerboard."""
-
-IMAGE_SIDE = 2048
-"""Pixels of the checkerboard's image along each side, about."""
-
+#: A light, slightly cool grey.
+LIGHT_CELL = (0.86, 0.87, 0.89)
+#: Blue, so that red and black marks stand out.
+DARK_CELL = (0.34, 0.46, 0.62)
+#: Cells in a row that is as long as the square root of the area: about 20 across a ball.
+CELLS = 36
+#: The formats that glTF knows, and their names there.
 EMBEDDED = {"PNG": "image/png", "JPEG": "image/jpeg"}
-"""The formats that glTF knows, and their names there."""
-
+#: A page with a picture that has more is slow to open.
 MOST_BYTES = 32 * 2**20
-"""A page with a picture that has more is slow to open."""
 
 _BEGINNINGS = {
     b"\x89PNG\r\n\x1a\n": "image/png",
@@ -43,7 +41,29 @@ class Texture(NamedTuple):
     kind: str
 
 
-def find_texture(texture: str | PathLike[str], result: Flattening | None = None) -> Texture | None:
+def cell_side(uv: FloatArray, uv_faces: IntArray, cells: float = CELLS) -> float:
+    """Return the side, in UV units, of square cells of which the layout's area holds `cells` squared.
+
+    Args:
+        uv: (u, 2) points of the layout.
+        uv_faces: (m, 3) index into them of every triangle corner.
+        cells: how many are as long as the root of the area.
+
+    Raises:
+        OptionError: `cells` is no positive number.
+    """
+    check_cells(cells)
+    area = np.abs(signed_double_areas(uv[uv_faces])).sum() / 2
+    return float(np.sqrt(area) or 1.0) / cells
+
+
+def check_cells(cells: float) -> None:
+    """Raise OptionError if a checkerboard cannot have so many cells."""
+    if not 0 < cells < np.inf:
+        raise OptionError(f"the number of cells of the checkerboard must be positive, not {cells:g}")
+
+
+def find_texture(texture: PathName, result: Flattening | None = None) -> Texture | None:
     """Return the texture that is meant: the checkerboard for a result, or an image file's.
 
     PNG and JPEG files are taken as they are; others that Pillow reads become PNG.
@@ -60,20 +80,15 @@ def find_texture(texture: str | PathLike[str], result: Flattening | None = None)
         from PIL import Image
     except ImportError as error:
         raise OptionError('textures need Pillow: pip install "coneflat[figures]"') from error
-    if isinstance(texture, str) and texture == CHECKER:
+    if isinstance(texture, str) and texture == "checker":
         return None if result is None else _checkerboard(result, Image)
     path = as_path(texture)
     content = read_bytes(path)
-    try:
-        with Image.open(BytesIO(content)) as image:
-            image.load()
-            if image.format in EMBEDDED and image.mode != "CMYK":
-                return Texture(content, EMBEDDED[image.format])
-            return Texture(_png(image.convert("RGBA")), EMBEDDED["PNG"])
-    except Exception as error:
-        # Whatever a damaged file makes Pillow do, the caller sees one kind of error.
-        reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise MeshFileError(f"{path} is not a readable image: {reason}") from error
+    with readable(path, "image"), Image.open(BytesIO(content)) as image:
+        image.load()
+        if image.format in EMBEDDED and image.mode != "CMYK":
+            return Texture(content, EMBEDDED[image.format])
+        return Texture(_png(image.convert("RGBA")), EMBEDDED["PNG"])
 
 
 def image_kind(content: bytes) -> str | None:
@@ -83,7 +98,7 @@ def image_kind(content: bytes) -> str | None:
     return next((kind for beginning, kind in _BEGINNINGS.items() if content.startswith(beginning)), None)
 
 
-def read_picture(path: str | PathLike[str]) -> Texture:
+def read_picture(path: PathName) -> Texture:
     """Return a PNG, JPEG, GIF or WebP file as it is: browsers read them. The content counts, not the ending.
 
     Raises:
@@ -103,7 +118,7 @@ def read_picture(path: str | PathLike[str]) -> Texture:
 def _checkerboard(result: Flattening, image: Any) -> Texture:
     """Return a checkerboard of whole cells across the unit square, as large as those of the figures."""
     cells = max(round(1.0 / cell_side(result.uv, result.uv_faces)), 1)
-    pixels = max(IMAGE_SIDE // cells, 1)
+    pixels = max(2048 // cells, 1)  # of each cell's side, about 2048 in all
     along = np.arange(cells * pixels) // pixels
     # The first row is the upper one, where v is largest.
     dark = (along[None, :] + along[::-1, None]) % 2

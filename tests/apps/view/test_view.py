@@ -10,7 +10,7 @@ from shapes import tube
 from coneflat.apps.view.figures.camera import eye_direction, fit_camera
 from coneflat.apps.view.figures.projection import rasterise, render_mesh
 from coneflat.errors import OptionError
-from coneflat.io.checker import DARK_CELL, LIGHT_CELL
+from coneflat.io.texture import DARK_CELL, LIGHT_CELL
 
 SQUARE = np.array([[0, 1, 2], [0, 2, 3]])
 

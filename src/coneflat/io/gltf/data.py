@@ -1,5 +1,8 @@
 """The JSON and the arrays of glTF 2.0 files, every reference checked before anything is allocated.
 
+Also which arrays the rest of a tree names, beyond what the mesh is made of: what is written keeps all that, extensions
+included, and must not carry along what nothing names any more.
+
 An own reader, because no library keeps all of what a GLB that is written has to reproduce, nor looks at what a file
 asks for before it is given. Names and numbers are those of the specification (Khronos, glTF 2.0, Sections 3.6, 4.4).
 """
@@ -11,8 +14,9 @@ import binascii
 import json
 import math
 import struct
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn, TypeAlias
 from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
@@ -20,14 +24,24 @@ from numpy.typing import NDArray
 
 from ...base.arrays import FloatArray, IntArray
 from ...errors import ConeflatError, MeshFileError
-from ..raw import read_bytes
+from ..files import read_bytes
 
+#: An object of the JSON.
+Item: TypeAlias = dict[str, Any]
+#: (k, b) the bytes of the elements of an array.
+ByteRows: TypeAlias = NDArray[np.uint8]
+#: The types of numbers.
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 #: Rows and columns of an element.
 SHAPES = {
     "SCALAR": (1, 1), "VEC2": (2, 1), "VEC3": (3, 1), "VEC4": (4, 1), "MAT2": (2, 2), "MAT3": (3, 3), "MAT4": (4, 4),
 }  # fmt: skip
 COMPRESSED = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+#: What stands under these names in extensions is a number of something else than an array.
+_NO_ARRAYS = ("index", "texCoord", "source", "sampler", "material", "light", "node", "mesh", "variants")
+_LISTS = (
+    "accessors", "bufferViews", "images", "materials", "meshes", "nodes", "textures", "skins", "animations",
+)  # fmt: skip
 _HEADER = struct.Struct("<4sII")
 _CHUNK = struct.Struct("<I4s")
 
@@ -71,14 +85,13 @@ class GltfData:
             raise MeshFileError(f"{path} is not a readable glTF file: its JSON is broken: {error}") from error
         if not isinstance(tree, dict):
             raise MeshFileError(f"{path} is not a glTF file: its JSON is no object")
-        self.tree: dict[str, Any] = tree
-        version = str(self.entry(tree, "asset", dict, {}).get("version", "2.0"))
+        self.tree: Item = tree
+        version = str(self.entry(tree, "asset", dict).get("version", "2.0"))
         if not version.startswith("2."):
             raise MeshFileError(f"{path} is glTF of version {version[:20]}; convert it to version 2.0")
         self._buffers = self._find_buffers(binary)
-        self.total_bytes = len(content) + sum(
-            map(len, {id(one): one for one in self._buffers if one is not None}.values())
-        )
+        different = {id(one): len(one) for one in self._buffers if one is not None}
+        self.total_bytes = len(content) + sum(different.values())
         self._refuse_compressed()
         self._check_names()
 
@@ -97,14 +110,14 @@ class GltfData:
         """
         raise MeshFileError(f"{self.path}: {reason}")
 
-    def entry(self, item: dict[str, Any], name: str, kind: type[Any], default: Any = None) -> Any:
-        """Return what an object has under a name, a list or an object; another kind of thing is refused."""
-        value = item.get(name, default) if isinstance(item, dict) else None
+    def entry(self, item: Item, name: str, kind: type[Any]) -> Any:
+        """Return the list or the object that an object has under a name, or an empty one; others are refused."""
+        value = item.get(name, kind()) if isinstance(item, dict) else None
         if not isinstance(value, kind):
             self.fail(f"{name!r} is no {'list' if kind is list else 'object'} where there should be one")
         return value
 
-    def item(self, name: str, index: Any) -> dict[str, Any]:
+    def item(self, name: str, index: Any) -> Item:
         """Return an object of one of the tree's lists, such as "meshes"."""
         every = self.tree.get(name, [])
         if not isinstance(every, list):
@@ -113,12 +126,16 @@ class GltfData:
             self.fail(f"{str(index)[:20]} is none of its {len(every)} {name}")
         if not isinstance(every[index], dict):
             self.fail(f"number {index} of its {name} is no object")
-        return dict[str, Any](every[index])
+        return Item(every[index])
+
+    def items(self, name: str) -> Iterator[Item]:
+        """Yield the objects of one of the tree's lists."""
+        return (self.item(name, i) for i in range(len(self.entry(self.tree, name, list))))
 
     def view(self, index: Any) -> memoryview:
         """Return the bytes of a buffer view."""
         view = self.item("bufferViews", index)
-        buffer = self._buffers[self._buffer_index(view.get("buffer"))]
+        buffer = self._buffer_of(view)
         start, length = self.count(view, "byteOffset", 0), self.count(view, "byteLength")
         if buffer is None:
             self.fail(f"buffer view {index} has no data")
@@ -137,7 +154,7 @@ class GltfData:
             self.fail(f"accessor {index} has an unknown type")
         return Accessor(np.dtype(kind), *shape, self.count(item, "count"))
 
-    def raw(self, index: Any) -> NDArray[np.uint8]:
+    def raw(self, index: Any) -> ByteRows:
         """Return (count, b) the bytes of each element of an array.
 
         Raises:
@@ -156,14 +173,14 @@ class GltfData:
             rows = self._with_sparse(index, self.entry(item, "sparse", dict), rows, form.kind)
         return rows
 
-    def values(self, index: Any, columns: int | None = None) -> FloatArray:
+    def values(self, index: Any, columns: int) -> FloatArray:
         """Return (count, columns) an array of vectors as doubles; whole numbers that stand for fractions as these.
 
         Raises:
             MeshFileError: as of `raw`; or it has another number of columns.
         """
         form = self.accessor(index)
-        if form.columns != 1 or (columns is not None and form.rows != columns):
+        if form.columns != 1 or form.rows != columns:
             self.fail(f"accessor {index} has {form.rows * form.columns} numbers per element, not {columns}")
         numbers = np.ascontiguousarray(self.raw(index)).view(form.kind).astype(np.float64)
         if self.item("accessors", index).get("normalized") and form.kind.kind in "iu":
@@ -177,7 +194,7 @@ class GltfData:
             self.fail(f"accessor {index} holds no indices")
         return np.ascontiguousarray(self.raw(index)).view(form.kind).reshape(-1).astype(np.int64)
 
-    def count(self, item: dict[str, Any], name: str, default: int | None = None) -> int:
+    def count(self, item: Item, name: str, default: int | None = None) -> int:
         """Return a whole number, 0 and up, that an object has."""
         value = item.get(name, default)
         if not isinstance(value, int) or isinstance(value, bool) or value < 0:
@@ -188,9 +205,7 @@ class GltfData:
         """Return the file that a reference relative to this one means."""
         return self.path.parent / unquote(uri)
 
-    def _rows(
-        self, index: Any, item: dict[str, Any], count: int, size: int, stride: int | None = None
-    ) -> NDArray[np.uint8]:
+    def _rows(self, index: Any, item: Item, count: int, size: int, stride: int | None = None) -> ByteRows:
         """Return (count, size) bytes of a buffer view that an accessor, or a part of it, names."""
         data = self.view(item.get("bufferView"))
         start = self.count(item, "byteOffset", 0)
@@ -202,12 +217,10 @@ class GltfData:
             self.fail(f"accessor {index} ends at {end:,} of the {len(data):,} bytes of its buffer view")
         return np.ndarray((count, size), np.uint8, data, start, (step, 1))
 
-    def _with_sparse(
-        self, index: Any, sparse: dict[str, Any], rows: NDArray[np.uint8], kind: np.dtype[Any]
-    ) -> NDArray[np.uint8]:
+    def _with_sparse(self, index: Any, sparse: Item, rows: ByteRows, kind: np.dtype[Any]) -> ByteRows:
         """Return an array with those elements replaced that the accessor lists."""
         count = self.count(sparse, "count")
-        where, new = self.entry(sparse, "indices", dict, {}), self.entry(sparse, "values", dict, {})
+        where, new = self.entry(sparse, "indices", dict), self.entry(sparse, "values", dict)
         form = COMPONENTS.get(self.count(where, "componentType"))
         if form is None or form[1] != "u":
             self.fail(f"the sparse indices of accessor {index} have an unknown type")
@@ -223,8 +236,7 @@ class GltfData:
         """Return the content of each buffer; None of one that only stands for compressed data."""
         known: dict[Path, bytes] = {}
         buffers: list[bytes | None] = []
-        for i in range(len(self.entry(self.tree, "buffers", list, []))):
-            item = self.item("buffers", i)
+        for i, item in enumerate(self.items("buffers")):
             uri, length = item.get("uri"), self.count(item, "byteLength")
             if uri is None:
                 found = binary if i == 0 else None
@@ -236,17 +248,14 @@ class GltfData:
                 self.fail(f"buffer {i} is at {uri[:60]!r}, and nothing is loaded from anywhere")
             else:
                 path = self.beside(uri)
-                found = known[path] if path in known else known.setdefault(path, self._external(path, i))
+                try:
+                    found = known[path] = known[path] if path in known else read_bytes(path)
+                except ConeflatError as error:
+                    raise MeshFileError(f"{self.path}: buffer {i} is not to be had: {error}") from error
             if found is not None and len(found) < length:
                 self.fail(f"buffer {i} has {len(found):,} of the {length:,} bytes it should have")
             buffers.append(found)
         return buffers
-
-    def _external(self, path: Path, index: int) -> bytes:
-        try:
-            return read_bytes(path)
-        except ConeflatError as error:
-            raise MeshFileError(f"{self.path}: buffer {index} is not to be had: {error}") from error
 
     def decoded(self, uri: str, what: str) -> bytes:
         """Return what a data URI holds."""
@@ -258,28 +267,24 @@ class GltfData:
         except (binascii.Error, ValueError) as error:
             raise MeshFileError(f"{self.path}: the data URI of {what} is broken: {error}") from error
 
-    def _buffer_index(self, index: Any) -> int:
-        self.item("buffers", index)
-        return int(index)
+    def _buffer_of(self, view: Item) -> bytes | None:
+        self.item("buffers", view.get("buffer"))
+        return self._buffers[view["buffer"]]
 
     def _refuse_compressed(self) -> None:
         """Refuse views of which there are compressed data only."""
-        for i in range(len(self.entry(self.tree, "bufferViews", list, []))):
-            view = self.item("bufferViews", i)
+        for view in self.items("bufferViews"):
+            extensions = self.entry(view, "extensions", dict)
             for name in COMPRESSED:
-                packed = self.entry(view, "extensions", dict, {}).get(name)
-                if packed is not None and self._buffers[self._buffer_index(view.get("buffer"))] is None:
+                if extensions.get(name) is not None and self._buffer_of(view) is None:
                     self.fail(f"its data are compressed ({name}); save it without compression")
 
 
-def numbers(data: GltfData, item: dict[str, Any], name: str, default: list[float]) -> FloatArray:
+def numbers(data: GltfData, item: Item, name: str, default: list[float]) -> FloatArray:
     """Return a list of as many finite numbers as the default has."""
     values = item.get(name, default)
-    if (
-        not isinstance(values, list)
-        or len(values) != len(default)
-        or not all(isinstance(value, (int, float)) and math.isfinite(value) for value in values)
-    ):
+    count = len(values) if isinstance(values, list) else -1
+    if count != len(default) or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in values):
         data.fail(f"the {name} of a node is not {len(default)} numbers")
     return np.array(values, dtype=np.float64)
 
@@ -307,3 +312,104 @@ def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes | None]:
     if b"JSON" not in found:
         raise MeshFileError(f"{path} is not a readable GLB file: it has no JSON chunk")
     return found[b"JSON"], found.get(b"BIN\0")
+
+
+def check_references(data: GltfData) -> None:
+    """Refuse a tree that could not be written again, since something in it is not what it should be.
+
+    Raises:
+        MeshFileError, KeyError, TypeError, AttributeError: respectively.
+    """
+    for name in _LISTS:
+        for i, item in enumerate(data.items(name)):
+            data.entry(item, "extensions", dict)
+            if name == "bufferViews":
+                data.view(i)
+            elif name == "meshes":
+                data.entry(item, "primitives", list)
+            elif name == "nodes" and "mesh" in item:
+                data.item("meshes", item["mesh"])
+    for name in ("extensionsUsed", "extensionsRequired"):
+        data.entry(data.tree, name, list)
+    for name, index in _references(data):
+        data.item(name, index)
+    for accessor in accessors_of_arrays(data.tree):
+        for owner in view_owners(data.item("accessors", accessor)):
+            data.view(owner["bufferView"])
+    for view in views_of_images(data.tree):
+        data.view(view)
+
+
+def _references(data: GltfData) -> Iterator[tuple[str, Any]]:
+    """Yield the list and the number of what scenes, nodes, primitives, textures and skins name, beside arrays."""
+    tree, entry = data.tree, data.entry
+    if "scene" in tree:
+        yield "scenes", tree["scene"]
+    singles = {
+        "nodes": {"mesh": "meshes", "skin": "skins", "camera": "cameras"},
+        "textures": {"source": "images", "sampler": "samplers"},
+        "skins": {"skeleton": "nodes"},
+    }
+    for kind, names in singles.items():
+        for item in entry(tree, kind, list):
+            yield from ((to, item[name]) for name, to in names.items() if name in item)
+    for kind, name in (("scenes", "nodes"), ("nodes", "children"), ("skins", "joints")):
+        for item in entry(tree, kind, list):
+            yield from (("nodes", node) for node in entry(item, name, list))
+    for mesh in entry(tree, "meshes", list):
+        yield from (("materials", one["material"]) for one in mesh["primitives"] if "material" in one)
+
+
+def accessors_of_arrays(tree: Item) -> Iterator[int]:
+    """Yield the accessors that meshes, skins and animations name."""
+    for mesh in tree.get("meshes", []):
+        for one in mesh["primitives"]:
+            yield from one.get("attributes", {}).values()
+            if "indices" in one:
+                yield one["indices"]
+            for target in one.get("targets", []):
+                yield from target.values()
+    for skin in tree.get("skins", []):
+        if "inverseBindMatrices" in skin:
+            yield skin["inverseBindMatrices"]
+    for animation in tree.get("animations", []):
+        for sampler in animation.get("samplers", []):
+            yield from (sampler[name] for name in ("input", "output") if name in sampler)
+
+
+def views_of_images(tree: Item) -> Iterator[int]:
+    """Yield the buffer views of images."""
+    return (image["bufferView"] for image in tree.get("images", []) if "bufferView" in image)
+
+
+def view_owners(accessor: Item) -> list[Item]:
+    """Return the parts of an accessor that have a buffer view."""
+    sparse = accessor.get("sparse", {})
+    parts = (accessor, sparse.get("indices", {}), sparse.get("values", {}))
+    return [one for one in parts if "bufferView" in one]
+
+
+def numbers_in_extensions(tree: Any) -> Iterator[int]:
+    """Yield all numbers in extensions, of which some may name arrays or buffer views."""
+    stack = [(tree, False)]
+    while stack:
+        item, is_inside = stack.pop()
+        if isinstance(item, dict):
+            kept = ((key, value) for key, value in item.items() if key not in _NO_ARRAYS)
+            stack += [(value, is_inside or key == "extensions") for key, value in kept]
+        elif isinstance(item, list):
+            stack += [(value, is_inside) for value in item]
+        elif is_inside and isinstance(item, int):
+            yield item
+
+
+def keys_of(item: Any) -> Iterator[str]:
+    """Yield all keys of an object and of those within."""
+    stack = [item]
+    while stack:
+        item = stack.pop()
+        if isinstance(item, dict):
+            yield from item
+            stack += item.values()
+        elif isinstance(item, list):
+            stack += item

@@ -1,12 +1,16 @@
 """Reading glTF and GLB scenes as one mesh, with the way back to their parts.
 
-Ours, since libraries give a scene's meshes without saying which corner became which.
+Ours, since libraries give a scene's meshes without saying which corner became which, and a writer must know of each
+triangle which node, mesh and primitive it came from.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,15 +18,52 @@ from ...base.arrays import FloatArray, IntArray
 from ...errors import EmptyMeshError
 from ...mesh.check import weld
 from ..mesh_file import MeshFile
-from ..raw import triangle_offsets
-from .data import GltfData
-from .names import check_references
-from .scene import DRACO, GltfScene, ScenePart, shown_nodes, triangle_corners
+from .data import GltfData, Item, check_references, numbers
 
+DRACO = "KHR_draco_mesh_compression"
 #: A scene may show its meshes so often that it has as many corners in all,
 MOST_CORNERS = 10_000_000
 #: or else as many for each byte of the file.
 MOST_CORNERS_PER_BYTE = 8
+
+
+class Mode(IntEnum):
+    """How the vertices of a primitive make triangles."""
+
+    TRIANGLES = 4
+    STRIP = 5
+    FAN = 6
+
+
+class ScenePart(NamedTuple):
+    """A primitive of triangles, as a node shows it.
+
+    Attributes:
+        node, mesh, primitive: which, the primitive within the mesh.
+        corners: (c,) the primitive's vertex at each corner, three for each triangle, as they run in the scene.
+        is_mirrored: triangles run the other way in the scene than in the primitive.
+    """
+
+    node: int
+    mesh: int
+    primitive: int
+    corners: IntArray
+    is_mirrored: bool
+
+
+@dataclass(frozen=True, eq=False)
+class GltfScene:
+    """A glTF file, and which of its triangles are those of the mesh that was read.
+
+    Attributes:
+        data: the file.
+        parts: whose corners are those of the mesh, one after the other.
+        blocks: where the vertices of each node begin, and where the last end; only within a node may they be merged.
+    """
+
+    data: GltfData
+    parts: tuple[ScenePart, ...]
+    blocks: tuple[int, ...]
 
 
 def parse_gltf(path: Path, content: bytes) -> MeshFile:
@@ -55,7 +96,7 @@ class _Reading:
         self._parts: list[ScenePart] = []
         self._vertices: list[FloatArray] = [np.empty((0, 3))]
         self._corners: list[IntArray] = [np.empty(0, np.int64)]
-        self._count = self._corner_count = 0
+        self._count = self._taken = 0
         self._blocks = [0]
         self._uvs, self._normals = _Rows(2), _Rows(3)
 
@@ -68,11 +109,10 @@ class _Reading:
         data = self.data
         linear = matrix[:3, :3]
         is_mirrored = bool(np.linalg.det(linear) < 0)
-        placed: dict[
-            Any, tuple[int, int]
-        ] = {}  # of each array of positions, the first vertex and their number
-        for index, primitive in enumerate(data.entry(data.item("meshes", mesh), "primitives", list, [])):
-            attributes = data.entry(primitive, "attributes", dict, {})
+        # Of each array of positions, the first vertex and their number.
+        placed: dict[Any, tuple[int, int]] = {}
+        for index, primitive in enumerate(data.entry(data.item("meshes", mesh), "primitives", list)):
+            attributes = data.entry(primitive, "attributes", dict)
             position = attributes.get("POSITION")
             if position is None:
                 continue
@@ -82,13 +122,13 @@ class _Reading:
                 continue
             if position not in placed:
                 points = data.values(position, 3)
-                self._take(len(points), 0)
+                self._take(len(points))
                 placed[position] = (self._count, len(points))
                 self._vertices.append(points @ linear.T + matrix[:3, 3])
                 self._count += len(points)
             first, count = placed[position]
             self._check_copied(primitive, count)
-            self._take(0, len(corners))
+            self._take(len(corners))
             if is_mirrored:
                 # The specification turns the winding under a mirroring node (Section 3.7.4).
                 corners = corners.reshape(-1, 3)[:, ::-1].reshape(-1)
@@ -114,7 +154,7 @@ class _Reading:
             self.data.path,
             np.concatenate(self._vertices),
             corners,
-            triangle_offsets(len(corners) // 3),
+            np.arange(0, len(corners) + 1, 3),
             texture=texture,
             # v points down in glTF.
             uv=None if uv is None else uv * [1, -1] + [0, 1],
@@ -123,31 +163,29 @@ class _Reading:
             scene=GltfScene(self.data, tuple(self._parts), tuple(self._blocks)),
         )
 
-    def _check_copied(self, primitive: dict[str, Any], count: int) -> None:
+    def _check_copied(self, primitive: Item, count: int) -> None:
         """Refuse arrays that are there for some of the vertices only, or not at all."""
         data = self.data
-        for each in (primitive["attributes"], *data.entry(primitive, "targets", list, [])):
+        for each in (primitive["attributes"], *data.entry(primitive, "targets", list)):
             for name, index in each.items():
                 if len(data.raw(index)) < count:
                     data.fail(f"a primitive has {name} for {len(data.raw(index))} of its {count} vertices")
 
-    def _take(self, vertices: int, corners: int) -> None:
-        """Count what a part adds, before it is added."""
-        self._corner_count += corners + vertices
-        if self._corner_count > self._most:
+    def _take(self, count: int) -> None:
+        """Count the vertices or corners that a part adds, before it is added."""
+        self._taken += count
+        if self._taken > self._most:
             self.data.fail(
                 f"its scene shows meshes so often that there are over {self._most:,} corners, many times what the "
                 "file holds; write each mesh once"
             )
 
-    def _refuse_packed(self, primitive: dict[str, Any], position: Any) -> None:
-        packed = DRACO in self.data.entry(primitive, "extensions", dict, {})
+    def _refuse_packed(self, primitive: Item, position: Any) -> None:
+        packed = DRACO in self.data.entry(primitive, "extensions", dict)
         item = self.data.item("accessors", position)
         if item.get("bufferView") is None and (packed or item.get("sparse") is None):
-            how = (
-                f"are compressed ({DRACO}); save it without compression" if packed else "are not in the file"
-            )
-            self.data.fail(f"the positions of a mesh {how}")
+            save = f"are compressed ({DRACO}); save it without compression"
+            self.data.fail(f"the positions of a mesh {save if packed else 'are not in the file'}")
 
 
 class _Rows:
@@ -190,3 +228,74 @@ def _cofactors(linear: FloatArray) -> FloatArray:
     a, b, c = linear.T
     rows = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
     return np.asarray(np.copysign(1.0, np.linalg.det(linear)) * rows)
+
+
+def shown_nodes(data: GltfData) -> Iterator[tuple[int, FloatArray]]:
+    """Yield the nodes of the scene that the file shows, depth first, each with its (4, 4) transform.
+
+    A file without a scene shows all its nodes.
+
+    Raises:
+        MeshFileError: nodes are no trees, or their transforms no numbers.
+    """
+    seen: set[int] = set()
+    stack = [(node, np.eye(4)) for node in reversed(_roots(data))]
+    while stack:
+        index, above = stack.pop()
+        node = data.item("nodes", index)
+        if index in seen:
+            data.fail(f"node {index} is reached twice: nodes must form trees")
+        seen.add(index)
+        matrix = above @ _local(data, node)
+        yield index, matrix
+        stack += [(child, matrix) for child in reversed(data.entry(node, "children", list))]
+
+
+def triangle_corners(data: GltfData, primitive: Item, count: int) -> IntArray:
+    """Return (3 m,) the vertices of the triangles of a primitive that has `count` vertices; none of lines and points.
+
+    Raises:
+        MeshFileError: it names a vertex that it does not have.
+    """
+    mode = data.count(primitive, "mode", Mode.TRIANGLES)
+    if mode not in list(Mode):
+        return np.empty(0, np.int64)
+    order = np.arange(count) if primitive.get("indices") is None else data.indices(primitive["indices"])
+    if len(order) and order.max() >= count:
+        data.fail(f"a face names vertex {order.max()}, but its primitive has {count} vertices, from 0 on")
+    if mode == Mode.TRIANGLES:
+        return order[: len(order) // 3 * 3]
+    i = np.arange(max(len(order) - 2, 0))
+    if mode == Mode.FAN:
+        rows = [i + 1, i + 2, np.zeros_like(i)]
+    else:
+        rows = [i, i + 1 + i % 2, i + 2 - i % 2]
+    triangles = order[np.stack(rows, axis=1)]
+    # Strips are joined by triangles that use a vertex twice.
+    a, b, c = triangles.T
+    return triangles[(a != b) & (b != c) & (c != a)].reshape(-1)
+
+
+def _roots(data: GltfData) -> list[Any]:
+    if data.tree.get("scenes"):
+        return list(data.entry(data.item("scenes", data.tree.get("scene", 0)), "nodes", list))
+    nodes = list(data.items("nodes"))
+    named = (child for node in nodes for child in data.entry(node, "children", list))
+    children = {child for child in named if isinstance(child, int)}
+    return [i for i in range(len(nodes)) if i not in children]
+
+
+def _local(data: GltfData, node: Item) -> FloatArray:
+    """Return (4, 4) the transform of a node in that above it."""
+    if "matrix" in node:
+        return numbers(data, node, "matrix", [0.0] * 16).reshape(4, 4).T
+    x, y, z, w = numbers(data, node, "rotation", [0.0, 0.0, 0.0, 1.0]).tolist()
+    matrix: FloatArray = np.eye(4)
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:3, :3] *= numbers(data, node, "scale", [1.0, 1.0, 1.0])
+    matrix[:3, 3] = numbers(data, node, "translation", [0.0, 0.0, 0.0])
+    return matrix

@@ -1,24 +1,147 @@
-"""Writing binary glTF: one mesh, or the scene that the mesh was read from."""
+"""Writing binary glTF: one mesh, or the scene that the mesh was read from, with new UVs and all else as it was.
+
+What stays keeps its number in the lists of the JSON, so that extensions, animations and skins that this package knows
+nothing of go on naming what they named. That is why the file is not taken apart and built anew, as libraries do. Names
+and numbers are those of the glTF 2.0 specification (Khronos).
+"""
 
 from __future__ import annotations
 
+import json
+import os
+import struct
+from collections import defaultdict, deque
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
+from urllib.parse import quote, unquote
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.arrays import FloatArray, IntArray
+from ...base.text import plural
+from ...errors import ConeflatError, MeshFileError
 from ...geometry.triangles import vertex_normals
-from ..normals import shading_normals, source_normals
-from ..texture import Texture
-from ..uv_split import split_at_seams
-from .glb import MATERIAL, Glb, bounds
-from .scene_write import scene_with_uvs
+from ..files import moved_path, read_bytes
+from ..split import shading_normals, source_normals, split_at_seams
+from ..texture import Texture, image_kind
+from .data import (
+    COMPRESSED,
+    GltfData,
+    Item,
+    accessors_of_arrays,
+    keys_of,
+    numbers_in_extensions,
+    view_owners,
+    views_of_images,
+)
+from .read import DRACO, GltfScene, Mode, ScenePart
 
 if TYPE_CHECKING:
     from ...result import Flattening
 
+#: What a view holds, for the graphics card.
+FOR_VERTICES, FOR_INDICES = 34962, 34963
+MATERIAL: Item = {
+    "name": "coneflat",
+    "doubleSided": True,
+    "pbrMetallicRoughness": {
+        "baseColorFactor": [0.92, 0.92, 0.92, 1.0],
+        "metallicFactor": 0.0,
+        "roughnessFactor": 0.7,
+    },
+}
+UV = "TEXCOORD_0"
+#: What an array of some elements has of the whole one.
+_KEPT = ("componentType", "type", "normalized", "name", "extras")
 
-def write_glb(
-    result: Flattening, stream: IO[bytes], texture: Texture | None = None, folder: Path | None = None
-) -> None:
+
+class Glb:
+    """What is to be written.
+
+    Attributes:
+        tree: the JSON.
+    """
+
+    def __init__(self, tree: Item) -> None:
+        self.tree = tree
+        self._pieces: list[bytes] = []
+        self._length = 0
+        self._free: defaultdict[str, deque[int]] = defaultdict(deque)
+
+    def free(self, kind: str, number: int, stub: Item) -> None:
+        """Let what is new have a number of a list, such as "accessors"; `stub` stands there until then."""
+        self.tree[kind][number] = stub
+        # Taken from the end, so that what is new stands in the order in which it is written.
+        self._free[kind].appendleft(number)
+
+    def add(self, kind: str, item: Item) -> int:
+        """Put something new into a list, and return its number there: one that is free, or the next."""
+        every = self.tree.setdefault(kind, [])
+        if self._free[kind]:
+            place = self._free[kind].pop()
+            every[place] = item
+            return place
+        every.append(item)
+        return len(every) - 1
+
+    def append(self, content: bytes) -> int:
+        """Return where in the buffer some bytes are now."""
+        start = self._length
+        self._pieces.append(content + bytes(-len(content) % 4))
+        self._length += len(self._pieces[-1])
+        return start
+
+    def add_view(self, content: bytes, **more: int) -> int:
+        """Return the number of a new buffer view."""
+        view = {"buffer": 0, "byteOffset": self.append(content), "byteLength": len(content), **more}
+        return self.add("bufferViews", view)
+
+    def add_array(self, rows: NDArray[Any], form: Item, target: int | None = None) -> int:
+        """Return the number of a new accessor of (k, c) values, or of their bytes, with what else is said of it."""
+        content = np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1)
+        more = {} if target is None else {"target": target}
+        if content.shape[1] % 4 and target == FOR_VERTICES:
+            # Elements of vertices begin at multiples of four.
+            content = np.pad(content, ((0, 0), (0, -content.shape[1] % 4)))
+            more["byteStride"] = content.shape[1]
+        view = self.add_view(content.tobytes(), **more)
+        return self.add("accessors", {"bufferView": view, "componentType": 0, "count": len(rows)} | form)
+
+    def add_material(self, texture: Texture) -> int:
+        """Return the number of a new material that shows an image."""
+        image = self.add("images", {"bufferView": self.add_view(texture.content), "mimeType": texture.kind})
+        colour = {"index": self.add("textures", {"source": image})}
+        shown = {"baseColorFactor": [1.0] * 4, "baseColorTexture": colour}
+        plain = MATERIAL["pbrMetallicRoughness"]
+        return self.add("materials", MATERIAL | {"pbrMetallicRoughness": plain | shown})
+
+    def write(self, stream: IO[bytes]) -> None:
+        """Write the file.
+
+        Raises:
+            MeshFileError: it is larger than GLB can be.
+        """
+        self.tree["buffers"] = [{"byteLength": self._length}]
+        text = json.dumps(self.tree, separators=(",", ":")).encode("ascii")
+        text += b" " * (-len(text) % 4)
+        total = 12 + 8 + len(text) + 8 + self._length
+        if total >= 2**32:
+            raise MeshFileError(
+                f"the result takes {total:,} bytes as GLB, which holds 4 GB at most: choose .ply or .npz"
+            )
+        stream.write(struct.pack("<4sII I4s", b"glTF", 2, total, len(text), b"JSON"))
+        stream.write(text)
+        stream.write(struct.pack("<I4s", self._length, b"BIN\0"))
+        stream.writelines(self._pieces)
+
+
+def bounds(values: NDArray[Any]) -> Item:
+    """Return what an accessor of positions says of their box."""
+    return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+
+
+def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None, folder: Path) -> None:
     """Write a result as GLB.
 
     Of a mesh that was read from a glTF scene, that is the scene with new UVs. Else it has one mesh, with a two-sided
@@ -30,7 +153,7 @@ def write_glb(
         result: what to write.
         stream: a binary file.
         texture: the image of the material; None for a light grey, or the scene's own materials.
-        folder: where the file will be, for paths of images that are not to be had; by default the current one.
+        folder: where the file will be, for paths of images that are not to be had.
 
     Raises:
         MeshFileError: it is larger than GLB can be.
@@ -39,7 +162,7 @@ def write_glb(
     if scene is None:
         glb = _one_mesh(result, texture)
     else:
-        glb = scene_with_uvs(result, scene, Path() if folder is None else folder, texture)
+        glb = scene_with_uvs(result, scene, folder, texture)
     glb.write(stream)
 
 
@@ -49,7 +172,7 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
     normals = split.normals
     if normals is None:
         normals = shading_normals(vertex_normals(result.vertices, result.faces))[split.own]
-    primitive: dict[str, Any] = {"attributes": {}, "indices": 0, "material": 0}
+    primitive: Item = {"attributes": {}, "indices": 0, "material": 0}
     glb = Glb(
         {
             "asset": {"version": "2.0", "generator": "coneflat"},
@@ -78,3 +201,199 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
     else:
         glb.add_material(texture)
     return glb
+
+
+def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: Texture | None) -> Glb:
+    """Return a glTF scene with the UVs of a result.
+
+    Of each primitive, TEXCOORD_0 is new, and every vertex is there as often as it has different UVs; all its other
+    attributes and morph targets are copied bit for bit. A mesh that several nodes show becomes one for each node.
+    Images beside the file are taken into the buffer. All else stays as it is.
+
+    Args:
+        result: of a mesh that was read from the scene, with its `face_corners`.
+        scene: what was read.
+        folder: where the file will be, for paths of images that are not to be had.
+        texture: for what was flattened, instead of the file's materials.
+    """
+    assert result.face_corners is not None
+    data, glb = scene.data, Glb(_copied(scene.data.tree))
+    targets = _own_primitives(glb.tree, scene)
+    old = [_copied(target) for target in targets]
+    for target in targets:
+        target["attributes"] = {}
+        for name in ("indices", "targets", "mode"):
+            target.pop(name, None)
+        target.get("extensions", {}).pop(DRACO, None)
+    _keep_the_rest(glb, data)
+    _embed_images(glb, data, folder)
+    material = None if texture is None else glb.add_material(texture)
+    owned, first = _faces_of_parts(scene.parts, result.face_corners), 0
+    for part, target, before, faces in zip(scene.parts, targets, old, owned, strict=True):
+        vertices, points = part.corners[result.face_corners[faces] - first], result.uv_faces[faces]
+        first += len(part.corners)
+        if part.is_mirrored:
+            vertices, points = vertices[:, ::-1], points[:, ::-1]
+        if len(vertices):
+            _fill(glb, data, target, before, vertices.reshape(-1), points.reshape(-1), result.uv)
+        if material is not None:
+            target["material"] = material
+    _drop_empty(glb, targets)
+    _forget_extensions(glb.tree)
+    return glb
+
+
+def scene_losses(result: Flattening) -> tuple[str, ...]:
+    """Return what a GLB of a result does not keep of the glTF file that it was read from, one sentence each."""
+    source = result.source
+    if source is None or source.scene is None or result.face_corners is None:
+        return ()
+    notes = []
+    tree, parts = source.scene.data.tree, source.scene.parts
+    dropped = sum(len(part.corners) for part in parts) // 3 - len(result.faces)
+    if dropped:
+        notes.append(f"Triangles that the repair dropped are not in the file: {dropped:,}.")
+    shown = {(part.mesh, part.node) for part in parts}
+    copies = len(shown) - len({mesh for mesh, _ in shown})
+    if copies:
+        notes.append(
+            f"Meshes that several nodes show have UVs of their own for each: {copies:,} more of them."
+        )
+    materials = tree.get("materials", [])
+    painted = {
+        i
+        for part in parts
+        if isinstance(i := tree["meshes"][part.mesh]["primitives"][part.primitive].get("material"), int)
+        and i < len(materials)
+        and any(name.endswith("Texture") for name in keys_of(materials[i]))
+    }
+    if painted:
+        notes.append(
+            f"Textures are kept, but were made for the old UVs: those of {plural(len(painted), 'material')}."
+        )
+    return tuple(notes)
+
+
+def _own_primitives(tree: Item, scene: GltfScene) -> list[Item]:
+    """Return the primitive of each part, after a copy was made of meshes that another node has."""
+    meshes, nodes = tree["meshes"], tree["nodes"]
+    first_node: dict[int, int] = {}
+    for part in scene.parts:
+        owner = first_node.setdefault(part.mesh, part.node)
+        if owner != part.node and nodes[part.node]["mesh"] == part.mesh:
+            nodes[part.node]["mesh"] = len(meshes)
+            meshes.append(_copied(scene.data.tree["meshes"][part.mesh]))
+    return [meshes[nodes[part.node]["mesh"]]["primitives"][part.primitive] for part in scene.parts]
+
+
+def _faces_of_parts(parts: tuple[ScenePart, ...], face_corners: IntArray) -> list[IntArray]:
+    """Return the triangles of a result that are each part's, whose corners the scene has one after the other."""
+    starts = np.cumsum([0] + [len(part.corners) for part in parts])
+    owner = np.searchsorted(starts, face_corners[:, 0], side="right") - 1
+    order = np.argsort(owner, kind="stable")
+    return np.split(order, np.searchsorted(owner[order], np.arange(1, len(parts))))
+
+
+def _keep_the_rest(glb: Glb, data: GltfData) -> None:
+    """Move what is still referred to into the new buffer, and free the numbers of all else."""
+    tree = glb.tree
+    maybe = set(numbers_in_extensions(tree))
+    accessors, views = maybe.union(accessors_of_arrays(tree)), maybe.union(views_of_images(tree))
+    for i, accessor in enumerate(tree.get("accessors", [])):
+        if i in accessors:
+            views |= {one["bufferView"] for one in view_owners(accessor)}
+        else:
+            # What nothing names any more is as small as an accessor can be.
+            glb.free("accessors", i, {"componentType": 5121, "count": 1, "type": "SCALAR"})
+    for i, view in enumerate(tree.get("bufferViews", [])):
+        if i in views:
+            view["byteOffset"] = glb.append(data.view(i).tobytes())
+            view["buffer"] = 0
+            for name in COMPRESSED:
+                view.get("extensions", {}).pop(name, None)
+        else:
+            glb.free("bufferViews", i, {"buffer": 0, "byteLength": 1})
+
+
+def _fill(
+    glb: Glb, data: GltfData, target: Item, before: Item, vertices: IntArray, points: IntArray, uv: FloatArray
+) -> None:
+    """Write the triangles of a primitive, whose corners are these of its vertices and these points of the plane."""
+    pairs, number = np.unique(vertices * len(uv) + points, return_inverse=True)
+    own, point = np.divmod(pairs, len(uv))
+
+    def gathered(arrays: dict[str, int]) -> dict[str, int]:
+        kept = ((name, index) for name, index in arrays.items() if name != UV)
+        return {name: _gathered(glb, data, index, own, name == "POSITION") for name, index in kept}
+
+    target["attributes"] = gathered(before["attributes"])
+    # v points down in glTF.
+    flat = (uv[point] * [1, -1] + [0, 1]).astype("<f4")
+    target["attributes"][UV] = glb.add_array(flat, {"componentType": 5126, "type": "VEC2"}, FOR_VERTICES)
+    corners = number.astype("<u4").reshape(-1, 1)
+    target["indices"] = glb.add_array(corners, {"componentType": 5125, "type": "SCALAR"}, FOR_INDICES)
+    if "targets" in before:
+        target["targets"] = [gathered(one) for one in before["targets"]]
+    if before.get("mode", Mode.TRIANGLES) != Mode.TRIANGLES:
+        target["mode"] = Mode.TRIANGLES.value
+
+
+def _gathered(glb: Glb, data: GltfData, index: int, own: IntArray, has_bounds: bool) -> int:
+    """Return the number of an array of some elements of another one."""
+    old = data.item("accessors", index)
+    rows = np.take(data.raw(index), own, axis=0)
+    kept: Item = {key: old[key] for key in _KEPT if key in old}
+    if has_bounds:
+        kept |= bounds(rows.view(data.accessor(index).kind))
+    return glb.add_array(rows, kept, FOR_VERTICES)
+
+
+def _embed_images(glb: Glb, data: GltfData, folder: Path) -> None:
+    """Take the files of images into the buffer; of those that cannot be read, make the paths fit."""
+    for image in glb.tree.get("images", []):
+        uri = image.get("uri")
+        if not isinstance(uri, str) or uri.startswith("data:") or "://" in uri:
+            continue
+        try:
+            content = read_bytes(data.beside(uri))
+        except ConeflatError:
+            content = b""
+        kind = image_kind(content)
+        if kind is None or kind == "image/gif":  # glTF knows no GIF
+            old, new = (os.path.realpath(place) for place in (data.path.parent, folder))
+            image["uri"] = quote(moved_path(os.fsencode(unquote(uri)), old, new))
+            continue
+        del image["uri"]
+        image |= {"bufferView": glb.add_view(content), "mimeType": kind}
+
+
+def _drop_empty(glb: Glb, targets: list[Item]) -> None:
+    """Leave out primitives of which the repair left nothing, and meshes without any."""
+    empty = {id(target) for target in targets if not target["attributes"]}
+    if not empty:
+        return
+    for node in glb.tree["nodes"]:
+        mesh = glb.tree["meshes"][node["mesh"]] if "mesh" in node else None
+        if mesh is not None and all(id(one) in empty for one in mesh["primitives"]):
+            del node["mesh"]
+    for mesh in glb.tree["meshes"]:
+        left = [one for one in mesh["primitives"] if id(one) not in empty]
+        if not left:
+            # Meshes must not be empty, not even those that nothing shows: they get a point.
+            zero = {"componentType": 5126, "count": 1, "type": "VEC3"} | bounds(np.zeros((1, 3)))
+            left = [{"attributes": {"POSITION": glb.add("accessors", zero)}, "mode": 0}]
+        mesh["primitives"] = left
+
+
+def _forget_extensions(tree: Item) -> None:
+    """Take compressions that are no more from the lists of extensions."""
+    used = set(keys_of(tree))
+    for name in ("extensionsUsed", "extensionsRequired"):
+        left = [one for one in tree.pop(name, []) if one not in (DRACO, *COMPRESSED) or one in used]
+        if left:
+            tree[name] = left
+
+
+def _copied(item: Any) -> Any:
+    """Return a copy of a tree of JSON, however deep."""
+    return json.loads(json.dumps(item))

@@ -1,0 +1,232 @@
+"""The content of files, and writing a file so that it is there in full or not at all."""
+
+from __future__ import annotations
+
+import glob
+import os
+import secrets
+import shutil
+import stat
+import sys
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
+from os import PathLike
+from pathlib import Path
+from typing import IO, Any, TypeAlias
+
+from ..errors import ConeflatError, EmptyMeshError, MeshFileError, UnknownFormatError
+
+#: How users name files.
+PathName: TypeAlias = "str | PathLike[str]"
+#: Stands for standard input, and for standard output.
+PIPE = Path("-")
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the content of a file.
+
+    Raises:
+        MeshFileError: there is no such file, it is a directory, or it may not be read.
+        EmptyMeshError: the file is empty.
+    """
+    try:
+        mode = path.stat().st_mode
+        # Devices, pipes and sockets may never end, or never begin: opening a pipe waits for who writes to it.
+        is_file = stat.S_ISREG(mode) or stat.S_ISDIR(mode)
+        content = path.read_bytes() if is_file else b""
+    except FileNotFoundError as error:
+        why = ": it is a link that leads nowhere" if path.is_symlink() else ""
+        raise MeshFileError(f"{path}: there is no such file{why}") from error
+    except (IsADirectoryError, PermissionError) as error:
+        reason = "is a folder, not a file" if os.path.isdir(path) else "may not be read (no permission)"
+        raise MeshFileError(f"{path} {reason}") from error
+    except (OSError, ValueError) as error:
+        raise MeshFileError(f"{path} cannot be read: {_reason(error)}") from error
+    if not is_file:
+        raise MeshFileError(
+            f"{path} is not a file but a device, a pipe or a socket; give - to read from a pipe"
+        )
+    if not content or content.isspace():
+        raise EmptyMeshError(f"{path} is empty")
+    return content
+
+
+def read_input() -> bytes:
+    """Return what comes in on standard input.
+
+    Raises:
+        MeshFileError: that is a terminal, or cannot be read.
+        EmptyMeshError: nothing comes in.
+    """
+    if sys.stdin is None or sys.stdin.isatty():
+        raise MeshFileError(
+            "- stands for a mesh on standard input, and there is none: pipe a file into the command"
+        )
+    try:
+        content = sys.stdin.buffer.read()
+    except OSError as error:
+        raise MeshFileError(f"standard input cannot be read: {_reason(error)}") from error
+    if not content or content.isspace():
+        raise EmptyMeshError("nothing came in on standard input")
+    return content
+
+
+@contextmanager
+def readable(path: Path, kind: str) -> Iterator[None]:
+    """Make one kind of error of whatever a damaged file makes a parser do; kind: what it should be, "PLY file".
+
+    Raises:
+        MeshFileError: the block ends by an exception that is neither of the package's own nor a lack of memory.
+    """
+    try:
+        yield
+    except (ConeflatError, MemoryError):
+        raise
+    except Exception as error:
+        reason = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())[:200]
+        raise MeshFileError(f"{path} is not a readable {kind}: {reason or type(error).__name__}") from error
+
+
+def as_path(path: object) -> Path:
+    """Return the path that text, bytes or a path object names.
+
+    Raises:
+        MeshFileError: it is something else.
+    """
+    try:
+        return Path(os.fsdecode(path))  # type: ignore[arg-type]
+    except TypeError as error:
+        raise MeshFileError(f"a file is named by text or a path, not by {type(path).__name__}") from error
+
+
+def known_ending(path: Path, endings: Collection[str], what: str) -> str:
+    """Return the ending of a path in lower case if it is known.
+
+    what: is done with files of these endings, for the message: "meshes are read from".
+
+    Raises:
+        UnknownFormatError: it is not.
+    """
+    ending = path.suffix.lower()
+    if ending not in endings:
+        wrong = f"ends with {path.suffix!r}, which is no known format" if path.suffix else "has no ending"
+        raise UnknownFormatError(f"{path} {wrong}; {what} {', '.join(endings)}")
+    return ending
+
+
+def moved_path(name: bytes, here: str, there: str) -> bytes:
+    """Return a path relative to another folder that leads where one relative to the first did; slashes part it."""
+    if os.path.isabs(name):
+        return name
+    full = os.path.join(os.fsencode(here), name)
+    try:
+        relative = os.path.relpath(full, os.fsencode(there))
+    except ValueError:
+        # On another drive nothing but the full path leads there.
+        relative = full
+    return relative.replace(os.fsencode(os.sep), b"/")
+
+
+def check_target(path: PathName) -> Path:
+    """Return the file that a path names, links followed, if it looks as if it could be written.
+
+    Raises:
+        MeshFileError: the folder is missing, or the path is a pipe or something else than a file, or writing is not
+            permitted.
+    """
+    path = as_path(path)
+    if path == PIPE:
+        raise MeshFileError("- is a pipe, to which only `coneflat flatten` writes its result: name a file")
+    try:
+        target = Path(os.path.realpath(path))
+        folder = target.parent
+        if not folder.is_dir():
+            reason = f"there is no folder {folder}; create it first"
+        elif target.is_dir():
+            reason = "it is a folder"
+        elif target.exists() and not target.is_file():
+            reason = "it is not an ordinary file"
+        elif target.exists() and not os.access(target, os.W_OK):
+            reason = "no permission to change it"
+        elif not os.access(folder, os.W_OK):
+            reason = f"no permission to write in {folder}"
+        else:
+            return target
+    except (OSError, ValueError) as error:
+        raise MeshFileError(f"{path} cannot be written: {_reason(error)}") from error
+    raise MeshFileError(f"{path} cannot be written: {reason}")
+
+
+def checked_target(path: PathName, endings: Collection[str], what: str) -> Path:
+    """Return a path if a file can be expected to be written there that has one of some endings, see `known_ending`.
+
+    Raises:
+        UnknownFormatError: it has another ending.
+        MeshFileError: as of `check_target`.
+    """
+    path = as_path(path)
+    known_ending(path, endings, what)
+    check_target(path)
+    return path
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder, and those that it is in, if they are missing.
+
+    Raises:
+        MeshFileError: it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise MeshFileError(f"cannot make the folder {path}: {_reason(error)}") from error
+
+
+@contextmanager
+def atomic_write(path: PathName, mode: str = "wb") -> Iterator[IO[Any]]:
+    """Open a file that appears under its name only when it is complete.
+
+    The content goes to a temporary file in the same folder, which takes the name at the end of the block; if
+    the block ends by any exception, it is removed and an older file of that name stays as it was.
+
+    Args:
+        path: the file to write.
+        mode: "wb" for bytes, "w" for text, which is UTF-8 with the line ends as given.
+
+    Raises:
+        MeshFileError: the file cannot be written, or the disk is full.
+    """
+    if mode not in ("w", "wb"):
+        raise ValueError(f"mode must be 'w' or 'wb', not {mode!r}")
+    target = check_target(path)
+    # Created by open(), and not by tempfile, so that it has the permissions of any new file.
+    temporary = target.with_name(_temporary(target.name, secrets.token_hex(6)))
+    text = {} if mode == "wb" else {"encoding": "utf-8", "newline": ""}
+    try:
+        with open(temporary, mode.replace("w", "x"), **text) as stream:  # type: ignore[call-overload]
+            yield stream
+        if target.exists():
+            shutil.copymode(target, temporary)
+        os.replace(temporary, target)
+    except ConeflatError:
+        raise
+    except OSError as error:
+        raise MeshFileError(f"{as_path(path)} cannot be written: {_reason(error)}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _temporary(name: str, mark: str) -> str:
+    return f".{name[:100]}.{mark}.tmp"
+
+
+def remove_unfinished(path: PathName) -> None:
+    """Remove what a process that was killed while it wrote a file has left of it."""
+    target = Path(os.path.realpath(path))
+    for left in target.parent.glob(_temporary(glob.escape(target.name[:100]), "?" * 12)):
+        with suppress(OSError):
+            left.unlink()
+
+
+def _reason(error: Exception) -> str:
+    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
