@@ -11,8 +11,8 @@ from grid_maps import bumpy, flat
 from shapes import grid as rectangle
 
 from coneflat import flatten
-from coneflat.apps.quads.aligned import aligned, split_edges
 from coneflat.apps.quads.extract import extract_quads
+from coneflat.apps.quads.layout import aligned, split_edges
 from coneflat.apps.quads.quad_mesh import least_jacobians
 from coneflat.apps.quads.quality import measure_quads
 from coneflat.apps.quads.smooth import smooth_quads

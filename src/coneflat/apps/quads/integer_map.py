@@ -13,8 +13,7 @@ from ...base import BoolArray, FloatArray, IntArray, list_some, plural
 from ...errors import GridError
 from ...geometry import double_areas, edge_lengths, sides_between, signed_double_areas
 from ...mesh import NEXT, PREVIOUS
-from .exact_grid import LOOSE
-from .sides import quarters_around
+from .layout import LOOSE, quarters_around
 from .transitions import UNITS
 
 
