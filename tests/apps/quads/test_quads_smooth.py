@@ -15,8 +15,7 @@ from coneflat.apps.quads.extract import extract_quads
 from coneflat.apps.quads.layout import aligned, split_edges
 from coneflat.apps.quads.quad_mesh import least_jacobians
 from coneflat.apps.quads.quality import measure_quads
-from coneflat.apps.quads.smooth import smooth_quads
-from coneflat.apps.quads.untangle import lift_worst, untangled
+from coneflat.apps.quads.smooth import lift_worst, smooth_quads, untangled
 from coneflat.errors import OptionError
 from coneflat.geometry.nearest import Stars, slide_near
 from coneflat.geometry.planar import signed_double_areas

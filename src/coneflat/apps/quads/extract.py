@@ -12,10 +12,9 @@ from ...errors import GridError
 from ...geometry import signed_double_areas
 from ...mesh import label_components
 from .exact_grid import ExactGrid, exact_grid
+from .grid_points import LOST, GridPoints, Ports, find_points, find_ports, join_ports
 from .integer_map import IntegerGrid
-from .points import GridPoints, Ports, find_points, find_ports
 from .quad_mesh import QuadMesh, require_manifold
-from .trace import LOST, join_ports
 
 # Squares at most: with about a kilobyte for each at the height of the work, what many machines have room for.
 MOST = 20_000_000

@@ -85,8 +85,6 @@ NEAR = 3.0
 # Radians by which the vector between such cones may turn, and pairs that are kept apart at once, as long as cones can
 # be kept apart so; if not, the next of these.
 WAYS = ((np.deg2rad(60.0), 1000), (np.deg2rad(90.0), 1000), (np.deg2rad(60.0), 1), (np.deg2rad(90.0), 1))
-# Sets of pairs kept apart that are looked at, at most.
-REPAIRS = 60
 # Places of the search tree visited for the nearest one alone, of which only that cones fall together is asked.
 QUICK = 2_000
 
@@ -178,7 +176,7 @@ class Rounding:
 
     def _apart(self, lattice: Lattice, turned: float, at_once: int) -> list[IntArray]:
         """Return near vectors of a lattice that keep all cones apart, and turn those near each other by less."""
-        for _ in range(REPAIRS):
+        while True:  # each time the lattice loses a dimension at least
             bad = self.pairs.collapsed(lattice.nearest(self.start, 1, QUICK)[0], turned)
             if not len(bad):
                 break
@@ -191,8 +189,6 @@ class Rounding:
                     )
                 lattice = lattice if part is None else part
             lattice = lattice.reduced()
-        else:
-            raise GridError(f"cones fall together in spite of {REPAIRS} rounds of equations between them")
         # The nearest of all may be another than that of the quick search.
         found = np.concatenate(
             [lattice.nearest(self.start, 64, VISITS), lattice.nearest(self.start, 1, QUICK)]
