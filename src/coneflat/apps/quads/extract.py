@@ -41,7 +41,8 @@ def extract_quads(grid: IntegerGrid) -> QuadMesh:
     exact = exact_grid(grid)
     found = find_points(exact)
     ports = find_ports(exact, found)
-    mates = _checked_mates(join_ports(exact, found, ports), ports)
+    mates = join_ports(exact, found, ports)
+    _require_pairs(mates, ports)
     following = _turn_left(mates, ports)
     darts, left_out = _close(following, ports)
     is_closed = not exact.mesh.is_boundary_edge.any()
@@ -70,8 +71,8 @@ def extract_quads(grid: IntegerGrid) -> QuadMesh:
     )
 
 
-def _checked_mates(mates: IntArray, ports: Ports) -> IntArray:
-    """Return where ports lead to, -1 for nowhere; raises GridError unless all ways lead there and back."""
+def _require_pairs(mates: IntArray, ports: Ports) -> None:
+    """Raise GridError unless all ways from ports lead to others, or the boundary, and back."""
     points = ports.points
     lost = np.flatnonzero(mates == LOST)
     if len(lost):
@@ -86,7 +87,6 @@ def _checked_mates(mates: IntArray, ports: Ports) -> IntArray:
             f"{plural(len(bad), 'grid line')} of {len(mates):,} that does not lead back, from points "
             f"{list_some(np.unique(points[bad]))}"
         )
-    return mates
 
 
 def _turn_left(mates: IntArray, ports: Ports) -> IntArray:

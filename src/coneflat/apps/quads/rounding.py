@@ -14,7 +14,7 @@ from ...base import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import GridError
 from ...geometry import cotangents
 from ...linalg import factorize
-from .lattice import VISITS, Lattice, whole_solutions
+from .lattice import Lattice, whole_solutions
 from .layout import Layout
 from .transitions import TURNS, UNITS, Transitions
 
@@ -190,9 +190,7 @@ class Rounding:
                 lattice = lattice if part is None else part
             lattice = lattice.reduced()
         # The nearest of all may be another than that of the quick search.
-        found = np.concatenate(
-            [lattice.nearest(self.start, 64, VISITS), lattice.nearest(self.start, 1, QUICK)]
-        )
+        found = np.concatenate([lattice.nearest(self.start, 64), lattice.nearest(self.start, 1, QUICK)])
         return [each for each in found if not len(self.pairs.collapsed(each, turned))][:16]
 
     def _turned_over(self, changes: FloatArray) -> FloatArray:
