@@ -112,8 +112,8 @@ def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
     return {"charts": "one"}
 
 
-def _noted(found: IntegerGrid, *notes: str) -> IntegerGrid:
-    return replace(found, notes=(*found.notes, *notes))
+def _noted(found: IntegerGrid, note: str) -> IntegerGrid:
+    return replace(found, notes=(*found.notes, note))
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,10 +94,9 @@ def sharp_layouts(
     with using_threads(options.threads):
         for layout in search.layouts():
             mesh = TriangleMesh(np.ldexp(layout.mesh.vertices, -exponent), layout.mesh.faces)
-            lengths, size = np.ldexp(layout.lengths, -exponent), float(np.ldexp(square, -exponent))
-            features = search.mesh.edges[search.edges]
-            in_units = replace(layout, mesh=mesh, lengths=lengths, size=size)
-            yield in_units, features, (*prepared.notes, *search.notes())
+            lengths, side = np.ldexp(layout.lengths, -exponent), float(np.ldexp(square, -exponent))
+            in_units = replace(layout, mesh=mesh, lengths=lengths, size=side)
+            yield in_units, search.mesh.edges[search.edges], (*prepared.notes, *search.notes())
 
 
 def not_taken(given: Mapping[str, Any], usual: Mapping[str, Any]) -> list[str]:
