@@ -158,7 +158,8 @@ def grid_of_corners(
             "this is no integer-grid map"
         )
     quarters = quarters_around(mesh, sides_between(corner_grid))
-    cones = np.flatnonzero((quarters != 4) & ~mesh.is_boundary_vertex & _used(mesh))
+    is_used = np.bincount(faces.ravel(), minlength=len(vertices)) > 0
+    cones = np.flatnonzero((quarters != 4) & ~mesh.is_boundary_vertex & is_used)
     corners = np.flatnonzero((quarters != 2) & _between_sides(mesh, corner_grid))
     area = float(double_areas(edge_lengths(vertices, faces)).sum())
     return IntegerGrid(
@@ -173,10 +174,6 @@ def grid_of_corners(
         corner_quarters=quarters[corners],
         **{"size": float(np.sqrt(area / flat.sum())), **known},  # type: ignore[arg-type]
     )
-
-
-def _used(mesh: TriangleMesh) -> BoolArray:
-    return np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)) > 0
 
 
 def _between_sides(mesh: TriangleMesh, corner_grid: FloatArray) -> BoolArray:

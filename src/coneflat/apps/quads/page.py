@@ -16,11 +16,10 @@ from ..view.page.payload import Told
 from ..view.page.webpage import page_of
 from .quad_mesh import QuadMesh
 from .quality import measure_quads
+from .transitions import TURNS
 
 # The corners of a square, counterclockwise, and the directions of its sides.
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
-# By so many quarter turns to the left.
-TURNS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]])
 
 
 @dataclass(frozen=True, eq=False)

@@ -82,9 +82,9 @@ def _turned_copies(transitions: Transitions) -> csr_matrix:
 
 # Units: cones that are farther from each other along the surface are not rounded onto each other.
 NEAR = 3.0
-# Radians by which the vector between such cones may turn, and pairs that are kept apart at once, as long as cones can
-# be kept apart so; if not, the next of these.
-WAYS = ((np.deg2rad(60.0), 1000), (np.deg2rad(90.0), 1000), (np.deg2rad(60.0), 1), (np.deg2rad(90.0), 1))
+# Radians by which the vector between such cones may turn, and pairs that are kept apart at once, None for all, as long
+# as cones can be kept apart so; if not, the next of these.
+WAYS = ((np.pi / 3, None), (np.pi / 2, None), (np.pi / 3, 1), (np.pi / 2, 1))
 # Places of the search tree visited for the nearest one alone, of which only that cones fall together is asked.
 QUICK = 2_000
 
@@ -171,10 +171,10 @@ class Rounding:
                 if (turned, at_once) == WAYS[-1]:
                     raise
         values = [np.asarray(self.basis @ each) for each in apart]
-        turned = self._turned_over(np.stack(values, axis=1) - self.smooth[:, None])
-        return [values[i] for i in np.argsort(turned, kind="stable")]
+        areas = self._turned_over(np.stack(values, axis=1) - self.smooth[:, None])
+        return [values[i] for i in np.argsort(areas, kind="stable")]
 
-    def _apart(self, lattice: Lattice, turned: float, at_once: int) -> list[IntArray]:
+    def _apart(self, lattice: Lattice, turned: float, at_once: int | None) -> list[IntArray]:
         """Return near vectors of a lattice that keep all cones apart, and turn those near each other by less."""
         while True:  # each time the lattice loses a dimension at least
             bad = self.pairs.collapsed(lattice.nearest(self.start, 1, QUICK)[0], turned)

@@ -20,7 +20,7 @@ from ...layout import SeamChains
 from .layout import LOOSE, Layout, charts_of, first_points, joining_chains
 
 UNITS = np.array([1, 1j, -1, -1j])
-# The same as matrices of whole numbers.
+# The same, quarter turns to the left, as matrices of whole numbers.
 TURNS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]])
 
 
