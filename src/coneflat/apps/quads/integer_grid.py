@@ -325,7 +325,8 @@ def _relaxed(
         tied=chains.halfedges[one_of, 1],
         translations=values[:count].reshape(-1, 2),
     )
-    # A thousand times the energy of an isometry: cones fall together then.
+    # A thousand times the energy of an isometry: cones fall together then. Of 60 cases of benchmarks/grids.py the
+    # slowest takes 1.7 times as long without this.
     hopeless = (
         1e3 * float(energy.values(np.ones(1), np.ones(1))[0]) * float(double_areas(layout.lengths).sum()) / 2
     )
