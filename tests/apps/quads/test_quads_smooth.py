@@ -11,13 +11,12 @@ from grid_maps import bumpy, flat
 from shapes import grid as rectangle
 
 from coneflat import flatten
-from coneflat.apps.quads.aligned import aligned, split_edges
 from coneflat.apps.quads.extract import extract_quads
+from coneflat.apps.quads.layout import aligned, split_edges
 from coneflat.apps.quads.nearest import Stars, slide_near
 from coneflat.apps.quads.quad_mesh import least_jacobians
 from coneflat.apps.quads.quality import measure_quads
-from coneflat.apps.quads.smooth import smooth_quads
-from coneflat.apps.quads.untangle import lift_worst, untangled
+from coneflat.apps.quads.smooth import lift_worst, smooth_quads, untangled
 from coneflat.errors import OptionError
 from coneflat.geometry.planar import signed_double_areas
 from coneflat.geometry.triangles import double_areas, edge_lengths

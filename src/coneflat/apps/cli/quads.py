@@ -62,8 +62,7 @@ def quads(
       coneflat quads hand.obj -o hand.npz --view hand.html
     """
     from ...io import check_target
-    from ..quads.files import check_quads_output
-    from ..quads.grid_files import check_grid_output
+    from ..quads.files import check_grid_output, check_quads_output
     from ..quads.page import page_of_quads
     from ..quads.quads import quads as find_quads
     from ..quads.quality import measure_quads
@@ -134,7 +133,7 @@ def _check_combinations(context: click.Context, mesh: Path) -> None:
 def _grid_of(mesh: Path, console: Console, options: dict[str, Any], weld: bool | None) -> IntegerGrid:
     """Return the grid of a mesh file, with notes on reading it, or the grid that a file holds."""
     from ...io import read_joined
-    from ..quads.grid_files import read_grid
+    from ..quads.files import read_grid
     from ..quads.integer_grid import integer_grid
     from .run import FLATTENED, READ
 

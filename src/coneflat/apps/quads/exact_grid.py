@@ -16,15 +16,13 @@ from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray, compiled, list_some, plural
 from ...errors import GridError
 from ...geometry import fill_orientations, sides_between
-from .sides import quarters_around
+from .layout import LOOSE, quarters_around
 
 if TYPE_CHECKING:
     from .integer_map import IntegerGrid
 
 # Grid units: what is so near a grid line is on it. Solvers leave 1e-12; what is on a line is to stay there.
 SNAP = 1e-9
-# Grid units by which the corners of a vertex may differ: far more than rounding, far less than what matters.
-LOOSE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)

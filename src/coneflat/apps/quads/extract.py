@@ -12,10 +12,9 @@ from ...errors import GridError
 from ...geometry import signed_double_areas
 from ...mesh import label_components
 from .exact_grid import ExactGrid, exact_grid
+from .grid_points import LOST, GridPoints, Ports, find_points, find_ports, join_ports
 from .integer_map import IntegerGrid
-from .points import GridPoints, Ports, find_points, find_ports
 from .quad_mesh import QuadMesh, require_manifold
-from .trace import LOST, join_ports
 
 # Squares at most: with about a kilobyte for each at the height of the work, what many machines have room for.
 MOST = 20_000_000
@@ -42,7 +41,8 @@ def extract_quads(grid: IntegerGrid) -> QuadMesh:
     exact = exact_grid(grid)
     found = find_points(exact)
     ports = find_ports(exact, found)
-    mates = _checked_mates(join_ports(exact, found, ports), ports)
+    mates = join_ports(exact, found, ports)
+    _require_pairs(mates, ports)
     following = _turn_left(mates, ports)
     darts, left_out = _close(following, ports)
     is_closed = not exact.mesh.is_boundary_edge.any()
@@ -71,8 +71,8 @@ def extract_quads(grid: IntegerGrid) -> QuadMesh:
     )
 
 
-def _checked_mates(mates: IntArray, ports: Ports) -> IntArray:
-    """Return where ports lead to, -1 for nowhere; raises GridError unless all ways lead there and back."""
+def _require_pairs(mates: IntArray, ports: Ports) -> None:
+    """Raise GridError unless all ways from ports lead to others, or the boundary, and back."""
     points = ports.points
     lost = np.flatnonzero(mates == LOST)
     if len(lost):
@@ -87,7 +87,6 @@ def _checked_mates(mates: IntArray, ports: Ports) -> IntArray:
             f"{plural(len(bad), 'grid line')} of {len(mates):,} that does not lead back, from points "
             f"{list_some(np.unique(points[bad]))}"
         )
-    return mates
 
 
 def _turn_left(mates: IntArray, ports: Ports) -> IntArray:

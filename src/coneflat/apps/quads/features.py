@@ -8,7 +8,7 @@ import numpy as np
 
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray
-from ...geometry import corner_angles, dihedral_angles
+from ...geometry import corner_angles, dihedral_angles, face_normals
 from ...mesh import CutMesh, label_components, open_along, tie_key
 
 
@@ -190,8 +190,7 @@ def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
 def _too_long(mesh: TriangleMesh, edges: IntArray, longest: float) -> BoolArray:
     """Return (e,) the edges longer than what their patches allow."""
     count, patch = patches_of(mesh, edges)
-    corners = mesh.vertices[mesh.faces]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    areas = np.linalg.norm(face_normals(mesh.vertices, mesh.faces), axis=1) / 2
     allowed = np.minimum(longest, np.sqrt(np.bincount(patch, areas, count)) / 4)[patch]
     lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
     one, two = mesh.edge_faces.T

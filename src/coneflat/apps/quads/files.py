@@ -1,17 +1,20 @@
-"""Writing and reading meshes of quads."""
+"""Files of integer grids, OBJ whose UVs are the grid and NPZ, and of meshes of quads."""
 
 from __future__ import annotations
 
 import json
+import re
 import zipfile
-from collections.abc import Callable
+from dataclasses import fields
 from os import PathLike
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import numpy as np
 
+from ... import TriangleMesh, check_mesh
 from ...base import FloatArray, IntArray
+from ...errors import MeshError, MeshFileError
 from ...geometry import vertex_normals
 from ...io import (
     FOR_INDICES,
@@ -26,18 +29,34 @@ from ...io import (
     known_ending,
     lines_of,
     number,
+    parse_obj,
     read_archive,
+    read_bytes,
     shading_normals,
     write_parts,
 )
-
-if TYPE_CHECKING:
-    from .quad_mesh import QuadMesh
+from .integer_map import IntegerGrid, find_motions, grid_of_corners
+from .quad_mesh import QuadMesh
 
 #: Endings of the files that `write_quads` writes.
 QUAD_FORMATS = (".obj", ".ply", ".glb", ".npz")
 #: Arrays from which a mesh of quads is made again.
 _NAMES = ("vertices", "quads", "faces", "barycentric", "surface_vertices", "surface_faces", "report")
+#: Endings of the files that `write_grid` writes and `read_grid` reads.
+GRID_FORMATS = (".obj", ".npz")
+#: The arrays of an integer grid, and its numbers.
+_ARRAYS, _NUMBERS = (
+    [field.name for field in fields(IntegerGrid) if str(field.type).endswith(kind)]
+    for kind in ("Array", "float")
+)
+_REPORT = re.compile(rb"(?m)^# grid (\{.*\})[ \t]*\r?$")
+_LINE = re.compile(rb"(?m)^l +(\d+) +(\d+)[ \t]*\r?$")
+_HEAD = (
+    "# An integer grid by coneflat: texture coordinates are in squares of the grid, which goes on across seams.",
+    "# seam V W TURNS X Y: across the edge from V to W, p of the triangle on its right is R p + (X, Y) in that on its",
+    "# left, R being so many quarter turns to the left. Other edges are no seams.",
+    "# Lines (l) are sharp edges on grid lines.",
+)
 
 
 def check_quads_output(path: str | PathLike[str]) -> Path:
@@ -54,7 +73,7 @@ def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
     """Write a mesh of quads, in full or not at all, and return the path.
 
     An .obj has the fewest digits from which the same numbers are read; a .ply is binary, coordinates as doubles. A
-    .glb, which knows no quads, has two triangles for each, and their edges as lines; see `write_quads_glb`. An .npz has
+    .glb, which knows no quads, has two triangles for each, and their edges as lines; see `_write_glb`. An .npz has
     all arrays of the `QuadMesh`, from which `read_quads` makes it again, and the irregular vertices with
     their valences.
 
@@ -74,26 +93,19 @@ def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
 
 def write_quads_stream(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
     """Write a mesh of quads to a binary stream; ending: one of `QUAD_FORMATS`, see `write_quads`."""
-    writers: dict[str, Callable[[QuadMesh, IO[bytes]], None]] = {
-        ".obj": _write_obj,
-        ".ply": _write_ply,
-        ".glb": write_quads_glb,
-        ".npz": _write_npz,
-    }
-    writers[ending](mesh, stream)
+    if ending == ".obj":
+        stream.writelines(lines_of("v", mesh.vertices, b"\n"))
+        stream.writelines(lines_of("f", mesh.quads + 1, b"\n"))
+    elif ending == ".ply":
+        places = np.ascontiguousarray(mesh.vertices, "<f8")
+        write_parts(stream, "quads by coneflat", [f"double {axis}" for axis in "xyz"], places, mesh.quads)
+    elif ending == ".glb":
+        _write_glb(mesh, stream)
+    else:
+        _write_quads_npz(mesh, stream)
 
 
-def _write_obj(mesh: QuadMesh, stream: IO[bytes]) -> None:
-    stream.writelines(lines_of("v", mesh.vertices, b"\n"))
-    stream.writelines(lines_of("f", mesh.quads + 1, b"\n"))
-
-
-def _write_ply(mesh: QuadMesh, stream: IO[bytes]) -> None:
-    places = np.ascontiguousarray(mesh.vertices, "<f8")
-    write_parts(stream, "quads by coneflat", [f"double {axis}" for axis in "xyz"], places, mesh.quads)
-
-
-def _write_npz(mesh: QuadMesh, stream: IO[bytes]) -> None:
+def _write_quads_npz(mesh: QuadMesh, stream: IO[bytes]) -> None:
     report = {"left_out": mesh.left_out, "area_left_out": mesh.area_left_out, "notes": list(mesh.notes)}
     np.savez(
         stream,
@@ -132,9 +144,6 @@ def read_quads(path: str | PathLike[str]) -> QuadMesh:
 
 
 def _quad_mesh(reading: CheckedArrays) -> QuadMesh:
-    from ... import TriangleMesh
-    from .quad_mesh import QuadMesh
-
     reading.need(_NAMES, "mesh of quads")
     report = reading.report()
     vertices, surface = reading.finite("vertices", (None, 3)), reading.finite("surface_vertices", (None, 3))
@@ -151,19 +160,15 @@ def _quad_mesh(reading: CheckedArrays) -> QuadMesh:
     )
 
 
-LINE_MATERIAL: dict[str, Any] = {
+_LINE_MATERIAL: dict[str, Any] = {
     "name": "edges",
-    "pbrMetallicRoughness": {
-        "baseColorFactor": [0.02, 0.02, 0.02, 1.0],
-        "metallicFactor": 0.0,
-        "roughnessFactor": 1.0,
-    },
+    "pbrMetallicRoughness": {"baseColorFactor": [0.02] * 3 + [1.0], "metallicFactor": 0.0},
     # Lines have no side to be lit from.
     "extensions": {"KHR_materials_unlit": {}},
 }
 
 
-def write_quads_glb(mesh: QuadMesh, stream: IO[bytes]) -> None:
+def _write_glb(mesh: QuadMesh, stream: IO[bytes]) -> None:
     """Write a mesh of quads as GLB: two triangles for each quad, and its edges as lines, so that quads are seen.
 
     The first primitive has the vertices in their order and the triangles on either side of the shorter diagonal of quad
@@ -183,33 +188,186 @@ def write_quads_glb(mesh: QuadMesh, stream: IO[bytes]) -> None:
             "scene": 0,
             "scenes": [{"nodes": [0]}],
             "nodes": [{"mesh": 0, "name": "quads"}],
-            "materials": [MATERIAL, LINE_MATERIAL],
+            "materials": [MATERIAL, _LINE_MATERIAL],
         }
     )
-    normal = _floats(glb, normals)
-    faces = {"attributes": {"POSITION": _places(glb, mesh.vertices), "NORMAL": normal}, "material": 0}
-    lines = {"attributes": {"POSITION": _places(glb, mesh.vertices + 0.01 * length * normals)}, "material": 1}
-    glb.tree["meshes"] = [
-        {
-            "name": "quads",
-            "primitives": [
-                faces | {"indices": _indices(glb, mesh.triangles)},
-                lines | {"indices": _indices(glb, mesh.edges), "mode": 1},
-            ],
-        }
-    ]
+
+    def floats(rows: FloatArray, **more: Any) -> int:
+        form = {"componentType": 5126, "type": "VEC3", **more}
+        return glb.add_array(rows.astype("<f4"), form, FOR_VERTICES)
+
+    def primitive(places: FloatArray, indices: IntArray, **more: int) -> dict[str, Any]:
+        form = {"componentType": 5125, "type": "SCALAR"}
+        at = glb.add_array(indices.reshape(-1, 1).astype("<u4"), form, FOR_INDICES)
+        attributes = {"POSITION": floats(places, **bounds(places.astype("<f4")))}
+        return {"attributes": attributes, "indices": at, **more}
+
+    faces = primitive(mesh.vertices, mesh.triangles, material=0)
+    faces["attributes"]["NORMAL"] = floats(normals)
+    lines = primitive(mesh.vertices + 0.01 * length * normals, mesh.edges, material=1, mode=1)
+    glb.tree["meshes"] = [{"name": "quads", "primitives": [faces, lines]}]
     glb.write(stream)
 
 
-def _floats(glb: Glb, rows: FloatArray, **more: Any) -> int:
-    form = {"componentType": 5126, "type": "VEC3", **more}
-    return glb.add_array(rows.astype("<f4"), form, FOR_VERTICES)
+def check_grid_output(path: str | PathLike[str]) -> Path:
+    """Return the path if `write_grid` can be expected to succeed with it.
+
+    Raises:
+        UnknownFormatError: the ending is not one of `GRID_FORMATS`.
+        MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
+    """
+    return checked_target(path, GRID_FORMATS, "integer grids are written as")
 
 
-def _places(glb: Glb, rows: FloatArray) -> int:
-    return _floats(glb, rows, **bounds(rows.astype("<f4")))
+def write_grid(path: str | PathLike[str], grid: IntegerGrid) -> Path:
+    """Write an integer grid, in full or not at all, and return the path.
+
+    An .obj has the place of every triangle corner as texture coordinates in units of the grid, with all their
+    digits: the form in which programs that extract quads take it, libQEx among them. The quarter turns and
+    translations of seam edges, and the measures of the grid, stand in comments. An .npz has all arrays of the
+    `IntegerGrid`, and `seams` (k, 2), pairs of vertices with their `seam_turns` (k,) and `seam_shifts` (k, 2), as the
+    comments have them.
+
+    Args:
+        path: the file.
+        grid: what to write.
+
+    Raises:
+        UnknownFormatError: the ending is not one of `GRID_FORMATS`.
+        MeshFileError: the file cannot be written.
+    """
+    path = check_grid_output(path)
+    with atomic_write(path) as stream:
+        (_write_grid_obj if path.suffix.lower() == ".obj" else _write_grid_npz)(grid, stream)
+    return path
 
 
-def _indices(glb: Glb, rows: IntArray) -> int:
-    form = {"componentType": 5125, "type": "SCALAR"}
-    return glb.add_array(rows.reshape(-1, 1).astype("<u4"), form, FOR_INDICES)
+def _write_grid_obj(grid: IntegerGrid, stream: IO[bytes]) -> None:
+    # A corner of the same vertex at the same place is the same point.
+    keys = np.concatenate([grid.faces.reshape(-1, 1), grid.corner_grid.reshape(-1, 2)], axis=1)
+    points, number_of = np.unique(keys, axis=0, return_inverse=True)
+    told = {**grid.report(), "notes": list(grid.notes)}
+    stream.write(("\n".join([*_HEAD, f"# grid {json.dumps(told)}"]) + "\n").encode("ascii"))
+    edges, turns, shifts = _seams(grid)
+    rows = np.concatenate([edges + 1, turns[:, None], shifts], axis=1)
+    stream.writelines(lines_of("# seam", rows, b"\n"))
+    stream.writelines(lines_of("v", grid.vertices, b"\n"))
+    stream.writelines(lines_of("vt", points[:, 1:], b"\n"))
+    corners = np.stack([grid.faces.ravel(), number_of.ravel()], axis=1).reshape(-1, 6) + 1
+    for i in range(0, len(corners), 1 << 15):
+        block = corners[i : i + (1 << 15)]
+        stream.write(("f %d/%d %d/%d %d/%d\n" * len(block) % tuple(block.ravel().tolist())).encode())
+    stream.writelines(lines_of("l", grid.features + 1, b"\n"))
+
+
+def _seams(grid: IntegerGrid) -> tuple[IntArray, IntArray, IntArray]:
+    """Return (k, 2) seam edges, (k,) turns and (k, 2) shifts; the triangle on the left of an edge is moved to.
+
+    An edge is a seam where the motion across it is not none.
+    """
+    mesh = TriangleMesh(grid.vertices, grid.faces)
+    here = mesh.edge_halfedges[~mesh.is_boundary_edge, 0]
+    here = here[(grid.turns[here] != 0) | grid.shifts[here].any(axis=1)]
+    edges = np.stack([mesh.tails[here], mesh.heads[here]], axis=1)
+    return edges, grid.turns[here], grid.shifts[here]
+
+
+def _write_grid_npz(grid: IntegerGrid, stream: IO[bytes]) -> None:
+    edges, turns, shifts = _seams(grid)
+    arrays: dict[str, Any] = {name: getattr(grid, name) for name in _ARRAYS}
+    arrays |= {"seams": edges, "seam_turns": turns, "seam_shifts": shifts}
+    told = {**grid.report(), "notes": list(grid.notes)}
+    np.savez(stream, **arrays, report=np.array(json.dumps(told)))
+
+
+def read_grid(path: str | PathLike[str]) -> IntegerGrid:
+    """Return an integer grid from an .npz or .obj file.
+
+    Of an .obj nothing is needed but triangles and their texture coordinates, in units of the grid: quarter turns,
+    translations and cones follow from these. Measures are those in the comments of `write_grid`, else not numbers.
+
+    Raises:
+        UnknownFormatError: the ending is another.
+        MeshFileError: the file is not there, may not be read, or holds no manifold of triangles with UVs.
+        MeshError: it has no vertices or faces, or some that do not exist.
+        GridError: the UVs are no integer-grid map: triangles are turned over, or sides of seams do not fit.
+    """
+    path = as_path(path)
+    if known_ending(path, GRID_FORMATS, "integer grids are read from") == ".npz":
+        return read_archive(path, (*_ARRAYS, "report"), _grid_of_archive)
+    return _grid_of_obj(path, read_bytes(path))
+
+
+def _grid_of_obj(path: Path, content: bytes) -> IntegerGrid:
+    mesh = parse_obj(path, content)
+    if (np.diff(mesh.offsets) != 3).any():
+        raise MeshFileError(f"{path} holds no integer grid: it has polygons that are no triangles")
+    uv, at = mesh.uv, mesh.texture
+    if uv is None or at is None or at.min() < 0 or at.max() >= len(uv):
+        raise MeshFileError(f"{path} holds no integer grid: there are triangle corners without UVs")
+    faces, places = mesh.corners.reshape(-1, 3), uv[at].reshape(-1, 3, 2)
+    _require_mesh(path, mesh.vertices, faces)
+    match = _REPORT.search(content)
+    known = {} if match is None else _known(path, match[1])
+    features = np.array(_LINE.findall(content), dtype=np.int64).reshape(-1, 2) - 1
+    if len(features) and not (features.min() >= 0 and features.max() < len(mesh.vertices)):
+        raise MeshFileError(f"{path} has lines between vertices that it does not have")
+    return grid_of_corners(mesh.vertices, faces, places, **known, features=features)
+
+
+def _require_mesh(path: Path, vertices: FloatArray, faces: IntArray) -> None:
+    """Raise MeshFileError unless triangles are a manifold, and all run the same way round."""
+    used, numbers = np.unique(faces, return_inverse=True)
+    again = numbers.reshape(-1, 3)
+    try:
+        checked = check_mesh(vertices[used], again)
+    except MeshError as error:
+        # What follows is how to repair it, which a map does not survive.
+        raise MeshFileError(f"{path} holds no integer grid: {str(error).split(';')[0]}") from error
+    if (checked.mesh.faces != again).any():
+        raise MeshFileError(
+            f"{path} holds no integer grid: neighbouring triangles run in opposite directions"
+        )
+
+
+def _known(path: Path, text: bytes) -> dict[str, Any]:
+    """Return the measures and notes that a comment has."""
+    try:
+        report = json.loads(text)
+        known: dict[str, Any] = {name: float(number(report[name])) for name in _NUMBERS if name in report}
+        known["notes"] = tuple(str(note) for note in report.get("notes", ()))
+    except (ValueError, TypeError, AttributeError) as error:
+        raise MeshFileError(f"{path} has a comment on its grid that cannot be read: {error}") from error
+    return known
+
+
+def _grid_of_archive(reading: CheckedArrays) -> IntegerGrid:
+    reading.need((*_ARRAYS, "report"), "integer grid")
+    report = reading.report()
+    vertices = reading.finite("vertices", (None, 3))
+    n = len(vertices)
+    faces = reading.indices("faces", (None, 3), n)
+    m = len(faces)
+    numbers: dict[str, Any] = {name: float(number(report[name])) for name in _NUMBERS}
+    cones, corners = (reading.indices(name, (None,), n) for name in ("cones", "corners"))
+    grid = IntegerGrid(
+        vertices=vertices,
+        faces=faces,
+        corner_grid=reading.finite("corner_grid", (m, 3, 2)),
+        turns=reading.indices("turns", (3 * m,), 4, least=-1),
+        shifts=reading.indices("shifts", (3 * m, 2), None, least=-(2**53)),
+        cones=cones,
+        quarters=reading.indices("quarters", (len(cones),), None),
+        corners=corners,
+        corner_quarters=reading.indices("corner_quarters", (len(corners),), None),
+        features=reading.indices("features", (None, 2), n),
+        **numbers,
+        notes=reading.notes(report),
+    )
+    _require_mesh(reading.path, vertices, faces)
+    turns, shifts, _ = find_motions(TriangleMesh(vertices, faces), grid.corner_grid)
+    if (turns != grid.turns).any() or (shifts != grid.shifts).any():
+        raise MeshFileError(
+            f"{reading.path} holds no integer grid: its turns and shifts are not those of its corners"
+        )
+    return grid

@@ -13,8 +13,7 @@ from ...base import BoolArray, FloatArray, IntArray, list_some, plural
 from ...errors import GridError
 from ...geometry import double_areas, edge_lengths, sides_between, signed_double_areas
 from ...mesh import NEXT, PREVIOUS
-from .exact_grid import LOOSE
-from .sides import quarters_around
+from .layout import LOOSE, quarters_around
 from .transitions import UNITS
 
 
@@ -55,13 +54,13 @@ class IntegerGrid:
     cones: IntArray
     quarters: IntArray
     size: float
-    move_rms: float
-    move_max: float
-    energy_before: float
-    energy: float
-    qc_before: float
-    qc_mean: float
-    least_area: float
+    move_rms: float = np.nan
+    move_max: float = np.nan
+    energy_before: float = np.nan
+    energy: float = np.nan
+    qc_before: float = np.nan
+    qc_mean: float = np.nan
+    least_area: float = np.nan
     notes: tuple[str, ...] = ()
     corners: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     corner_quarters: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
@@ -80,7 +79,7 @@ class IntegerGrid:
             UnknownFormatError: the ending is another.
             MeshFileError: the file cannot be written.
         """
-        from .grid_files import write_grid
+        from .files import write_grid
 
         return write_grid(path, self)
 
@@ -93,7 +92,7 @@ class IntegerGrid:
             MeshFileError: the file is not there, may not be read, or holds no manifold of triangles with UVs.
             GridError: the UVs are no integer-grid map.
         """
-        from .grid_files import read_grid
+        from .files import read_grid
 
         return read_grid(path)
 
@@ -159,12 +158,10 @@ def grid_of_corners(
             "this is no integer-grid map"
         )
     quarters = quarters_around(mesh, sides_between(corner_grid))
-    cones = np.flatnonzero((quarters != 4) & ~mesh.is_boundary_vertex & _used(mesh))
+    is_used = np.bincount(faces.ravel(), minlength=len(vertices)) > 0
+    cones = np.flatnonzero((quarters != 4) & ~mesh.is_boundary_vertex & is_used)
     corners = np.flatnonzero((quarters != 2) & _between_sides(mesh, corner_grid))
     area = float(double_areas(edge_lengths(vertices, faces)).sum())
-    nothing = dict.fromkeys(
-        ("move_rms", "move_max", "energy_before", "energy", "qc_before", "qc_mean", "least_area"), np.nan
-    )
     return IntegerGrid(
         vertices=vertices,
         faces=faces,
@@ -175,12 +172,8 @@ def grid_of_corners(
         quarters=quarters[cones],
         corners=corners,
         corner_quarters=quarters[corners],
-        **{"size": float(np.sqrt(area / flat.sum())), **nothing, **known},  # type: ignore[arg-type]
+        **{"size": float(np.sqrt(area / flat.sum())), **known},  # type: ignore[arg-type]
     )
-
-
-def _used(mesh: TriangleMesh) -> BoolArray:
-    return np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)) > 0
 
 
 def _between_sides(mesh: TriangleMesh, corner_grid: FloatArray) -> BoolArray:

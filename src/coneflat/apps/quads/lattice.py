@@ -11,8 +11,6 @@ import scipy.linalg
 from ...base import FloatArray, IntArray, compiled
 from ...errors import GridError
 
-# Entries above this are near what 64 bits hold; those of seams stay below a hundred.
-LARGEST = 2**40
 # Places of the search tree that are visited in all, at most.
 VISITS = 200_000
 
@@ -71,7 +69,8 @@ def _eliminate(work: IntArray, row: int, open_columns: IntArray) -> int | None:
         others = columns[filled][columns[filled] != pivot]
         times = np.rint(work[row, others] / work[row, pivot]).astype(np.int64)
         work[:, others] -= work[:, [pivot]] * times
-        if np.abs(work[:, others]).max() > LARGEST:
+        # Near what 64 bits hold; entries of seams stay below a hundred.
+        if np.abs(work[:, others]).max() > 2**40:
             raise GridError(f"the equations between {work.shape[1]} translations of seams overflow")
 
 

@@ -20,9 +20,8 @@ from ...options import (
     strength,
 )
 
-#: Where nothing else is said: how many quads, rounds of smoothing, of which more change little, and radians of the
-#: sharpest cone and the widest saddle: three and six quads.
-QUADS, ROUNDS, MIN_CONE_ANGLE, MAX_CONE_ANGLE = 10_000, 10, 1.5 * math.pi, 3 * math.pi
+#: Where nothing else is said: how many quads, and rounds of smoothing, of which more change little.
+QUADS, ROUNDS = 10_000, 10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +55,6 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
     sharp_angle: float | None = option(None, ANGLE_OR_NONE)
     cones: str | Mapping[int, float] = option("auto", WordOrVertices(("auto",), "cone"), one_mesh=True)
     boundary: str = option("auto", Choice(("auto", "straight", "free")))
-    min_cone_angle: float = option(MIN_CONE_ANGLE, ANGLE)
-    max_cone_angle: float | None = option(MAX_CONE_ANGLE, ANGLE_OR_NONE)
+    min_cone_angle: float = option(1.5 * math.pi, ANGLE)
+    max_cone_angle: float | None = option(3 * math.pi, ANGLE_OR_NONE)
     max_cones: int | None = option(None, COUNT)

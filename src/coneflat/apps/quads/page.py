@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ... import Flattening
 from ...base import BoolArray, IntArray, plural
 from ...io import Mapped
 from ...mesh import label_components
@@ -15,15 +16,10 @@ from ..view.page.payload import Told
 from ..view.page.webpage import page_of
 from .quad_mesh import QuadMesh
 from .quality import measure_quads
-
-if TYPE_CHECKING:
-    from ... import Flattening
-    from .quad_mesh import QuadMesh
+from .transitions import TURNS
 
 # The corners of a square, counterclockwise, and the directions of its sides.
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
-# By so many quarter turns to the left.
-TURNS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,12 +138,12 @@ def _turned(turn: IntArray, vectors: IntArray) -> IntArray:
     return found
 
 
-def arranged(domains: Domains, gap: int = 1) -> tuple[IntArray, int]:
+def arranged(domains: Domains) -> tuple[IntArray, int]:
     """Return (p, 4, 2) whole numbers where corners of quads lie if all rectangles lie apart, and the side of a square.
 
-    They lie in rows, the tallest below, so that all are about square; a gap of so many quads is around each.
+    They lie in rows, the tallest below, so that all are about square; a gap of one quad is around each.
     """
-    sides = domains.sides + gap
+    sides = domains.sides + 1
     order = np.lexsort((-sides[:, 0], -sides[:, 1]))
     width = max(int(np.ceil(np.sqrt(sides.prod(axis=1).sum()))), int(sides[:, 0].max()))
     corner = np.zeros_like(sides)
@@ -157,7 +153,7 @@ def arranged(domains: Domains, gap: int = 1) -> tuple[IntArray, int]:
             x, y, height = 0, y + height, 0
         corner[k] = x, y
         x, height = x + int(sides[k, 0]), max(height, int(sides[k, 1]))
-    return gap + domains.places + corner[domains.domain][:, None], gap + max(width, y + height)
+    return 1 + domains.places + corner[domains.domain][:, None], 1 + max(width, y + height)
 
 
 def page_of_quads(quads: QuadMesh, *, name: str = "Quads", show: str | None = None, **look: Any) -> str:
@@ -168,14 +164,9 @@ def page_of_quads(quads: QuadMesh, *, name: str = "Quads", show: str | None = No
     """
     domains = find_domains(quads)
     result, charts = as_flattening(quads, domains), len(domains.sides)
+    irregular = plural(len(quads.irregular), "irregular vertex", "irregular vertices")
     told = Told(
-        title="  ·  ".join(
-            (
-                plural(len(quads.quads), "quad"),
-                plural(len(quads.irregular), "irregular vertex", "irregular vertices"),
-                plural(charts, "rectangle"),
-            )
-        ),
+        title=f"{plural(len(quads.quads), 'quad')}  ·  {irregular}  ·  {plural(charts, 'rectangle')}",
         rows=[
             *measure_quads(quads).rows(),
             ("red dots", f"{(result.curvatures > 0).sum():,}", "vertices with fewer than four quads"),

@@ -104,7 +104,8 @@ class QuadMesh:
     @property
     def surface_euler(self) -> int:
         """That of the surface, which is the same unless squares were left out; vertices without a face do not count."""
-        return used_euler(self.surface)
+        unused = len(self.surface.vertices) - len(np.unique(self.surface.faces))
+        return self.surface.euler_characteristic - unused
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the mesh as .obj, .ply, .glb or .npz, in full or not at all, and return the path; see `write_quads`.
@@ -135,12 +136,6 @@ class QuadMesh:
         from .files import read_quads
 
         return read_quads(path)
-
-
-def used_euler(mesh: TriangleMesh) -> int:
-    """Return the Euler characteristic of a mesh without the vertices that no face has."""
-    unused = len(mesh.vertices) - len(np.unique(mesh.faces))
-    return mesh.euler_characteristic - unused
 
 
 def require_manifold(quads: IntArray, vertex_count: int, edge_count: int) -> None:

@@ -15,8 +15,7 @@ from .integer_grid import integer_grid
 from .integer_map import IntegerGrid
 from .options import ROUNDS
 from .quad_mesh import QuadMesh, least_jacobians
-from .smooth import smooth_quads
-from .untangle import untangled
+from .smooth import smooth_quads, untangled
 
 
 def quads(

@@ -65,37 +65,18 @@ class QuadMeasures:
         valences = ", ".join(f"{count:,} of {valence}" for valence, count in self.irregular_valences.items())
         apart = self.hausdorff / self.edge_mean
         holds = self.euler_characteristic == self.surface_euler
-        yield (
-            "quads",
-            f"{self.quads:,}",
-            f"Euler characteristic {self.euler_characteristic}, "
-            + ("as the surface" if holds else f"not {self.surface_euler} as the surface"),
-        )
-        yield (
-            "irregular",
-            f"{self.irregular:,}",
-            f"inner vertices of other valence than 4: {valences or 'none'}",
-        )
-        yield (
-            "off 90 deg",
-            f"{self.angle_mean:.2f}",
-            f"mean; 95% below {self.angle_p95:.1f}, worst {self.angle_max:.1f}",
-        )
-        yield (
-            "edge cv",
-            f"{self.edge_cv:.3f}",
-            f"standard deviation of edge lengths over their mean, {self.edge_mean:.4g}",
-        )
-        yield (
-            "Jacobian",
-            f"{self.jacobian_mean:.3f}",
-            f"scaled, mean of each quad's least; least {self.jacobian_min:.3f}",
-        )
-        yield (
-            "distance",
-            f"{self.hausdorff:.3g}",
-            f"from the surface and back, the largest of samples; {apart:.2f} edges",
-        )
+        euler = "as the surface" if holds else f"not {self.surface_euler} as the surface"
+        yield "quads", f"{self.quads:,}", f"Euler characteristic {self.euler_characteristic}, {euler}"
+        irregular = f"inner vertices of other valence than 4: {valences or 'none'}"
+        yield "irregular", f"{self.irregular:,}", irregular
+        off = f"mean; 95% below {self.angle_p95:.1f}, worst {self.angle_max:.1f}"
+        yield "off 90 deg", f"{self.angle_mean:.2f}", off
+        spread = f"standard deviation of edge lengths over their mean, {self.edge_mean:.4g}"
+        yield "edge cv", f"{self.edge_cv:.3f}", spread
+        least = f"scaled, mean of each quad's least; least {self.jacobian_min:.3f}"
+        yield "Jacobian", f"{self.jacobian_mean:.3f}", least
+        distance = f"from the surface and back, the largest of samples; {apart:.2f} edges"
+        yield "distance", f"{self.hausdorff:.3g}", distance
 
 
 def measure_quads(quads: QuadMesh) -> QuadMeasures:
@@ -156,14 +137,11 @@ def surface_gaps(quads: QuadMesh) -> tuple[float, float]:
     return float(there.max()), float(back.max())
 
 
-def _samples(mesh: TriangleMesh, apart: float, most: int = 64) -> FloatArray:
-    """Return (s, 3) points of triangles, those of each in rows so far apart at most, and their vertices.
-
-    most: rows in a triangle.
-    """
+def _samples(mesh: TriangleMesh, apart: float) -> FloatArray:
+    """Return (s, 3) points of triangles, those of each in rows so far apart, 64 at most, and their vertices."""
     parts = [mesh.vertices[np.unique(mesh.faces)]]
     longest = edge_lengths(mesh.vertices, mesh.faces).max(axis=1)
-    rows = np.minimum(np.ceil(longest / apart), most).astype(np.int64)
+    rows = np.minimum(np.ceil(longest / apart), 64).astype(np.int64)
     for count in np.unique(rows):
         i, j = (x.ravel() for x in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
         # Middles of the small triangles that stand upright.

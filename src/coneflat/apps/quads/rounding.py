@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, kron
 from scipy.sparse.csgraph import dijkstra
 
-from ... import TriangleMesh
-from ...base import ComplexArray, FloatArray, IntArray
+from ...base import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import GridError
 from ...geometry import cotangents
 from ...linalg import factorize
-from ...mesh import NEXT, PREVIOUS
-from .lattice import VISITS, Lattice, whole_solutions
-from .near_sides import PathVector, distances_to_sides, paths_to_sides
+from .lattice import Lattice, whole_solutions
+from .layout import Layout
 from .transitions import TURNS, UNITS, Transitions
 
 
@@ -29,9 +28,9 @@ class Stiffness:
     translations, in which some run around all of the model and some around a finger, does not.
     """
 
-    def __init__(self, corners: IntArray, points: ComplexArray, transitions: Transitions) -> None:
+    def __init__(self, layout: Layout, transitions: Transitions) -> None:
         self._shifts = transitions.shifts
-        self._energy = kron(_laplacian(corners, points), np.eye(2)).tocsr()
+        self._energy = kron(_laplacian(layout), np.eye(2)).tocsr()
         self._turned = _turned_copies(transitions)
         system = (self._turned.T @ self._energy @ self._turned).tocsc()
         ridge = 1e-10 * float(system.diagonal().mean()) if system.shape[0] else 0.0
@@ -59,9 +58,9 @@ class Stiffness:
         return (gram + gram.T) / 2 + 1e-10 * max(float(np.trace(gram)), 1.0) * np.eye(count)
 
 
-def _laplacian(corners: IntArray, points: ComplexArray) -> csr_matrix:
+def _laplacian(layout: Layout) -> csr_matrix:
     """Return (u, u) the cotangent Laplacian of the layout."""
-    starts, ends = corners[:, NEXT].ravel(), corners[:, PREVIOUS].ravel()
+    points, (starts, ends) = layout.points, layout.ends
     weights = cotangents(np.abs(points[ends] - points[starts]).reshape(-1, 3)).ravel() / 2
     rows = np.concatenate([starts, ends, starts, ends])
     columns = np.concatenate([ends, starts, starts, ends])
@@ -83,11 +82,9 @@ def _turned_copies(transitions: Transitions) -> csr_matrix:
 
 # Units: cones that are farther from each other along the surface are not rounded onto each other.
 NEAR = 3.0
-# Radians by which the vector between such cones may turn, and pairs that are kept apart at once, as long as cones can
-# be kept apart so; if not, the next of these.
-WAYS = ((np.deg2rad(60.0), 1000), (np.deg2rad(90.0), 1000), (np.deg2rad(60.0), 1), (np.deg2rad(90.0), 1))
-# Sets of pairs kept apart that are looked at, at most.
-REPAIRS = 60
+# Radians by which the vector between such cones may turn, and pairs that are kept apart at once, None for all, as long
+# as cones can be kept apart so; if not, the next of these.
+WAYS = ((np.pi / 3, None), (np.pi / 2, None), (np.pi / 3, 1), (np.pi / 2, 1))
 # Places of the search tree visited for the nearest one alone, of which only that cones fall together is asked.
 QUICK = 2_000
 
@@ -138,7 +135,7 @@ class Rounding:
         metric: scalar products (d, d) of the basis.
         pairs: of cones that must not fall together.
         stiffness: what that is from.
-        corners, points: the smooth layout.
+        layout: the smooth one.
     """
 
     basis: IntArray
@@ -146,8 +143,7 @@ class Rounding:
     metric: FloatArray
     pairs: ConePairs
     stiffness: Stiffness
-    corners: IntArray
-    points: ComplexArray
+    layout: Layout
 
     @property
     def smooth(self) -> FloatArray:
@@ -163,7 +159,9 @@ class Rounding:
         Raises:
             GridError: cones cannot be kept apart.
         """
-        lattice = self._lattice()
+        size = len(self.start)
+        whole = Lattice(np.zeros(size, dtype=np.int64), np.eye(size, dtype=np.int64), self.metric)
+        lattice = whole.reduced()
         apart: list[IntArray] = []
         for turned, at_once in WAYS:
             try:
@@ -173,12 +171,12 @@ class Rounding:
                 if (turned, at_once) == WAYS[-1]:
                     raise
         values = [np.asarray(self.basis @ each) for each in apart]
-        turned = self.turned_over(np.stack(values, axis=1) - self.smooth[:, None])
-        return [values[i] for i in np.argsort(turned, kind="stable")]
+        areas = self._turned_over(np.stack(values, axis=1) - self.smooth[:, None])
+        return [values[i] for i in np.argsort(areas, kind="stable")]
 
-    def _apart(self, lattice: Lattice, turned: float, at_once: int) -> list[IntArray]:
+    def _apart(self, lattice: Lattice, turned: float, at_once: int | None) -> list[IntArray]:
         """Return near vectors of a lattice that keep all cones apart, and turn those near each other by less."""
-        for _ in range(REPAIRS):
+        while True:  # each time the lattice loses a dimension at least
             bad = self.pairs.collapsed(lattice.nearest(self.start, 1, QUICK)[0], turned)
             if not len(bad):
                 break
@@ -191,24 +189,15 @@ class Rounding:
                     )
                 lattice = lattice if part is None else part
             lattice = lattice.reduced()
-        else:
-            raise GridError(f"cones fall together in spite of {REPAIRS} rounds of equations between them")
         # The nearest of all may be another than that of the quick search.
-        found = np.concatenate(
-            [lattice.nearest(self.start, 64, VISITS), lattice.nearest(self.start, 1, QUICK)]
-        )
+        found = np.concatenate([lattice.nearest(self.start, 64), lattice.nearest(self.start, 1, QUICK)])
         return [each for each in found if not len(self.pairs.collapsed(each, turned))][:16]
 
-    def _lattice(self) -> Lattice:
-        size = len(self.start)
-        whole = Lattice(np.zeros(size, dtype=np.int64), np.eye(size, dtype=np.int64), self.metric)
-        return whole.reduced()
-
-    def turned_over(self, changes: FloatArray) -> FloatArray:
+    def _turned_over(self, changes: FloatArray) -> FloatArray:
         """Return (k,) the area of triangles that the shifts of least energy turn over, for changes (v, k)."""
         shifts = self.stiffness.displacement(changes)
-        moved = self.points[:, None] + shifts[0::2] + 1j * shifts[1::2]
-        a, b, c = (moved[self.corners[:, i]] for i in range(3))
+        moved = self.layout.points[:, None] + shifts[0::2] + 1j * shifts[1::2]
+        a, b, c = (moved[self.layout.corners[:, i]] for i in range(3))
         doubled = (np.conj(b - a) * (c - a)).imag
         areas: FloatArray = -np.minimum(doubled, 0.0).sum(axis=0)
         return areas
@@ -232,9 +221,7 @@ class Rounding:
         return None
 
 
-def find_rounding(
-    mesh: TriangleMesh, corners: IntArray, points: ComplexArray, cones: IntArray, transitions: Transitions
-) -> Rounding:
+def find_rounding(layout: Layout, transitions: Transitions) -> Rounding:
     """Return the lattice that a layout's translations and cones are to be rounded to."""
     zeros = np.zeros(len(transitions.equations), dtype=np.int64)
     solutions = whole_solutions(transitions.equations, zeros)
@@ -242,23 +229,14 @@ def find_rounding(
     basis = solutions.basis
     fitted = np.linalg.lstsq(basis.astype(np.float64), transitions.values, rcond=None)[0]
     start = np.asarray(fitted, dtype=np.float64)
-    stiffness = Stiffness(corners, points, transitions)
-    metric = stiffness.gram(basis)
-    pairs = _near_pairs(mesh, corners, points, cones, transitions, basis, start)
-    return Rounding(basis, start, metric, pairs, stiffness, corners, points)
+    stiffness = Stiffness(layout, transitions)
+    pairs = _near_pairs(layout, transitions, basis, start)
+    return Rounding(basis, start, stiffness.gram(basis), pairs, stiffness, layout)
 
 
-def _near_pairs(
-    mesh: TriangleMesh,
-    corners: IntArray,
-    points: ComplexArray,
-    cones: IntArray,
-    transitions: Transitions,
-    basis: IntArray,
-    start: FloatArray,
-) -> ConePairs:
+def _near_pairs(layout: Layout, transitions: Transitions, basis: IntArray, start: FloatArray) -> ConePairs:
     """Return the vectors between cones along the shortest paths over edges, where these are short."""
-    starts, ends = corners[:, NEXT].ravel(), corners[:, PREVIOUS].ravel()
+    mesh, points, cones, (starts, ends) = layout.mesh, layout.points, layout.whole, layout.ends
     tails, heads = mesh.tails, mesh.heads
     graph = csr_matrix(
         (np.abs(points[ends] - points[starts]), (tails, heads)), shape=(len(mesh.vertices),) * 2
@@ -285,9 +263,9 @@ def _near_pairs(
             continue
         rows.append(joining(path).rows)
         ends_of.append((i, j))
-    cones_apart = np.array(rows, dtype=np.int64).reshape(len(rows), 2, basis.shape[0])
-    paths = paths_to_sides(mesh, corners, points, cones, transitions, NEAR)
-    sides_apart, length = distances_to_sides([joining(path) for path in paths], transitions)
+    cones_apart = np.array(rows, dtype=np.int64).reshape(len(rows), 2, len(basis))
+    paths = _paths_to_sides(layout)
+    sides_apart, length = _distances_to_sides([joining(path) for path in paths], transitions)
     sides_apart = sides_apart @ basis
     # Those that face each other: nearly half of the way leads straight to the other; and that are not on one line.
     facing = np.abs(sides_apart[:, 0] @ start) > np.maximum(0.45 * length, 1e-6)
@@ -327,3 +305,83 @@ def _vector(sides: list[tuple[int, int]], transitions: Transitions, points: Comp
     # Along one edge there is nothing between, however far off the straight way its end may be.
     length = float(abs(place)) if len(sides) > 1 else 0.0
     return PathVector(last, length, sides[0][0], sides[-1][1], turn)
+
+
+def _paths_to_sides(layout: Layout) -> list[list[int]]:
+    """Return short paths of vertices between sides, or a side and a cone, that pass no other side or cone.
+
+    Of all that join the same two, the shortest one; cones are joined by others.
+    """
+    mesh, sides, cones, (starts, ends) = layout.mesh, layout.sides, layout.whole, layout.ends
+    side_count = len(sides.axis)
+    if not side_count:
+        return []
+    # What lies on sides has the number of one, cones have their own.
+    label = np.full(len(mesh.vertices), -1)
+    label[cones] = side_count + np.arange(len(cones))
+    on_side = layout.vertex[sides.points]
+    inner = ~np.isin(on_side, cones)
+    label[on_side[inner]] = sides.side[inner]
+    # Edges along sides join nothing.
+    both = label[mesh.edges]
+    at_end = np.isin(mesh.edges, np.intersect1d(cones, on_side)).any(axis=1)
+    along = (both >= 0).all(axis=1) & (at_end | (both[:, 0] == both[:, 1]))
+    lengths = np.abs(layout.points[ends] - layout.points[starts])
+    kept = ~along[mesh.halfedge_edges]
+    graph = csr_matrix((lengths[kept], (mesh.tails[kept], mesh.heads[kept])), shape=(len(label),) * 2)
+    graph = graph.maximum(graph.T)
+    distance, before, source = dijkstra(
+        graph, indices=np.flatnonzero(label >= 0), limit=NEAR, min_only=True, return_predecessors=True
+    )
+    one, two = mesh.edges[~along & np.isfinite(distance)[mesh.edges].all(axis=1)].T
+    total = distance[one] + distance[two] + np.asarray(graph[one, two]).ravel()
+    pairs = np.sort(label[source[np.stack([one, two], axis=1)]], axis=1)
+    near = np.flatnonzero((total <= NEAR) & (pairs[:, 0] != pairs[:, 1]) & (pairs[:, 0] < side_count))
+    near = near[np.lexsort((total[near], pairs[near, 1], pairs[near, 0]))]
+    _, first = np.unique(pairs[near], axis=0, return_index=True)
+
+    def to_root(vertex: int) -> list[int]:
+        path = [vertex]
+        while before[path[-1]] >= 0:
+            path.append(int(before[path[-1]]))
+        return path
+
+    return [[*to_root(int(one[k]))[::-1], *to_root(int(two[k]))] for k in near[first]]
+
+
+class PathVector(NamedTuple):
+    """The vector between the ends of a path, in the frame of its first edge.
+
+    Attributes:
+        rows: (2, v) of it, by the variables, as far as these tell where the ends are.
+        length: of it, in the layout; 0 along a single edge.
+        first, last: the points at the ends.
+        turn: by how many quarter turns the frame of the last edge is turned.
+    """
+
+    rows: IntArray
+    length: float
+    first: int
+    last: int
+    turn: int
+
+
+def _distances_to_sides(vectors: list[PathVector], transitions: Transitions) -> tuple[IntArray, FloatArray]:
+    """Return (p, 2, v) the coordinate that separates the ends of vectors, with 0 for the other, and (p,) lengths."""
+    found, lengths = [], []
+    for one in vectors:
+        known = _known_axes(transitions, one.first) & np.roll(
+            _known_axes(transitions, one.last), one.turn % 2
+        )
+        for axis in np.flatnonzero(known).tolist():
+            if one.rows[axis].any():
+                found.append(np.stack([one.rows[axis], np.zeros_like(one.rows[axis])]))
+                lengths.append(one.length)
+    size = transitions.shifts.shape[1]
+    return np.array(found, dtype=np.int64).reshape(len(found), 2, size), np.array(lengths)
+
+
+def _known_axes(transitions: Transitions, point: int) -> BoolArray:
+    """Return (2,) whether the variables tell a coordinate of a point."""
+    held: BoolArray = transitions.held[transitions.base[point]]
+    return np.roll(held, int(transitions.turn[point]) % 2)

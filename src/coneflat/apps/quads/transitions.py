@@ -14,15 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
-from ... import TriangleMesh
 from ...base import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import GridError
-from ...layout import SeamChains, find_chains
-from ...mesh import label_components, label_faces, point_vertices
-from .sides import QUARTER, Sides
+from ...layout import SeamChains
+from .layout import LOOSE, Layout, charts_of, first_points, joining_chains
 
 UNITS = np.array([1, 1j, -1, -1j])
-# The same as matrices of whole numbers.
+# The same, quarter turns to the left, as matrices of whole numbers.
 TURNS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]])
 
 
@@ -41,7 +39,6 @@ class Transitions:
         turn: (u,) from 0 to 3.
         shifts: (2u, v) x and y of the shift of each point, by the variables.
         held: (u, 2) coordinates that are their shifts alone: both of cones, one on sides of the boundary.
-        sides: of the boundary.
         equations: (r, v) that make 0 of the variables.
         values: (v,) the variables of the layout as it is, up to rounding.
     """
@@ -52,7 +49,6 @@ class Transitions:
     turn: IntArray
     shifts: csr_matrix
     held: BoolArray
-    sides: Sides
     equations: IntArray
     values: FloatArray
 
@@ -64,66 +60,44 @@ class Transitions:
         return moved
 
 
-def find_transitions(
-    mesh: TriangleMesh, corners: IntArray, points: ComplexArray, cones: IntArray, sides: Sides
-) -> Transitions:
+def find_transitions(layout: Layout) -> Transitions:
     """Return the transitions of a layout.
-
-    Args:
-        mesh: the mesh.
-        corners: (m, 3) the point at each triangle corner.
-        points: (u,) of the plane.
-        cones: vertices whose places are variables, corners of sides among them.
-        sides: of the boundary, along the axes.
 
     Raises:
         SeamError: the sides of a seam are no rigid copies of each other.
         GridError: they are no quarter turns of each other.
     """
-    chains = find_chains(mesh, corners, points, cones)
+    chains = layout.chains()
     angle = np.angle(chains.rotation) / (np.pi / 2)
     quarters = np.rint(angle).astype(np.int64)
     off = float(np.abs(angle - quarters).max(initial=0.0)) * np.pi / 2
-    if off > QUARTER:
+    if off > LOOSE:
         raise GridError(
             f"seams turn by up to {off:.2g} rad beside quarter turns: flatten with quantise=pi/2 and correct_handles, "
             "and a mesh with several boundaries with boundary='straight'"
         )
-    builder = _Builder(mesh, corners, points, cones, chains, quarters % 4, sides)
-    return builder.transitions()
+    return _Builder(layout, chains, quarters % 4).transitions()
 
 
 class _Builder:
-    def __init__(
-        self,
-        mesh: TriangleMesh,
-        corners: IntArray,
-        points: ComplexArray,
-        cones: IntArray,
-        chains: SeamChains,
-        quarters: IntArray,
-        sides: Sides,
-    ) -> None:
-        self.sides = sides
-        self.chains, self.quarters, self.points, self.cones = chains, quarters, points, cones
-        self.vertex = point_vertices(mesh.faces, corners, len(points))
-        self.base = np.arange(len(points))
-        self.turn = np.zeros(len(points), dtype=np.int64)
-        self.chain_count = len(quarters)
-        self.first_side = 2 * (self.chain_count + len(cones))
-        self.size = self.first_side + len(sides.axis)
-        self.held = np.zeros((len(points), 2), dtype=bool)
+    def __init__(self, layout: Layout, chains: SeamChains, quarters: IntArray) -> None:
+        count = len(layout.points)
+        self.layout, self.points, self.sides = layout, layout.points, layout.sides
+        self.chains, self.quarters, self.chain_count = chains, quarters, len(quarters)
+        self.cones, self.vertex = layout.whole, layout.vertex
+        self.cone_points = first_points(self.vertex)[self.cones]
+        self.first_side = 2 * (self.chain_count + len(self.cones))
+        self.size = self.first_side + len(self.sides.axis)
+        self.base, self.turn = np.arange(count), np.zeros(count, dtype=np.int64)
+        self.held = np.isin(self.vertex, self.cones)[:, None].repeat(2, axis=1)
         self.sides_at: dict[int, list[int]] = defaultdict(list)
         self.entries: list[tuple[IntArray, IntArray, IntArray]] = []
         self.equations: list[IntArray] = []
-        self.corners = corners
 
     def transitions(self) -> Transitions:
         """Return the transitions."""
         chains, points = self.chains, self.points
-        self.held[np.isin(self.vertex, self.cones)] = True
-        on_side = self._add_sides()
-        self._add_regular(on_side)
+        self._add_regular(self._add_sides())
         self._add_nodes()
         self._fix_charts()
         row, column, value = (np.concatenate(parts) for parts in zip(*self.entries, strict=True))
@@ -134,17 +108,8 @@ class _Builder:
         translation /= np.maximum(np.bincount(chains.chain, minlength=self.chain_count), 1)
         both = np.concatenate([translation, points[self.cone_points]])
         values = np.concatenate([np.stack([both.real, both.imag], axis=1).ravel(), self._side_values()])
-        return Transitions(
-            chains,
-            self.quarters,
-            self.base,
-            self.turn,
-            shifts,
-            self.held,
-            self.sides,
-            np.array(self.equations, dtype=np.int64).reshape(len(self.equations), self.size),
-            values,
-        )
+        equations = np.array(self.equations, dtype=np.int64).reshape(len(self.equations), self.size)
+        return Transitions(chains, self.quarters, self.base, self.turn, shifts, self.held, equations, values)
 
     def _side_values(self) -> FloatArray:
         """Return (l,) the mean of the coordinate that points of each side have in common."""
@@ -201,9 +166,7 @@ class _Builder:
             triple = (int(chains.left[k, end]), int(chains.right[k, end]), int(chains.chain[k]))
             relations[int(chains.vertices[k, end])].add(triple)
         of_cone = {int(v): i for i, v in enumerate(self.cones)}
-        first = first_points(self.vertex)
-        self.cone_points = first[self.cones]
-        start = first.copy()
+        start = first_points(self.vertex)
         on_side = np.array(sorted(self.sides_at, reverse=True), dtype=np.int64)
         start[self.vertex[on_side]] = on_side
         start[self.cones] = self.cone_points
@@ -233,7 +196,11 @@ class _Builder:
                     if right not in known:
                         known[right] = turn, shift
                         continue
-                    self._close(v, known[right], (turn, shift), cone is not None)
+                    if cone is None and known[right][0] != turn:
+                        raise GridError(
+                            f"vertex {v} has an angle of {4 + known[right][0] - turn} quarter turns, but is no cone"
+                        )
+                    self.equations.extend(row for row in shift - known[right][1] if row.any())
                 elif right in known:
                     turn, shift = known[right]
                     known[left] = (turn - quarter) % 4, TURNS[-quarter % 4] @ (shift - across)
@@ -245,68 +212,21 @@ class _Builder:
         for point, (turn, shift) in known.items():
             if cone is None:
                 self.base[point], self.turn[point] = start, turn
-            self._close_sides(point, shift)
+            for side in self.sides_at.get(point, ()):  # it lies on these
+                equation = shift[self.sides.axis[side]].copy()
+                equation[self.first_side + side] -= 1
+                self.equations.extend([equation] if equation.any() else [])
             row, column = np.nonzero(shift)
             self.entries.append((2 * point + row, column, shift[row, column]))
 
-    def _close(self, v: int, one: tuple[int, IntArray], two: tuple[int, IntArray], is_cone: bool) -> None:
-        if not is_cone and one[0] != two[0]:
-            raise GridError(f"vertex {v} has an angle of {4 + one[0] - two[0]} quarter turns, but is no cone")
-        self.equations.extend(row for row in two[1] - one[1] if row.any())
-
-    def _close_sides(self, point: int, shift: IntArray) -> None:
-        """Have a point where a seam or a side ends lie on its sides."""
-        for side in self.sides_at.get(point, ()):
-            row = shift[self.sides.axis[side]].copy()
-            row[self.first_side + side] -= 1
-            if row.any():
-                self.equations.append(row)
-
     def _fix_charts(self) -> None:
         """Let charts not move by themselves: some seams between them stay, and a cone or side of each component."""
-        chart, component = charts_of(self.corners, len(self.points), self.chains)
-        for chain in joining_chains(self.chains, chart).tolist():
-            self._fix(chain)
-        coned, firsts = np.unique(component[chart[self.cone_points]], return_index=True)
-        for cone in firsts.tolist():
-            self._fix(self.chain_count + cone)
-        straight, firsts = np.unique(component[chart[self.sides.points]], return_index=True)
-        for side in self.sides.side[firsts[~np.isin(straight, coned)]].tolist():
+        chart, component = charts_of(self.layout, self.chains)
+        coned, firsts = np.unique(component[self.cone_points], return_index=True)
+        fixed = np.concatenate([joining_chains(self.chains, chart), self.chain_count + firsts])
+        straight, firsts = np.unique(component[self.sides.points], return_index=True)
+        sides = self.sides.side[firsts[~np.isin(straight, coned)]]
+        for column in (*(2 * fixed[:, None] + [0, 1]).ravel(), *(self.first_side + sides)):
             row = np.zeros(self.size, dtype=np.int64)
-            row[self.first_side + side] = 1
+            row[column] = 1
             self.equations.append(row)
-
-    def _fix(self, variable: int) -> None:
-        for axis in range(2):
-            row = np.zeros(self.size, dtype=np.int64)
-            row[2 * variable + axis] = 1
-            self.equations.append(row)
-
-
-def charts_of(corners: IntArray, count: int, chains: SeamChains) -> tuple[IntArray, IntArray]:
-    """Return (u,) the chart of each point and (charts,) the component of each chart."""
-    charts, chart = label_faces(corners, count)
-    of_point = np.zeros(count, dtype=np.int64)
-    of_point[corners.ravel()] = chart.repeat(3)
-    _, component = label_components(charts, of_point[chains.left[:, 0]], of_point[chains.right[:, 0]])
-    return of_point, component
-
-
-def joining_chains(chains: SeamChains, chart: IntArray) -> IntArray:
-    """Return chains that join the charts of each component, and none too many; chart: (u,) that of each point."""
-    joined = np.arange(int(chart.max(initial=-1)) + 1)
-    kept = []
-    _, firsts = np.unique(chains.chain, return_index=True)
-    for chain, k in enumerate(firsts.tolist()):
-        one, two = int(joined[chart[chains.left[k, 0]]]), int(joined[chart[chains.right[k, 0]]])
-        if one != two:
-            joined[joined == two] = one
-            kept.append(chain)
-    return np.array(kept, dtype=np.int64)
-
-
-def first_points(vertex: IntArray) -> IntArray:
-    """Return (n,) the first point of each vertex; vertex: (u,) that of each point."""
-    first = np.zeros(int(vertex.max(initial=-1)) + 1, dtype=np.int64)
-    first[vertex[::-1]] = np.arange(len(vertex))[::-1]
-    return first

@@ -1,23 +1,30 @@
-"""The points of an integer grid on a surface, each once, and the directions in which grid lines leave them.
+"""The points of an integer grid on a surface, each once, and the grid lines that join them.
 
 A point lies inside a triangle, within an edge or at a vertex; which, exact signs decide (H.-C. Ebke, D. Bommes, M.
-Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013).
+Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013). Lines are followed for one unit from point to point,
+across triangles and seams, just beside themselves, on their left or on their right, so they never meet a vertex: exact
+signs tell which two sides of a triangle a line crosses, and one along edges is no special case.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
 from ...base import BoolArray, FloatArray, IntArray, compiled, dots
-from ...geometry import fill_orientations
-from .exact_grid import ExactGrid, turned
+from ...geometry import fill_orientations, orientation
+from .exact_grid import ExactGrid, turn, turned
 
-# Where in its triangle a point lies: within side 0, 1 or 2, at corner 0, 1 or 2, or inside.
-CORNER, INSIDE = 3, 6
+#: Where a port leads to no other: the boundary is in the way, or something is wrong with the map.
+BOUNDARY, LOST = -1, -2
 # The directions of ports.
 AXES = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+
+# A map and its points as kernels take them: corners, twin, turns and shifts of an `ExactGrid`, start and places of
+# `GridPoints`.
+Grid: TypeAlias = tuple[FloatArray, IntArray, IntArray, FloatArray, IntArray, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +89,7 @@ def find_points(exact: ExactGrid) -> GridPoints:
     within = (signs >= 0).all(axis=1)
     faces, places, on = faces[within], places[within], signs[within] == 0
     # The corner that two sides have is opposite the third.
-    sides = np.choose(on.sum(axis=1), [INSIDE, on.argmax(axis=1), CORNER + on.argmin(axis=1)])
+    sides = np.choose(on.sum(axis=1), [6, on.argmax(axis=1), 3 + on.argmin(axis=1)])
     label = _same_point(exact, faces, places, sides)
     _, entry, points = np.unique(label, return_index=True, return_inverse=True)
     # In the order in which triangles have them.
@@ -119,10 +126,10 @@ def _ranges(low: FloatArray, high: FloatArray) -> tuple[IntArray, FloatArray]:
 
 def _same_point(exact: ExactGrid, faces: IntArray, places: FloatArray, sides: IntArray) -> IntArray:
     """Return a number for each place in a triangle, the same for those of one point."""
-    at_vertex = (sides >= CORNER) & (sides < INSIDE)
-    on_edge = sides < CORNER
+    at_vertex = (sides >= 3) & (sides < 6)
+    on_edge = sides < 3
     label = np.arange(len(faces)) + len(exact.mesh.vertices)
-    label[at_vertex] = exact.mesh.faces[faces[at_vertex], sides[at_vertex] - CORNER]
+    label[at_vertex] = exact.mesh.faces[faces[at_vertex], sides[at_vertex] - 3]
     half = 3 * faces[on_edge] + sides[on_edge]
     there, place = half.copy(), places[on_edge]
     seen = np.flatnonzero((exact.twin[half] >= 0) & (exact.twin[half] < half))
@@ -152,39 +159,31 @@ def find_entry(start: IntArray, places: FloatArray, face: int, x: float, y: floa
 def find_ports(exact: ExactGrid, found: GridPoints) -> Ports:
     """Return the directions in which grid lines leave the grid points."""
     corners, flat = exact.corners, exact.mesh.faces.ravel()
-    inside = np.flatnonzero(found.sides == INSIDE)
+    inside = np.flatnonzero(found.sides == 6)
     every = np.broadcast_to(np.arange(4), (len(inside), 4))
     parts = [
         (inside, found.faces[inside], found.own_places[inside], every, np.zeros(len(inside), dtype=bool))
     ]
 
-    def add(
-        points: IntArray,
-        corner: IntArray,
-        ends: tuple[FloatArray, FloatArray],
-        places: FloatArray,
-        closed: BoolArray,
-    ) -> None:
-        parts.append((points, corner // 3, places, _directions(*ends, closed), closed))
-
-    on_edge = np.flatnonzero(found.sides < CORNER)
+    on_edge = np.flatnonzero(found.sides < 3)
     half, places = 3 * found.faces[on_edge] + found.sides[on_edge], found.own_places[on_edge]
     for _ in range(2):
         faces, i = half // 3, half % 3
         side = corners[faces, (i + 2) % 3] - corners[faces, (i + 1) % 3]
-        add(on_edge, half, (side, -side), places, exact.twin[half] < 0)
-        inner = exact.twin[half] >= 0
-        places = (turned(exact.turns[half], places) + exact.shifts[half])[inner]
-        on_edge, half = on_edge[inner], exact.twin[half[inner]]
-    at_vertex = np.flatnonzero((found.sides >= CORNER) & (found.sides < INSIDE))
+        closed = exact.twin[half] < 0
+        parts.append((on_edge, faces, places, _directions(side, -side, closed), closed))
+        places = (turned(exact.turns[half], places) + exact.shifts[half])[~closed]
+        on_edge, half = on_edge[~closed], exact.twin[half[~closed]]
+    at_vertex = np.flatnonzero((found.sides >= 3) & (found.sides < 6))
     point = np.full(len(exact.mesh.vertices), -1)
-    point[flat[3 * found.faces[at_vertex] + found.sides[at_vertex] - CORNER]] = at_vertex
+    point[flat[3 * found.faces[at_vertex] + found.sides[at_vertex] - 3]] = at_vertex
     for fan in exact.fans:
         fan = fan[point[flat[fan]] >= 0]
         faces, i = fan // 3, fan % 3
         own = corners[faces, i]
-        ends = corners[faces, (i + 1) % 3] - own, corners[faces, (i + 2) % 3] - own
-        add(point[flat[fan]], fan, ends, own, exact.twin[3 * faces + (i + 1) % 3] < 0)
+        one, two = corners[faces, (i + 1) % 3] - own, corners[faces, (i + 2) % 3] - own
+        closed = exact.twin[3 * faces + (i + 1) % 3] < 0
+        parts.append((point[flat[fan]], faces, own, _directions(one, two, closed), closed))
     points, faces, places, directions, closed = (np.concatenate(each) for each in zip(*parts, strict=True))
     order = np.argsort(points, kind="stable")
     wedge, which = np.nonzero(directions[order] >= 0)
@@ -220,3 +219,119 @@ def _directions(start: FloatArray, end: FloatArray, closed: BoolArray) -> IntArr
 
 def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
     return one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+
+
+def join_ports(exact: ExactGrid, found: GridPoints, ports: Ports) -> IntArray:
+    """Return (k,) the port that each leads to, BOUNDARY or LOST."""
+    ends = np.empty((len(ports.faces), 3), dtype=np.int64)
+    grid = exact.corners, exact.twin, exact.turns, exact.shifts, found.start, found.places
+    _follow_all(grid, ports.places, ports.faces, ports.directions, ends)
+    mates, face, direction = ends.T
+    arrived = np.flatnonzero(mates >= 0)
+    mates[arrived] = _ports_back(
+        exact, found, ports, mates[arrived], face[arrived], (direction[arrived] + 2) % 4
+    )
+    return mates
+
+
+def _ports_back(
+    exact: ExactGrid, found: GridPoints, ports: Ports, entry: IntArray, face: IntArray, direction: IntArray
+) -> IntArray:
+    """Return (k,) the port of the point of each entry that leads into a triangle in a direction, or LOST.
+
+    If the direction runs along the side of the triangle that is most counterclockwise, the port is the neighbour's.
+    """
+
+    def keys(points: IntArray, faces: IntArray, directions: IntArray) -> IntArray:
+        return 4 * (points * len(exact.corners) + faces) + directions
+
+    known = keys(ports.points, ports.faces, ports.directions)
+    order = np.argsort(known, kind="stable")
+
+    def port_at(which: IntArray) -> IntArray:
+        wanted = keys(found.points[entry[which]], face[which], direction[which])
+        at = order[np.minimum(np.searchsorted(known, wanted, sorter=order), len(order) - 1)]
+        return np.where(known[at] == wanted, at, LOST)
+
+    port = port_at(np.arange(len(entry)))
+    lost = np.flatnonzero(port == LOST)
+    beside = np.full(len(lost), -1)
+    along, places = AXES[direction[lost]], found.places[entry[lost]]
+    for i in range(3):
+        a, b = exact.corners[face[lost], (i + 1) % 3], exact.corners[face[lost], (i + 2) % 3]
+        side, half = b - a, 3 * face[lost] + i
+        signs = np.empty(len(lost), dtype=np.int64)
+        fill_orientations(np.concatenate([a, b, places], axis=1), np.empty(12), signs)
+        is_along = (side[:, 0] * along[:, 1] == side[:, 1] * along[:, 0]) & (dots(side, along) < 0)
+        is_along &= (signs == 0) & (exact.twin[half] >= 0) & (beside < 0)
+        beside[is_along] = half[is_along]
+    lost, beside = lost[beside >= 0], beside[beside >= 0]
+    direction[lost] = (direction[lost] + exact.turns[beside]) % 4
+    face[lost] = exact.twin[beside] // 3
+    port[lost] = port_at(lost)
+    return port
+
+
+@compiled
+def _follow_all(
+    grid: Grid, port_places: FloatArray, port_faces: IntArray, directions: IntArray, ends: IntArray
+) -> None:
+    """Fill in (k, 3) the entry where each port leads to, see `_follow`, its triangle and the direction there."""
+    parts = np.empty(12)
+    for k in range(len(port_faces)):
+        f, d = port_faces[k], directions[k]
+        x, y = port_places[k, 0], port_places[k, 1]
+        for on_left in (True, False):
+            face, entry, heading = _follow(grid, f, x, y, d, on_left, parts)
+            if entry != BOUNDARY:
+                break
+        ends[k, 0], ends[k, 1], ends[k, 2] = entry, face, heading
+
+
+@compiled
+def _follow(
+    grid: Grid, f: int, x: float, y: float, d: int, on_left: bool, parts: FloatArray
+) -> tuple[int, int, int]:
+    """Return the triangle and the entry where a unit's way ends, and its direction there.
+
+    Args:
+        f, x, y, d: triangle, coordinates and direction at the start.
+        on_left: follow the line just left of itself, so that what is on it lies right; or just right of it.
+
+    Returns:
+        For the entry BOUNDARY, where the way leaves the surface; LOST, where it ends at no grid point.
+    """
+    corners, twin, turns, shifts, start, places = grid
+    along_x, along_y = turn(d, 1.0, 0.0)
+    to_x, to_y = x + along_x, y + along_y
+    for _ in range(len(corners) + 2):
+        c = corners[f]
+        left, on, inside = 0, 0, True  # Bit i is that of corner i.
+        for i in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            inside &= orientation(c[a, 0], c[a, 1], c[b, 0], c[b, 1], to_x, to_y, parts) >= 0
+            side = orientation(x, y, to_x, to_y, c[i, 0], c[i, 1], parts)
+            left |= (side > 0 or (side == 0 and not on_left)) << i
+            on |= (side == 0) << i
+        if inside:
+            entry = find_entry(start, places, f, to_x, to_y)
+            return f, (entry if entry >= 0 else LOST), d
+        out = -1
+        for i in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            # It leaves through the side from a corner on its right to one on its left; or, if it runs along a side
+            # and just outside of it, through that.
+            upwards = (left >> b) & 1 and not (left >> a) & 1
+            beside = (on >> a) & (on >> b) & 1 and ((left >> i) & 1) != on_left
+            if upwards or beside:
+                out = i
+        h = 3 * f + out
+        if out < 0 or twin[h] < 0:
+            return f, BOUNDARY, d
+        x, y = turn(turns[h], x, y)
+        to_x, to_y = turn(turns[h], to_x, to_y)
+        x, y = x + shifts[h, 0], y + shifts[h, 1]
+        to_x, to_y = to_x + shifts[h, 0], to_y + shifts[h, 1]
+        d = (d + turns[h]) % 4
+        f = twin[h] // 3
+    return f, LOST, d

@@ -1,0 +1,361 @@
+"""Layouts in units of a grid: straight sides, charts turned to each other, along the creases, and edges split."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ... import Flattening, TriangleMesh
+from ...base import BoolArray, ComplexArray, FloatArray, IntArray
+from ...errors import GridError
+from ...geometry import (
+    as_complex,
+    as_pairs,
+    dihedral_angles,
+    double_areas,
+    edge_lengths,
+    mollify,
+    signed_angles,
+    signed_double_areas,
+)
+from ...layout import SeamChains, find_chains, rest_sides
+from ...mesh import NEXT, PREVIOUS, label_components, label_faces, point_vertices
+
+# Radians, or squares, by which what is to be straight, parallel up to quarter turns, or in one place may be off: far
+# more than rounding, far less than what matters.
+LOOSE = 1e-6
+
+
+def _none() -> IntArray:
+    return np.empty(0, dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Straight sides of a boundary, each a piece that no seam and no corner parts.
+
+    Attributes:
+        corners: (k,) vertices where sides meet at an angle.
+        points: (q,) points on sides, those of the ends included; one of two sides is there twice.
+        side: (q,) the side of each.
+        axis: (l,) what points of a side have in common: 0 for x, 1 for y.
+    """
+
+    corners: IntArray = field(default_factory=_none)
+    points: IntArray = field(default_factory=_none)
+    side: IntArray = field(default_factory=_none)
+    axis: IntArray = field(default_factory=_none)
+
+    @property
+    def directions(self) -> FloatArray:
+        """(l, 2) of the sides, along the axes."""
+        return np.eye(2)[1 - self.axis]
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A layout in units of a grid.
+
+    Attributes:
+        mesh: of all components.
+        lengths: (m, 3) side lengths of its triangles in model units, column i opposite corner i.
+        corners: (m, 3) the point at each triangle corner.
+        points: (u,) of the plane.
+        cones: (s,) vertices, inside the surface.
+        sides: straight ones of the boundary, along the axes.
+        size: of a square of the grid, in model units.
+    """
+
+    mesh: TriangleMesh
+    lengths: FloatArray
+    corners: IntArray
+    points: ComplexArray
+    cones: IntArray
+    sides: Sides
+    size: float
+
+    @property
+    def whole(self) -> IntArray:
+        """Vertices that are to lie on grid points: cones, and corners of straight sides."""
+        return np.concatenate([self.cones, self.sides.corners])
+
+    @property
+    def vertex(self) -> IntArray:
+        """(u,) the vertex of each point."""
+        return point_vertices(self.mesh.faces, self.corners, len(self.points))
+
+    @property
+    def ends(self) -> tuple[IntArray, IntArray]:
+        """(3m,), (3m,) the points at the start and at the end of each half-edge."""
+        return self.corners[:, NEXT].ravel(), self.corners[:, PREVIOUS].ravel()
+
+    @property
+    def border(self) -> IntArray:
+        """The half-edges of the boundary."""
+        return self.mesh.edge_halfedges[self.mesh.is_boundary_edge, 0]
+
+    @property
+    def area(self) -> float:
+        """Of the plane: how many squares the layout covers."""
+        return float(self.double_areas().sum()) / 2
+
+    def double_areas(self) -> FloatArray:
+        """Return (m,) twice the areas of triangles in the plane, negative for those turned over."""
+        return signed_double_areas(as_pairs(self.points)[self.corners])
+
+    def scaled(self, factor: float) -> Layout:
+        """Return a layout of so many times the squares."""
+        times = float(np.sqrt(factor))
+        return replace(self, points=times * self.points, size=self.size / times)
+
+    def chains(self, quarter_turns: bool = False) -> SeamChains:
+        """Return the seams as chains between vertices that are to lie on grid points; see `find_chains`."""
+        return find_chains(self.mesh, self.corners, self.points, self.whole, quarter_turns=quarter_turns)
+
+
+def aligned(result: Flattening, quads: float | None, size: float | None) -> Layout:
+    """Return the layout of a flattening, turned so that the grid follows creases, bends and boundaries.
+
+    Charts are joined at some seams, and a cone of each component is at the origin.
+
+    Args:
+        result: with quantised cones.
+        quads: unit squares that it is to cover.
+        size: of a square in model units, instead.
+
+    Raises:
+        GridError: triangles are turned over.
+        SeamError: the sides of a seam are no rigid copies of each other.
+    """
+    mesh = TriangleMesh(result.vertices, result.faces)
+    own = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
+    lengths, _ = mollify(own)
+    flat = signed_double_areas(result.corner_uv)
+    if not (flat > 0).all():
+        raise GridError(
+            f"{int((flat <= 0).sum())} of {len(flat):,} triangles of the layout are turned over or have no area"
+        )
+    area = float(double_areas(lengths).sum()) / 2
+    if size is None:
+        assert quads is not None
+        size = float(np.sqrt(area / quads))
+    scale = np.sqrt(area / size**2 / (flat.sum() / 2))
+    points = scale * as_complex(result.uv)
+    cones = np.asarray(result.cones, dtype=np.int64)
+    cones = cones[~mesh.is_boundary_vertex[cones]]
+    layout, component = joined_charts(Layout(mesh, lengths, result.uv_faces, points, cones, Sides(), size))
+    is_straight, angles = _side_angles(layout, component)
+    angles = np.where(is_straight, angles, _crease_angles(layout, component))
+    layout = replace(layout, points=layout.points * np.exp(-1j * angles)[component])
+    return at_origin(replace(layout, sides=find_sides(layout, is_straight[component])), component)
+
+
+def joined_charts(layout: Layout) -> tuple[Layout, IntArray]:
+    """Return a layout with charts moved to each other, so that none of `joining_chains` moves a point.
+
+    And (u,) the component of each point.
+    """
+    chains, points = layout.chains(), layout.points.copy()
+    chart, component = charts_of(layout, chains)
+    _, firsts = np.unique(chains.chain, return_index=True)
+    done = np.zeros(int(chart.max(initial=-1)) + 1, dtype=bool)
+    done[chart[np.unique(component, return_index=True)[1]]] = True
+    left_over = joining_chains(chains, chart).tolist()
+    while left_over:
+        later = []
+        for chain in left_over:
+            k = firsts[chain]
+            sides = chains.left[k], chains.right[k]
+            if done[chart[sides[0][0]]] == done[chart[sides[1][0]]]:
+                later.append(chain)
+                continue
+            still, moving = sides if done[chart[sides[0][0]]] else sides[::-1]
+            factor = np.diff(points[still])[0] / np.diff(points[moving])[0]
+            with_it = chart == chart[moving[0]]
+            points[with_it] = factor / abs(factor) * (points[with_it] - points[moving[0]]) + points[still[0]]
+            done[chart[moving[0]]] = True
+        left_over = later
+    return replace(layout, points=points), component
+
+
+def at_origin(layout: Layout, component: IntArray) -> Layout:
+    """Return a layout with the first cone or corner of each component, or else the first point on a side, at 0."""
+    at = np.concatenate([first_points(layout.vertex)[layout.whole], layout.sides.points])[::-1]
+    origins = np.zeros(int(component.max(initial=-1)) + 1, dtype=np.complex128)
+    origins[component[at]] = layout.points[at]  # the first one stays, as the last to be written
+    return replace(layout, points=layout.points - origins[component])
+
+
+def _crease_angles(layout: Layout, component: IntArray) -> FloatArray:
+    """Return the angle of each component that most of its bending is along, up to quarter turns.
+
+    An edge counts for the curvature it carries, its length times its dihedral angle (Cohen-Steiner and Morvan 2003),
+    one on the boundary as a right angle.
+    """
+    mesh, (starts, ends) = layout.mesh, layout.ends
+    one = mesh.edge_halfedges[:, 0]
+    bend = np.where(mesh.is_boundary_edge, np.pi / 2, np.abs(dihedral_angles(mesh)))
+    side = layout.points[ends[one]] - layout.points[starts[one]]
+    return _directions(layout.lengths.ravel()[one] * bend, side, component, component[starts[one]])
+
+
+def _side_angles(layout: Layout, component: IntArray) -> tuple[BoolArray, FloatArray]:
+    """Return (c,) whether the boundary of each component is made of sides at right angles, and where these point.
+
+    component: (u,) that of each point.
+    """
+    starts, ends = (each[layout.border] for each in layout.ends)
+    vector, label = layout.points[ends] - layout.points[starts], component[starts]
+    angles = _directions(np.abs(vector), vector, component, label)
+    off = np.zeros(len(angles))
+    np.maximum.at(off, label, np.abs(np.angle((vector * np.exp(-1j * angles[label])) ** 4) / 4))
+    return (np.bincount(label, minlength=len(angles)) > 0) & (off <= LOOSE), angles
+
+
+def _directions(
+    weights: FloatArray, vectors: ComplexArray, component: IntArray, label: IntArray
+) -> FloatArray:
+    """Return the mean direction of weighted vectors, up to quarter turns, for each component; label: those of them."""
+    fourth, count = weights * (vectors / np.abs(vectors)) ** 4, int(component.max(initial=-1)) + 1
+    angles: FloatArray = (
+        np.angle(np.bincount(label, fourth.real, count) + 1j * np.bincount(label, fourth.imag, count)) / 4
+    )
+    return angles
+
+
+def find_sides(layout: Layout, is_straight: BoolArray) -> Sides:
+    """Return the sides of a layout whose straight ones, at (u,) points of components, lie along the axes."""
+    mesh, points, border = layout.mesh, layout.points, layout.border
+    starts, ends = (each[border] for each in layout.ends)
+    kept = is_straight[starts]
+    border, starts, ends = border[kept], starts[kept], ends[kept]
+    if not len(border):
+        return Sides()
+    quarter = np.rint(np.angle(points[ends] - points[starts]) / (np.pi / 2)).astype(np.int64) % 4
+    leaving = np.full(len(points), -1)
+    leaving[starts] = np.arange(len(border))
+    after = leaving[ends]
+    goes_on = (after >= 0) & (quarter[after] == quarter)
+    count, side = label_components(len(border), np.flatnonzero(goes_on), after[goes_on])
+    axis = np.zeros(count, dtype=np.int64)
+    axis[side] = 1 - quarter % 2
+    both = np.unique(np.stack([np.concatenate([starts, ends]), np.tile(side, 2)], axis=1), axis=0)
+    z = points[layout.corners]
+    quarters = quarters_around(mesh, z[:, PREVIOUS] - z[:, NEXT])
+    at = np.unique(np.concatenate([mesh.tails[border], mesh.heads[border]]))
+    return Sides(at[quarters[at] != 2], both[:, 0], both[:, 1], axis)
+
+
+def quarters_around(mesh: TriangleMesh, sides: ComplexArray) -> IntArray:
+    """Return (n,) the angle around each vertex in quarter turns, rounded; sides: (m, 3) of triangles in the plane."""
+    angles = signed_angles(sides)
+    sums = np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
+    return np.rint(sums / (np.pi / 2)).astype(np.int64)
+
+
+def charts_of(layout: Layout, chains: SeamChains) -> tuple[IntArray, IntArray]:
+    """Return (u,) the chart of each point, and (u,) its component."""
+    count = len(layout.points)
+    charts, chart = label_faces(layout.corners, count)
+    of_point = np.zeros(count, dtype=np.int64)
+    of_point[layout.corners.ravel()] = chart.repeat(3)
+    _, component = label_components(charts, of_point[chains.left[:, 0]], of_point[chains.right[:, 0]])
+    return of_point, component[of_point]
+
+
+def joining_chains(chains: SeamChains, chart: IntArray) -> IntArray:
+    """Return chains that join the charts of each component, and none too many; chart: (u,) that of each point."""
+    joined = np.arange(int(chart.max(initial=-1)) + 1)
+    kept = []
+    _, firsts = np.unique(chains.chain, return_index=True)
+    for chain, k in enumerate(firsts.tolist()):
+        one, two = int(joined[chart[chains.left[k, 0]]]), int(joined[chart[chains.right[k, 0]]])
+        if one != two:
+            joined[joined == two] = one
+            kept.append(chain)
+    return np.array(kept, dtype=np.int64)
+
+
+def first_points(vertex: IntArray) -> IntArray:
+    """Return (n,) the first point of each vertex; vertex: (u,) that of each point."""
+    first = np.zeros(int(vertex.max(initial=-1)) + 1, dtype=np.int64)
+    first[vertex[::-1]] = np.arange(len(vertex))[::-1]
+    return first
+
+
+# Triangles that one with given sides split falls apart into, by their corners: 0 to 2 its own, 3 + i the middle of the
+# side opposite corner i. The sides split are the bits of the index.
+PIECES: tuple[tuple[tuple[int, int, int], ...], ...] = (
+    ((0, 1, 2),),
+    ((0, 1, 3), (0, 3, 2)),
+    ((1, 2, 4), (1, 4, 0)),
+    ((4, 3, 2), (0, 1, 3), (0, 3, 4)),
+    ((2, 0, 5), (2, 5, 1)),
+    ((5, 1, 3), (2, 0, 5), (2, 5, 3)),
+    ((0, 5, 4), (1, 2, 4), (1, 4, 5)),
+    ((0, 5, 4), (5, 1, 3), (4, 3, 2), (3, 4, 5)),
+)
+
+
+def between_whole(layout: Layout) -> BoolArray:
+    """Return (e,) the edges between two vertices that are to lie on grid points.
+
+    A triangle of three such has no place where these come to lie in a row.
+    """
+    is_whole = np.zeros(len(layout.mesh.vertices), dtype=bool)
+    is_whole[layout.whole] = True
+    return np.asarray(is_whole[layout.mesh.edges].all(axis=1))
+
+
+def split_edges(layout: Layout, is_split: BoolArray) -> Layout:
+    """Return a layout of the same surface with edges split in the middle; is_split: (e,)."""
+    mesh, corners, points = layout.mesh, layout.corners, layout.points
+    edge_of = mesh.halfedge_edges.reshape(-1, 3)
+    number = np.full(len(mesh.edges), -1)
+    number[is_split] = len(mesh.vertices) + np.arange(int(is_split.sum()))
+    middle = mesh.vertices[mesh.edges[is_split]].mean(axis=1)
+    own, pairs = _middle_points(corners, is_split[edge_of], len(points))
+    origin, piece = _pieces((is_split[edge_of] * [1, 2, 4]).sum(axis=1))
+    faces, new_corners = (
+        np.take_along_axis(np.concatenate(both, axis=1)[origin], piece, axis=1)
+        for both in ((mesh.faces, number[edge_of]), (corners, own))
+    )
+    places = np.take_along_axis(_six_places(layout.lengths)[origin], piece, axis=1)
+    whole_mesh = TriangleMesh(np.concatenate([mesh.vertices, middle]), faces)
+    lengths: FloatArray = np.abs(places[:, PREVIOUS] - places[:, NEXT])
+    new_points = np.concatenate([points, points[pairs].mean(axis=1)])
+    split = replace(layout, mesh=whole_mesh, lengths=lengths, corners=new_corners, points=new_points)
+    # Components whose boundary has straight sides go on to have them.
+    component = charts_of(split, split.chains())[1]
+    return replace(split, sides=find_sides(split, np.isin(component, component[layout.sides.points])))
+
+
+def _pieces(kind: IntArray) -> tuple[IntArray, IntArray]:
+    """Return (t,) the triangle of each piece, in order, and (t, 3) its corners; kind: (m,) the sides split."""
+    origin, corners = [], []
+    for which, pieces in enumerate(PIECES):
+        at = np.flatnonzero(kind == which)
+        for piece in pieces:
+            origin.append(at)
+            corners.append(np.tile(piece, (len(at), 1)))
+    all_of = np.concatenate(origin)
+    order = np.argsort(all_of, kind="stable")
+    return all_of[order], np.concatenate(corners)[order]
+
+
+def _middle_points(corners: IntArray, is_split: BoolArray, count: int) -> tuple[IntArray, IntArray]:
+    """Return (m, 3) the point in the middle of each side that is split, from `count`, and (k, 2) between which."""
+    ends = np.sort(np.stack([corners[:, NEXT], corners[:, PREVIOUS]], axis=-1), axis=-1)
+    pairs, index = np.unique(ends[is_split], axis=0, return_inverse=True)
+    own = np.full(corners.shape, -1)
+    own[is_split] = count + index.ravel()
+    return own, pairs
+
+
+def _six_places(lengths: FloatArray) -> ComplexArray:
+    """Return (m, 6) corners of triangles with given sides, and the middles of these, in the plane."""
+    sides = rest_sides(lengths)
+    places = np.stack([np.zeros(len(sides)), sides[:, 2], -sides[:, 1]], axis=1)
+    middles = (places[:, NEXT] + places[:, PREVIOUS]) / 2
+    return np.concatenate([places, middles], axis=1)
