@@ -207,11 +207,6 @@ def check_color_map(name: str) -> None:
         raise OptionError(f"matplotlib has no colour map {name!r}; try viridis, cividis or magma")
 
 
-BEYOND = 0.01
-LEAST_RANGE = 0.5
-FILES = (".npy", ".npz")
-
-
 def own_quantity(result: Flattening, name: str, archive: Path | None = None) -> Quantity:
     """Return numbers of the user's own, with a scale: from dark to light, or to both sides of 0 where there are both.
 
@@ -252,7 +247,7 @@ def _named(result: Flattening, name: str, archive: Path | None) -> tuple[str, Fl
     if name in properties:
         return name, np.asarray(properties[name])
     path, _, array = name.rpartition(":") if ".npz:" in name.lower() else (name, "", "")
-    if Path(path).suffix.lower() in FILES:
+    if Path(path).suffix.lower() in (".npy", ".npz"):
         return array or Path(path).stem, _read(Path(path), array)
     if archive is not None:
         return name, _read(archive, name)
