@@ -16,10 +16,10 @@ from ...geometry import signed_double_areas
 from ...io import atomic_write, check_target, make_folder
 from ...mesh import label_faces
 from ..view import draw_checker, draw_cones, draw_layout, new_figure, save_figure
-from ..view.figures.camera import Eye, eye_direction, view_aspect
 from ..view.figures.compose import Panel, Row, compose, text_width
 from ..view.figures.cone_marks import mark_handles
 from ..view.figures.model import draw_quantity
+from ..view.figures.projection import Eye, eye_direction, view_aspect
 from ..view.figures.uv_layout import fill_layout, layout_aspect
 from ..view.quantity import Quantity, conformal_distortion
 from .run import Comparison, Entry
