@@ -121,8 +121,8 @@ def of_project(
     context: click.Context, project: Path
 ) -> tuple[Path, dict[str, Any], Callable[[Flattening], Flattening]]:
     """Return the mesh of a project, the keyword arguments of `coneflat.flatten` that it holds, and what notes them."""
+    from ..studio.messages import noted
     from ..studio.project import read_project
-    from ..studio.warnings import noted
 
     taken = [name for name in (*declarations(Options), "mesh", "paper", "weld") if name in context.params]
     for name in taken:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from itertools import chain, pairwise
 from types import MappingProxyType
 from typing import Any
@@ -234,7 +234,32 @@ class Choices:
         Raises:
             OptionError: they do not go together.
         """
-        words = meaning(self)
+        words = dict(self.options)
+        if self.by_hand:
+            words = {name: value for name, value in words.items() if name not in NUMBERS}
+            words["cones"] = {cone.vertex: cone.curvature for cone in self.cones} or "none"
+        elif self.cones:
+            words["required_cones"] = [cone.vertex for cone in self.cones]
+        if words.get("boundary") == "rectangle":
+            # While corners are still to be picked, the boundary is free.
+            del words["boundary"]
+            if len(self.corners) == 4:
+                words["boundary"] = dict.fromkeys(self.corners)
+        if self.cuts:
+            cut = _pairs(self.cuts)
+            words["seams"] = ("input", cut) if "seams" in words else cut
+        paint = self.paint
+        if paint.no_seam:
+            words["no_seams"] = np.array([*paint.no_seam.vertices(), *chain(*self.kept)])
+        elif self.kept:
+            words["no_seams"] = _pairs(self.kept)
+        # Of what is painted, as far as it means something: cones placed by hand or locked lie where they are.
+        if paint.no_cone and not self.by_hand:
+            locked = {cone.vertex for cone in self.cones}
+            words["forbidden_cones"] = [v for v in paint.no_cone.vertices() if v not in locked]
+        # Where all angles are given there is nothing to weigh.
+        if paint.importance and (not self.by_hand or any(cone.angle is None for cone in self.cones)):
+            words["weights"] = paint.weights()
         read_options(words)
         return words
 
@@ -243,9 +268,7 @@ class Choices:
         return {
             "options": dict(self.options),
             "by_hand": self.by_hand,
-            "cones": [
-                {"vertex": cone.vertex, "angle": cone.angle, "locked": cone.locked} for cone in self.cones
-            ],
+            "cones": [asdict(cone) for cone in self.cones],
             "cuts": [list(path) for path in self.cuts],
             "kept": [list(path) for path in self.kept],
             **({"paint": self.paint.as_plain()} if self.paint else {}),
@@ -312,51 +335,6 @@ def _checked(path: Iterable[Any]) -> Path:
     if len(vertices) < 2 or any(a == b for a, b in pairwise(vertices)):
         raise StudioError(f"a path leads from one vertex to others, not along {shown(list(vertices))}")
     return vertices
-
-
-def meaning(chosen: Choices) -> dict[str, Any]:
-    """Return keyword arguments of `coneflat.flatten`; whether they go together is not looked at."""
-    words = dict(chosen.options)
-    if chosen.by_hand:
-        words.pop("distortion", None)
-        words.pop("cone_count", None)
-        words |= _cones_by_hand(chosen)
-    elif chosen.cones:
-        words["required_cones"] = [cone.vertex for cone in chosen.cones]
-    if words.get("boundary") == "rectangle":
-        words |= _rectangle(words.pop("boundary"), chosen)
-    if chosen.cuts:
-        cut = _pairs(chosen.cuts)
-        words["seams"] = ("input", cut) if "seams" in words else cut
-    if chosen.paint.no_seam:
-        words["no_seams"] = np.array([*chosen.paint.no_seam.vertices(), *chain(*chosen.kept)])
-    elif chosen.kept:
-        words["no_seams"] = _pairs(chosen.kept)
-    return words | _painted(chosen)
-
-
-def _cones_by_hand(chosen: Choices) -> dict[str, Any]:
-    if not chosen.cones:
-        return {"cones": "none"}
-    return {"cones": {cone.vertex: cone.curvature for cone in chosen.cones}}
-
-
-def _rectangle(boundary: str, chosen: Choices) -> dict[str, Any]:
-    """Return the corners of a rectangle; while some are still to be picked, nothing, so that the boundary is free."""
-    return {"boundary": dict.fromkeys(chosen.corners)} if len(chosen.corners) == 4 else {}
-
-
-def _painted(chosen: Choices) -> dict[str, Any]:
-    """Return what is painted, as far as it means something: cones placed by hand or locked lie where they are."""
-    paint = chosen.paint
-    words: dict[str, Any] = {}
-    if paint.no_cone and not chosen.by_hand:
-        locked = {cone.vertex for cone in chosen.cones}
-        words["forbidden_cones"] = [v for v in paint.no_cone.vertices() if v not in locked]
-    # Where all angles are given there is nothing to weigh.
-    if paint.importance and (not chosen.by_hand or any(cone.angle is None for cone in chosen.cones)):
-        words["weights"] = paint.weights()
-    return words
 
 
 def _pairs(paths: Iterable[tuple[int, ...]]) -> Any:

@@ -12,21 +12,9 @@ from .paint import region_of
 FEW = 12
 
 
-class Replay:
-    """What makes the same layout without the studio, written once for each change."""
-
-    def __init__(self) -> None:
-        self._of: tuple[str | None, Choices | None] = None, None
-        self._texts: dict[str, str] = {}
-
-    def of(self, mesh: str | None, project: str, choices: Choices) -> dict[str, str]:
-        """Return the command line, and Python; nothing without a mesh."""
-        if mesh is None:
-            return {"command": "", "python": ""}
-        if self._of[0] != mesh or self._of[1] is not choices:
-            command, python = command_line(mesh, project, choices), python_lines(mesh, choices)
-            self._of, self._texts = (mesh, choices), {"command": command, "python": python}
-        return self._texts
+def replay(mesh: str, project: str, choices: Choices) -> dict[str, str]:
+    """Return what makes the same layout without the studio: the command line, and Python."""
+    return {"command": command_line(mesh, project, choices), "python": python_lines(mesh, choices)}
 
 
 def command_line(mesh: str, project: str, choices: Choices) -> str:
