@@ -79,8 +79,7 @@ def compare(
     from ..peers.run import COMPARED as METHODS
     from ..peers.run import compare_methods
     from ..peers.table import comparison_csv, comparison_lines, comparison_markdown
-    from .console import Console
-    from .run import FLATTENED, READ
+    from .run import FLATTENED, READ, Console
 
     flags = chosen(given, CompareFlags)
     refuse(context, [(flags.paper, declarations(FindOptions), "--paper says which cones")])
@@ -139,8 +138,7 @@ def paper(meshes: tuple[Path, ...], up: str, verbosity: str | None, **given: Any
     from ..peers import reproduce
     from ..peers.paper import FILES
     from ..peers.pictures import Sight, open_folder, write_folder
-    from .console import Console
-    from .run import FLATTENED
+    from .run import FLATTENED, Console
 
     flags = chosen(given, PaperFlags)
     sight = Sight(flags.eye, up)

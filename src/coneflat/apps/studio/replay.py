@@ -6,7 +6,7 @@ import shlex
 from typing import Any
 
 from .choices import Choices
-from .paint import region_of
+from .paint import Region
 
 #: Numbers that are written one by one.
 FEW = 12
@@ -70,7 +70,5 @@ def _written(value: Any) -> str:
 
 def _ranges(vertices: list[int]) -> str:
     """Return vertices, ascending, as they stand in brackets: those that follow each other as a range."""
-    import numpy as np
-
-    runs = region_of(np.array(vertices)).runs
+    runs = Region.of_runs((vertex, vertex) for vertex in vertices).runs
     return ", ".join(str(a) if a == b else f"*range({a}, {b + 1})" for a, b in runs)
