@@ -77,8 +77,7 @@ def compare(
     from ...errors import MetricError
     from ...io import read_joined
     from ..peers.run import COMPARED as METHODS
-    from ..peers.run import compare_methods
-    from ..peers.table import comparison_csv, comparison_lines, comparison_markdown
+    from ..peers.run import compare_methods, comparison_csv, comparison_lines, comparison_markdown
     from .run import FLATTENED, READ, Console
 
     flags = chosen(given, CompareFlags)
