@@ -14,13 +14,12 @@ from ... import ConeflatError
 from ...base import shown
 from ...errors import MeshFileError, StudioError
 from ...options import as_number, as_whole
-from .choices import Choices
+from .choices import Choices, replay
 from .known import Known
 from .messages import misplaced
 from .outputs import EXPORTS, MOST_QUADS, QUADS, curve_options
 from .paint import Region
 from .project import Project, file_within, opened
-from .replay import replay
 from .worker import Head, Worker
 
 PATIENCE = 600.0  # seconds that saving waits for the flattening before it
