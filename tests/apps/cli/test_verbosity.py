@@ -8,8 +8,8 @@ import pytest
 import shapes
 from click.testing import CliRunner
 
-from coneflat.apps.cli.console import Console
 from coneflat.apps.cli.main import cli
+from coneflat.apps.cli.run import Console
 
 COMMANDS = {
     "flatten": ("flatten", "model.obj", "-o", "out.obj"),
@@ -65,7 +65,7 @@ def test_quiet_says_nothing(folder, name):
 
 def test_lines_come_a_second_apart_if_it_takes_long(capsys, monkeypatch):
     now = [0.0]
-    monkeypatch.setattr("coneflat.apps.cli.console.time.perf_counter", lambda: now[0])
+    monkeypatch.setattr("coneflat.apps.cli.run.time.perf_counter", lambda: now[0])
     with Console() as console:
         for now[0] in (0.0, 0.9, 1.9, 2.9, 3.1, 3.9, 4.3, 4.4):
             console.progress(f"step {now[0]}", now[0] / 6)

@@ -21,8 +21,7 @@ from coneflat.apps.peers.packages import PEERS, installed_peers, with_uv
 from coneflat.apps.peers.paper import METHODS as PAPER_METHODS
 from coneflat.apps.peers.paper import MODELS, model_of
 from coneflat.apps.peers.pictures import Sight, draw_layouts, draw_qualities, turned_alike
-from coneflat.apps.peers.run import COMPARED, Comparison, Entry
-from coneflat.apps.peers.table import COLUMNS, comparison_csv, comparison_markdown
+from coneflat.apps.peers.run import COLUMNS, COMPARED, Comparison, Entry, comparison_csv, comparison_markdown
 
 
 @pytest.fixture(scope="module")

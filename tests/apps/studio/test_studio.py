@@ -13,9 +13,8 @@ from click.testing import CliRunner
 
 import coneflat
 from coneflat.apps.cli.main import cli
-from coneflat.apps.studio.choices import Choices, Cone
+from coneflat.apps.studio.choices import Choices, Cone, command_line, python_lines
 from coneflat.apps.studio.project import Project, hash_of, read_project
-from coneflat.apps.studio.replay import command_line, python_lines
 from coneflat.apps.studio.session import History
 from coneflat.errors import OptionError, ProjectError, StudioError
 

@@ -36,8 +36,9 @@ def session(tmp_path):
 
 
 @pytest.fixture
-def stranger(session):
-    return TestClient(studio_app(session, TOKEN, PORT, MOST), base_url=BASE)
+def stranger(session, monkeypatch):
+    monkeypatch.setattr("coneflat.apps.studio.server.MOST_UPLOADED", MOST)
+    return TestClient(studio_app(session, TOKEN, PORT), base_url=BASE)
 
 
 @pytest.fixture

@@ -19,9 +19,9 @@ from click.testing import CliRunner
 import coneflat
 from coneflat.apps.cli.main import cli
 from coneflat.apps.studio.choices import Choices
-from coneflat.apps.studio.frames import read_frame, write_frame
 from coneflat.apps.studio.project import Project, hash_of, read_project
 from coneflat.apps.studio.session import Session
+from coneflat.apps.studio.worker import read_frame, write_frame
 from coneflat.errors import OptionError, ProjectError, StudioError
 
 

@@ -13,10 +13,9 @@ import shapes
 
 import coneflat
 from coneflat.apps.studio.choices import Choices
+from coneflat.apps.studio.messages import CONTROLS, in_page, misplaced, within
 from coneflat.apps.studio.paint import Region, region_of
 from coneflat.apps.studio.session import Session
-from coneflat.apps.studio.warnings import misplaced, within
-from coneflat.apps.studio.wording import CONTROLS, in_page
 from coneflat.base.defaults import MAX_CONE_ANGLE
 from coneflat.errors import StudioError
 from coneflat.options import Options, declarations

@@ -76,6 +76,11 @@ class TestQuality:
         assert close.mean() > 0.9
         assert np.ptp(expected, axis=0).max() > 100
 
+    def test_scales_of_small_distortion_are_short(self):
+        flat = coneflat.flatten([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        assert quantity.conformal_distortion(flat).scale.high == pytest.approx(1.05)
+        assert quantity.stretch(flat).scale.high == pytest.approx(1.05)
+
 
 class TestConesAndCurvature:
     def test_cones_are_dots_and_those_behind_are_faint(self):

@@ -79,7 +79,7 @@ def batch(
     from ...io import make_folder
     from ...measure import REPORTED, parse_requirements
     from ..batch import find_jobs, run_batch
-    from .console import Console
+    from .run import Console
 
     check_combinations(context)
     flags = chosen(given, BatchFlags)

@@ -57,8 +57,7 @@ def cones(
     from ... import cone_curve, find_cones
     from ...io import atomic_write, check_target, read_joined
     from ..view import check_figure_target, make_figure, new_figure, save_figure
-    from .console import Console
-    from .run import FLATTENED, READ
+    from .run import FLATTENED, READ, Console
 
     flags, options = chosen(given, ConeFlags), keywords(given, FindOptions)
     picture = None

@@ -15,7 +15,7 @@ from .shared import again_option, checking, color_option, input_options, up_opti
 
 if TYPE_CHECKING:
     from ..quads.quad_mesh import QuadMesh
-    from .console import Console
+    from .run import Console
 
 KINDS = ("layout", "checker", "quality", "cones", "curvature", "color", "curve", "quads")
 
@@ -102,8 +102,7 @@ def figure(
     from ... import cone_curve
     from ..view import Look, check_figure_target, make_figure, new_figure, save_figure
     from ..view.quantity import own_quantity
-    from .console import Console
-    from .run import FLATTENED, READ, archive_of, open_result
+    from .run import FLATTENED, READ, Console, archive_of, open_result
 
     flags = chosen(given, FigureFlags)
     kind = "color" if color is not None and not is_given(context, "kind") else flags.kind
@@ -198,8 +197,7 @@ def demo(output: Path, verbosity: str | None) -> None:
     from ... import sample_path
     from ...io import make_folder
     from ..view import demo_figure, new_figure, save_figure
-    from .console import Console
-    from .run import FLATTENED, flatten_file, save
+    from .run import FLATTENED, Console, flatten_file, save
 
     new_figure(1, 1)  # says what is missing before the work
     make_folder(output)

@@ -20,8 +20,8 @@ from .options import (
     option_flags,
     paper_option,
     path_flag,
-)  # fmt: skip
-from .shared import GroupedCommand, input_options, require_option, verbosity_options
+)
+from .shared import GroupedCommand, check_required, input_options, require_option, verbosity_options
 
 if TYPE_CHECKING:
     from ... import Flattening
@@ -87,8 +87,9 @@ def flatten(
             f"{mesh} {context.args[0]} ... --out FOLDER` flattens many",
             context,
         )
+    from ...io import PIPE, check_output, check_target
     from ...measure import REPORTED, parse_requirements
-    from .run import named_output, run
+    from .run import Console, flatten_file, kept_apart, require_distinct, save
 
     requirements = parse_requirements(required, REPORTED)
     check_combinations(context)
@@ -100,33 +101,33 @@ def flatten(
     else:
         options = keywords(given)
     ending = f".{flags.format or 'obj'}"
-    output = named_output(mesh, ending) if flags.output is None else flags.output
+    named = PIPE if mesh == PIPE else Path(f"{mesh.stem}_uv{ending}")
+    output = named if flags.output is None else flags.output
     if flags.format is not None and output.suffix.lower() not in ("", ending):
         raise click.UsageError(f"{output} is no {ending} file: leave out --format", context)
-    run(
-        mesh,
-        output,
-        options,
-        weld=weld,
-        report=flags.report,
-        texture=flags.texture,
-        verbosity=verbosity,
-        ending=ending,
-        requirements=requirements,
-        noted=noted,
-    )
+    # What can fail at the end is looked at before the work.
+    check_output(Path(f"stdout{ending}") if output == PIPE else output, flags.texture)
+    if flags.report is not None:
+        check_target(flags.report)
+    require_distinct({"input": mesh, "output": output, "report": flags.report})
+    with kept_apart(output) as stdout, Console(verbosity) as console:
+        result = flatten_file(mesh, console, options, weld)
+        result = result if noted is None else noted(result)
+        result = save(result, console, output, flags.report, flags.texture, stdout, ending)
+        written = [path for path in (output, flags.report) if path is not None and path != PIPE]
+        console.finish(written, result)
+    check_required(requirements, result.report(), str(output))
 
 
 def of_project(
     context: click.Context, project: Path
 ) -> tuple[Path, dict[str, Any], Callable[[Flattening], Flattening]]:
     """Return the mesh of a project, the keyword arguments of `coneflat.flatten` that it holds, and what notes them."""
+    from ..studio.messages import noted
     from ..studio.project import read_project
-    from ..studio.warnings import noted
 
-    taken = [name for name in (*declarations(Options), "mesh", "paper", "weld") if name in context.params]
-    for name in taken:
-        if is_given(context, name):
+    for name in (*declarations(Options), "mesh", "paper", "weld"):
+        if name in context.params and is_given(context, name):
             what = "MESH" if name == "mesh" else flag_of(name)
             raise click.UsageError(f"a project has its own mesh and options: leave out {what}", context)
     opened = read_project(project)

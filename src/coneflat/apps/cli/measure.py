@@ -42,8 +42,7 @@ def measure(
     from ...io import as_mapped, check_target
     from ...measure import parse_requirements
     from ...measure_uv import MEASURED, measure_mapped
-    from .console import Console
-    from .run import require_distinct, write_report
+    from .run import Console, require_distinct, write_report
 
     requirements = parse_requirements(required, MEASURED)
     if report is not None:
@@ -69,7 +68,7 @@ def measure(
 def rows_of_measures(measured: UVMeasures) -> list[Row]:
     """Return the rows of the table of measures of UVs."""
     from ...measure import map_rows, number_text, packing_row
-    from .console import FIRST_ROWS
+    from .run import FIRST_ROWS
 
     counts, of_map = measured.counts, map_rows(measured.distortion)
     missing = ""

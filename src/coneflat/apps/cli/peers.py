@@ -77,10 +77,8 @@ def compare(
     from ...errors import MetricError
     from ...io import read_joined
     from ..peers.run import COMPARED as METHODS
-    from ..peers.run import compare_methods
-    from ..peers.table import comparison_csv, comparison_lines, comparison_markdown
-    from .console import Console
-    from .run import FLATTENED, READ
+    from ..peers.run import compare_methods, comparison_csv, comparison_lines, comparison_markdown
+    from .run import FLATTENED, READ, Console
 
     flags = chosen(given, CompareFlags)
     refuse(context, [(flags.paper, declarations(FindOptions), "--paper says which cones")])
@@ -139,8 +137,7 @@ def paper(meshes: tuple[Path, ...], up: str, verbosity: str | None, **given: Any
     from ..peers import reproduce
     from ..peers.paper import FILES
     from ..peers.pictures import Sight, open_folder, write_folder
-    from .console import Console
-    from .run import FLATTENED
+    from .run import FLATTENED, Console
 
     flags = chosen(given, PaperFlags)
     sight = Sight(flags.eye, up)

@@ -17,7 +17,7 @@ from .shared import GroupedCommand, input_options, verbosity_options
 
 if TYPE_CHECKING:
     from ..quads.integer_map import IntegerGrid
-    from .console import Console
+    from .run import Console
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,8 +67,7 @@ def quads(
     from ..quads.quads import quads as find_quads
     from ..quads.quality import measure_quads
     from ..view.page.webpage import check_page, write_page
-    from .console import Console
-    from .run import FLATTENED, READ, require_distinct, write_report
+    from .run import FLATTENED, READ, Console, require_distinct, write_report
 
     _check_combinations(context, mesh)
     flags, options = chosen(given, QuadFlags), keywords(given, QuadOptions)

@@ -1,91 +1,210 @@
-"""From a file to a result, and to files, with progress and a table at the end."""
+"""From a file to a result, and to files, with progress on stderr, and what came out on stdout."""
 
 from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stdout
-from dataclasses import replace
+import textwrap
+import threading
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout, suppress
+from dataclasses import asdict, replace
 from io import BytesIO
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
+
+import click
 
 from ... import Flattening, flatten, read_flattening
+from ...base import Progress as Listener
+from ...base import Stopwatch
 from ...errors import OptionError
 from ...io import (
     PIPE,
     Joined,
     as_written,
     atomic_write,
-    check_output,
-    check_target,
     has_uv,
     read_joined,
     write_measured,
     write_stream,
 )
-from ...measure import Requirement
-from .console import Console
-from .shared import check_required, checking
+from .shared import QUIET, VERBOSE, checking
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 READ, FLATTENED = 0.03, 0.92
 """Fractions of the whole that are done when the mesh is read, and when it is flattened, about."""
 
 AGAIN = "--again flattens the mesh anew"
 
+PATIENCE = 1.0  # seconds between the plain lines that say what is going on, and before the first of them
+#: What an artist asks first, in this order; the other rows are printed if verbose.
+FIRST_ROWS = ("charts", "overlap", "flipped", "texel density", "seam length", "QC distortion", "cones")
 
-def run(
-    mesh: Path,
-    output: Path | None,
-    options: Mapping[str, Any],
-    *,
-    weld: bool | None = None,
-    report: Path | None = None,
-    texture: str | None = None,
-    verbosity: str | None = None,
-    ending: str = ".obj",
-    requirements: Sequence[Requirement] = (),
-    noted: Callable[[Flattening], Flattening] | None = None,
-) -> None:
-    """Flatten a mesh file, write the result and its report, and print what came out.
 
-    Args:
-        mesh: file to read.
-        output: file to write, "-" for standard output; None for a file in the current folder that is named after the
-            input, or standard output for what comes from standard input.
-        options: keyword arguments of `coneflat.flatten`.
-        weld: merge vertices at the same position; None for the default, see `read_joined`.
-        report: JSON file for the measures.
-        texture: of a .glb: "checker", or an image file.
-        verbosity: how much to print, see `verbosity_options`.
-        ending: format of what goes to standard output, or of a file without a name.
-        requirements: what measures must be; the files are written in any case.
-        noted: gives a result with more notes.
+class Console:
+    """Progress while a command runs, what came out when it is done; nothing if quiet.
+
+    Progress is a bar in a terminal, else a line about every second, also within long steps; what is done, or fails,
+    within the first second says nothing of it. If verbose, it is a line for every step.
+
+    Attributes:
+        seconds: wall time of each stage.
     """
-    output = named_output(mesh, ending) if output is None else output
-    # What can fail at the end is looked at before the work.
-    check_output(Path(f"stdout{ending}") if output == PIPE else output, texture)
-    if report is not None:
-        check_target(report)
-    require_distinct({"input": mesh, "output": output, "report": report})
 
-    with _kept_apart(output) as stdout, Console(verbosity) as console:
-        result = flatten_file(mesh, console, options, weld)
-        result = result if noted is None else noted(result)
-        result = save(result, console, output, report, texture, stdout, ending)
-        console.finish([path for path in (output, report) if path is not None and path != PIPE], result)
-    check_required(requirements, result.report(), str(output))
+    def __init__(self, verbosity: str | None = None) -> None:
+        self.quiet, self.verbose = verbosity == QUIET, verbosity == VERBOSE
+        self._stages = Stopwatch(self.progress)
+        self.seconds = self._stages.seconds
+        self._start = time.perf_counter()
+        self._last_line = 0.0
+        self._now = ("", 0.0)
+        self._lock = threading.Lock()
+        self._over = threading.Event()
+        self._bar: Progress | None = None
+        if verbosity is None and sys.stderr.isatty():
+            self._bar = _bar()
+            self._task = self._bar.add_task("", total=1.0)
+
+    def __enter__(self) -> Console:
+        if self._bar:
+            self._bar.start()
+        elif not self.quiet and not self.verbose:
+            threading.Thread(target=self._remind, daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._over.set()
+        if self._bar:
+            self._bar.stop()
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the start."""
+        return time.perf_counter() - self._start
+
+    def progress(self, stage: str, fraction: float) -> None:
+        """Show what is being done, and the fraction of the whole that is done."""
+        if self._bar:
+            self._bar.update(self._task, description=stage, completed=fraction)
+            return
+        with self._lock:
+            self._now = (stage, fraction)
+            if not self.quiet and (self.verbose or self.elapsed - self._last_line > PATIENCE):
+                self._tell()
+
+    def _tell(self) -> None:
+        stage, fraction = self._now
+        self._last_line = self.elapsed
+        click.echo(f"{self.elapsed:6.1f} s  {fraction:4.0%}  {stage}", err=True)
+
+    def _remind(self) -> None:
+        """Say again what is being done, where nothing has been said for a while."""
+        while not self._over.wait(PATIENCE / 4):
+            with self._lock, suppress(OSError, ValueError):  # Whoever was to read it may be gone.
+                late = self.elapsed - self._last_line > (2 * PATIENCE if self._last_line else PATIENCE)
+                if late and self._now[0] and not self._over.is_set():
+                    self._tell()
+
+    def part(self, begin: float, end: float) -> Listener:
+        """Return a listener to a part of the work, which makes up these fractions of the whole."""
+        return lambda stage, fraction: self.progress(stage, begin + (end - begin) * fraction)
+
+    @contextmanager
+    def stage(self, name: str, done: float) -> Iterator[None]:
+        """Show and time a stage, at the beginning of which so much of the whole is done."""
+        self._stages.done = done
+        with self._stages(name):
+            yield
+
+    def say(self, lines: Iterable[str]) -> None:
+        """Print lines of what came out."""
+        if self.quiet:
+            return
+        if self._bar:
+            self._bar.stop()
+        for line in lines:
+            click.echo(line)
+        self._last_line = self.elapsed
+        if self._bar:
+            self._bar.start()
+
+    def finish(self, written: Sequence[Path], result: Flattening | None = None) -> None:
+        """Print the notes on a result if there is one, what was written, its measures, and where the time went."""
+        with self._lock:
+            self._over.set()
+        if self._bar:
+            self._bar.stop()
+            self._bar = None
+        if result is not None:
+            self.say(f"note: {note}" for note in result.notes)
+        self.say(f"wrote {path}" for path in written)
+        if result is not None:
+            self.table(self._result_rows(result))
+        if self.seconds:
+            self.say([f"time           {self._spent()}"])
+
+    def _spent(self) -> str:
+        each = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in self.seconds.items())
+        return f"{sum(self.seconds.values()):.2f} s: {each}"
+
+    def _result_rows(self, result: Flattening) -> list[tuple[str, str, str]]:
+        """Return what an artist wants to know; if verbose, all measures and how the result was found."""
+        from ..view.from_uv import shown_rows
+
+        rows = {row[0]: row for row in shown_rows(result)}
+        first = [rows.pop(name) for name in FIRST_ROWS if name in rows]
+        if not self.verbose:
+            return first
+        found = asdict(result.solve)
+        return [
+            *first,
+            *rows.values(),
+            *((name.replace("_", " "), f"{value:.3g}", "") for name, value in found.items()),
+        ]
+
+    def table(self, rows: Iterable[tuple[str, str, str]]) -> None:
+        """Print a table of (measure, value, meaning)."""
+        self.say(_lines_of_table(list(rows)))
 
 
-def named_output(mesh: Path, ending: str) -> Path:
-    """Return the file that the result of a mesh is written to if none is named."""
-    return PIPE if mesh == PIPE else Path(f"{mesh.stem}_uv{ending}")
+def _bar() -> Progress:
+    from rich.console import Console as RichConsole
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    return Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description:28}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        console=RichConsole(stderr=True),
+        transient=True,
+    )
+
+
+def _lines_of_table(rows: Sequence[tuple[str, str, str]]) -> Iterator[str]:
+    """Yield the lines of a table as wide as the terminal, or 110; its last column is wrapped.
+
+    Outside a terminal click leaves the styles out.
+    """
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 110
+    names, values = (max((len(row[column]) for row in rows), default=0) for column in (0, 1))
+    rest = max(width - names - values - 4, 20)
+    for name, value, meaning in rows:
+        first, *more = textwrap.wrap(meaning, rest) or [""]
+        told = click.style(f"{name:{names}}", bold=True), f"{value:{values}}", click.style(first, dim=True)
+        yield "  ".join(told if first else told[:2]).rstrip()
+        yield from (" " * (names + values + 4) + click.style(line, dim=True) for line in more)
 
 
 @contextmanager
-def _kept_apart(output: Path) -> Iterator[IO[bytes] | None]:
+def kept_apart(output: Path) -> Iterator[IO[bytes] | None]:
     """Yield standard output if the result goes there, and let everything else that is printed go to stderr."""
     if output != PIPE:
         yield None

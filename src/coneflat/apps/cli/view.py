@@ -75,8 +75,7 @@ def view(
     from ..quads.page import page_of_quads
     from ..view.page.webpage import check_page, open_page, page_of, write_page
     from ..view.quantity import own_quantity
-    from .console import Console
-    from .run import FLATTENED, archive_of, open_result
+    from .run import FLATTENED, Console, archive_of, open_result
 
     # What can fail at the end is looked at before the work.
     flags = chosen(given, ViewFlags)

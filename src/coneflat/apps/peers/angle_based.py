@@ -35,56 +35,6 @@ STEPS, TOLERANCE, LAST_CHANGE = 100, 1e-9, 1e-6
 Solve: TypeAlias = Callable[["AngleConditions", FloatArray], tuple[FloatArray, int, bool]]
 
 
-@dataclass(frozen=True, eq=False)
-class AngleMetric:
-    """Angle based flattening of a mesh, before or after it is cut.
-
-    Attributes:
-        mesh: connected.
-        lengths: (m, 3) its side lengths.
-        solution: cones and their curvatures.
-        solve: `linear_angles`, or `nearest_angles`.
-        best_effort: take angles that did not converge.
-        is_free: cut first and prescribe nothing at cones and seams, as in 2008; the seams are a free boundary then.
-    """
-
-    mesh: TriangleMesh
-    lengths: FloatArray
-    solution: ConeSolution
-    solve: Solve
-    best_effort: bool = False
-    is_free: bool = False
-
-    def embed(self, cut: Cut) -> Embedding:
-        """Return the least squares reconstruction, at the mesh's area.
-
-        Raises:
-            ConvergenceError: the solve ends short of its tolerance, unless `best_effort`.
-            CurvatureError: a cone is too wide for its triangles.
-        """
-        notes: list[str] = []
-        disk, mesh, curvature = cut.mesh, self.mesh, self.solution.target
-        if self.is_free:
-            mesh, curvature = disk, np.zeros(len(disk.vertices))
-            if len(cut.seams):
-                notes.append(
-                    "The mesh was cut first: the angles of cones, and lengths along seams, were left free."
-                )
-        wanted = wanted_angles(mesh, corner_angles(self.lengths), curvature)
-        conditions = angle_conditions(mesh, curvature)
-        angles, steps, converged = self.solve(conditions, wanted)
-        residual = conditions.residual(np.clip(angles, LEAST_ANGLE, np.pi - LEAST_ANGLE))
-        if not converged:
-            what = "angle based flattening did not converge: the conditions on angles are"
-            notes += failure_notes(what, steps, residual, "", self.best_effort)
-        shapes = shapes_of_angles(angles.reshape(-1, 3))
-        broken = int(shapes.is_broken.sum())
-        if broken:
-            notes.append(f"{plural(broken, 'triangle')} got an angle below 0: method 'abf++' allows none.")
-        statistics = SolveStatistics(newton_steps=steps, residual=residual, broken=broken)
-        return Embedding(fit_shapes(disk, shapes, self.lengths), statistics, tuple(notes))
-
-
 def angle_based(
     mesh: TriangleMesh,
     lengths: FloatArray,
@@ -93,9 +43,46 @@ def angle_based(
     best_effort: bool = False,
     is_free: bool = False,
 ) -> FlatMetric:
-    """Return the angle based flattening of a mesh; see `AngleMetric` for the arguments."""
-    method = AngleMetric(mesh, lengths, solution, solve, best_effort, is_free)
-    return embedding_metric(mesh, lengths, solution, method.embed, holds_cones=not is_free)
+    """Return the angle based flattening of a mesh.
+
+    Args:
+        mesh: connected.
+        lengths: (m, 3) its side lengths.
+        solution: cones and their curvatures.
+        solve: `linear_angles`, or `nearest_angles`.
+        best_effort: take angles that did not converge.
+        is_free: cut first and prescribe nothing at cones and seams, as in 2008; the seams are a free boundary then.
+    """
+
+    def embed(cut: Cut) -> Embedding:
+        """Return the least squares reconstruction, at the mesh's area.
+
+        Raises:
+            ConvergenceError: the solve ends short of its tolerance, unless `best_effort`.
+            CurvatureError: a cone is too wide for its triangles.
+        """
+        notes: list[str] = []
+        whole, curvature = mesh, solution.target
+        if is_free:
+            whole, curvature = cut.mesh, np.zeros(len(cut.mesh.vertices))
+            if len(cut.seams):
+                notes.append(
+                    "The mesh was cut first: the angles of cones, and lengths along seams, were left free."
+                )
+        conditions = angle_conditions(whole, curvature)
+        angles, steps, converged = solve(conditions, wanted_angles(whole, corner_angles(lengths), curvature))
+        residual = conditions.residual(np.clip(angles, LEAST_ANGLE, np.pi - LEAST_ANGLE))
+        if not converged:
+            what = "angle based flattening did not converge: the conditions on angles are"
+            notes += failure_notes(what, steps, residual, "", best_effort)
+        shapes = shapes_of_angles(angles.reshape(-1, 3))
+        broken = int(shapes.is_broken.sum())
+        if broken:
+            notes.append(f"{plural(broken, 'triangle')} got an angle below 0: method 'abf++' allows none.")
+        statistics = SolveStatistics(newton_steps=steps, residual=residual, broken=broken)
+        return Embedding(fit_shapes(cut.mesh, shapes, lengths), statistics, tuple(notes))
+
+    return embedding_metric(mesh, lengths, solution, embed, holds_cones=not is_free)
 
 
 def nearest_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[FloatArray, int, bool]:
@@ -200,8 +187,7 @@ class AngleConditions:
 
 def excess_of(angles: FloatArray) -> FloatArray:
     """Return (m,) what triangles with (3m,) corner angles have in excess of half a turn."""
-    excess: FloatArray = angles.reshape(-1, 3).sum(axis=1) - np.pi
-    return excess
+    return angles.reshape(-1, 3).sum(axis=1) - np.pi
 
 
 def angle_conditions(mesh: TriangleMesh, curvature: FloatArray) -> AngleConditions:

@@ -51,9 +51,8 @@ def boundary_first(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSoluti
         # Half-edges keep their numbers in the cut: both sides of a seam are sides of one edge of the mesh.
         found = best_fit_lengths(wanted, lengths.ravel()[border], tangents, mesh.halfedge_edges[border])
         corners = closed_chain(found * tangents)
-        if (
-            np.conj(corners) * np.roll(corners, -1)
-        ).sum().imag < 0:  # Far too strong a change turns it inside out.
+        # Far too strong a change turns it inside out.
+        if (np.conj(corners) * np.roll(corners, -1)).sum().imag < 0:
             corners = np.conj(corners)
         curve = np.zeros((2, len(disk.vertices)))
         curve[:, disk.tails[border]] = corners.real, corners.imag

@@ -1,4 +1,8 @@
-"""Circle patterns (Kharevych, Springborn, Schroeder 2006), with cones."""
+"""Circle patterns (Kharevych, Springborn, Schroeder 2006), with cones.
+
+First the nearest angles that a pattern can have, a quadratic program, after edge flips where there are none; then the
+radii of its circles.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, csr_matrix, identity
 
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray
@@ -14,21 +18,20 @@ from ...errors import ConvergenceError
 from ...geometry import (
     IntrinsicTriangulation,
     corner_angles,
+    euclidean_diagonal,
     intrinsic_triangulation,
     make_delaunay,
+    relink,
     vertex_areas,
 )
 from ...linalg import Limits, Point, factorize, minimise
+from ...mesh import NEXT, PREVIOUS
 from ...metric import checked_target
 from ...stages import ConeSolution, FlatMetric
-from .coherent_angles import CoherentAngles, coherent_angles
-from .proper import make_proper
 from .shared import failure_notes, flat_metric
 
 # Largest curvature error of a metric that has converged, radians.
 TOLERANCE = 1e-9
-# Mean angle, radians, that corners at a vertex are to stay below.
-WIDEST = 0.98 * np.pi
 
 
 def circle_patterns(
@@ -85,8 +88,8 @@ def _find_angles(
     coherent = _nearest_angles(triangulation, target, border)
     if not coherent.converged:
         # Two edges between the same vertices, flat all around, cannot both be straight; nor can there be a cone wider
-        # than the corners at it can be.
-        wanted = np.where(border, 0, np.floor((2 * np.pi - target) / WIDEST).astype(np.int64) + 1)
+        # than the corners at it can be: their mean is to stay below 0.98 pi.
+        wanted = np.where(border, 0, np.floor((2 * np.pi - target) / (0.98 * np.pi)).astype(np.int64) + 1)
         flips = np.concatenate([flips, make_proper(triangulation, wanted)])
         coherent = _nearest_angles(triangulation, target, border)
     return coherent, flips
@@ -99,12 +102,208 @@ def _nearest_angles(
     return coherent_angles(triangulation, angles, 2 * np.pi - target, ~border)
 
 
-# When to stop: largest error of the angles around the centre of a circle, radians; steps at most; rounding of a sum of
-# some angles, radians; halvings after which a step is taken for rounding; largest change of a log radius in one step;
-# and part of the gradient that a step must change.
-LIMITS = Limits(
-    1e-10, 50, goal=1e-12, halvings=40, halvings_below=40, largest_step=5.0, least_change=1e-6
-)  # fmt: skip
+# Angles may shrink to this part of what they were, or to 0.02 radians where that is less; but never below the last,
+# radians.
+LEAST_PART, LEAST_ANGLE = 0.5, 1e-5
+# Circles meet at this angle at least, radians, also those around the two halves of a planar quad that is inscribed in a
+# circle, which are one: the equations are as steep as this is small.
+LEAST_MEETING = 1e-4
+# The largest sum of angles opposite an edge.
+WIDEST_PAIR = np.pi - LEAST_MEETING
+# When to stop: largest error of a sum of angles, radians, which sums to that of curvature; Newton steps at most;
+# rounding of a sum of some angles, radians; halvings after which a step is taken for rounding; and part of the gradient
+# that a step must change, as where there is no solution the function falls without an end.
+ANGLE_LIMITS = Limits(1e-10, 40, goal=1e-12, halvings=40, halvings_below=40, least_change=1e-6)
+
+
+@dataclass(frozen=True, eq=False)
+class CoherentAngles:
+    """Angles of a circle pattern.
+
+    Attributes:
+        angles: (3m,) opposite each half-edge, radians.
+        residual: the largest error of a sum of angles, radians.
+        steps: Newton steps.
+    """
+
+    angles: FloatArray
+    residual: float
+    steps: int
+
+    @property
+    def converged(self) -> bool:
+        """Whether the angles sum to what they should."""
+        return self.residual <= ANGLE_LIMITS.tolerance
+
+
+def coherent_angles(
+    triangulation: IntrinsicTriangulation, angles: FloatArray, sums: FloatArray, is_summed: BoolArray
+) -> CoherentAngles:
+    """Return the angles nearest to given ones, in the sum of squares, that belong to a flat circle pattern.
+
+    They are positive, sum to pi in triangles and to what is wanted at vertices, and the two opposite an edge sum
+    to less than pi: the paper's quadratic program. Angles at a boundary are free.
+
+    Args:
+        triangulation: connected.
+        angles: (3m,) opposite each half-edge, radians.
+        sums: (n,) what the angles at a vertex are to sum to.
+        is_summed: (n,) the vertices where that is asked.
+
+    Notes:
+        Without the sums, each edge has a problem of its own, to project two angles to a triangle. The sums
+        are equations, whose multipliers minimise a convex function that has what they are off by for its gradient;
+        its second derivative jumps where bounds begin or cease to hold; Newton's method converges all the same.
+        Where none holds, the first step is the least squares solution.
+    """
+    count = len(angles)
+    rows = triangulation.face_count
+    summed = np.flatnonzero(is_summed)
+    number = np.full(triangulation.vertex_count, -1, dtype=np.int64)
+    number[summed] = rows + np.arange(len(summed))
+    row = np.concatenate([np.arange(count) // 3, number[triangulation.faces.ravel()]])
+    column = np.tile(np.arange(count), 2)
+    wanted = row >= 0
+    equations = csr_matrix(
+        (np.ones(int(wanted.sum())), (row[wanted], column[wanted])), shape=(rows + len(summed), count)
+    )
+    right = np.concatenate([np.full(rows, np.pi), sums[summed]])
+
+    least = np.clip(LEAST_PART * angles, LEAST_ANGLE, 0.02)
+    problem = _Dual(angles, least, triangulation.twin, equations, right, bool(is_summed.all()))
+    found, steps = minimise(problem, problem.evaluate(np.zeros(len(right))), ANGLE_LIMITS)
+    return CoherentAngles(problem.project(found.place)[0], found.largest, steps)
+
+
+@dataclass(eq=False)
+class _Dual:
+    """A convex function of the multipliers of equations A x = b, for x nearest to c within bounds."""
+
+    angles: FloatArray
+    least: FloatArray
+    twin: IntArray
+    equations: csr_matrix
+    right: FloatArray
+    is_closed: bool  # then the last of the equations follows from the others
+
+    def project(self, place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the angles for multipliers, and their derivatives by those before bounds: own and across."""
+        free = self.angles + self.equations.T @ place
+        is_inner = self.twin >= 0
+        other = np.where(is_inner, self.twin, 0)
+        bounded = np.maximum(free, self.least)
+        too_wide = is_inner & (bounded + bounded[other] > WIDEST_PAIR)
+        half = (free - free[other]) / 2
+        low, high = self.least - WIDEST_PAIR / 2, WIDEST_PAIR / 2 - self.least[other]
+        slides = too_wide & (low < half) & (half < high)
+        angles = np.where(too_wide, WIDEST_PAIR / 2 + np.clip(half, low, high), bounded)
+        own = np.where(too_wide, 0.5 * slides, free > self.least)
+        return angles, own, np.where(slides, -0.5, 0.0)
+
+    def evaluate(self, place: FloatArray) -> Point:
+        """Return by how much each sum falls short, which is minus the gradient."""
+        return Point(place, self.right - self.equations @ self.project(place)[0])
+
+    def direction(self, here: Point, exactly: bool) -> tuple[FloatArray, bool]:
+        """Return the step, damped as much as the residual is large; there is none more exact."""
+        residual = here.residual
+        _, own, across = self.project(here.place)
+        slots = np.flatnonzero(across)
+        every = np.arange(len(own))
+        derivative = csr_matrix(
+            (
+                np.concatenate([own, across[slots]]),
+                (np.concatenate([every, slots]), np.concatenate([every, self.twin[slots]])),
+            ),
+            shape=(len(own), len(own)),
+        )
+        used = len(residual) - self.is_closed
+        # Relative to the residual, where rank is wanting.
+        damping = np.clip(1e-5 * np.abs(residual[:used]).max(), 1e-13, 1e-6)
+        equations = self.equations[:used]
+        matrix = csc_matrix(equations @ derivative @ equations.T + damping * identity(used, format="csr"))
+        matrix.sort_indices()
+        step = np.zeros_like(residual)
+        step[:used] = factorize(matrix).solve(residual[:used])
+        return step, True
+
+
+def make_proper(triangulation: IntrinsicTriangulation, wanted: IntArray) -> IntArray:
+    """Flip edges, in place, that have the same ends as others, or one end only, and towards vertices of small degree.
+
+    Intrinsic Delaunay triangulations have some such edges near vertices of large curvature. Of those that
+    can be flipped the one with most room goes first; there are few, so each is looked for anew.
+
+    Args:
+        triangulation: changed in place, as far as quads are convex.
+        wanted: (n,) number of triangles at each vertex, at least.
+
+    Returns:
+        The half-edges flipped, in order.
+    """
+    flipped: list[int] = []
+    while True:
+        slots, room = _candidates(triangulation, wanted)
+        if not len(slots):
+            return np.array(flipped, dtype=np.int64)
+        h = int(slots[np.argmax(room)])
+        twin, tail, length = triangulation.twin, triangulation.tail, triangulation.length
+        one, two = _around(h), _around(int(twin[h]))
+        sides = (h, one[1], one[0], two[0], two[1])
+        diagonal = euclidean_diagonal(*(float(length[side]) for side in sides))
+        relink(twin, tail, length, h, diagonal)
+        flipped.append(h)
+
+
+def _around(slots: int | IntArray) -> tuple[IntArray, IntArray]:
+    """Return the next and the previous half-edge in the triangle of each."""
+    base = slots - slots % 3
+    return base + NEXT[slots % 3], base + PREVIOUS[slots % 3]
+
+
+def _candidates(triangulation: IntrinsicTriangulation, wanted: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return the half-edges that should be flipped, and can without harm, and their room."""
+    twin, tail, count = triangulation.twin, triangulation.tail, triangulation.vertex_count
+    every = np.arange(len(twin))
+    after, before = _around(every)
+    keys = _pair(tail, tail[after], count)
+    known, number, times = np.unique(keys[twin < every], return_inverse=True, return_counts=True)
+    is_double = np.zeros(len(twin), dtype=bool)
+    is_double[twin < every] = times[number.ravel()] > 1
+    is_double |= tail == tail[after]
+    degree = np.bincount(tail, minlength=count)
+    should: BoolArray = is_double | (degree < wanted)[tail[before]]
+    slots = every[should & (twin >= 0)]
+    slots = slots[twin[slots] // 3 != slots // 3]
+
+    other = twin[slots]
+    new = tail[before[slots]], tail[before[other]]
+    spare = degree > wanted
+    fine = spare[tail[slots]] & spare[tail[other]] & (new[0] != new[1])
+    fine &= ~np.isin(_pair(*new, count), known)
+    slots = slots[fine]
+    room = _room(triangulation, slots)
+    wide = room > 1e-3  # radians that corners of the quad are short of straight
+    return slots[wide], room[wide]
+
+
+def _pair(one: IntArray, two: IntArray, count: int) -> IntArray:
+    return np.minimum(one, two) * count + np.maximum(one, two)
+
+
+def _room(triangulation: IntrinsicTriangulation, slots: IntArray) -> FloatArray:
+    """Return by how much the wider corner at the ends of each edge is short of straight."""
+    lengths, other = triangulation.length.reshape(-1, 3), triangulation.twin[slots]
+    one, two = corner_angles(lengths[slots // 3]), corner_angles(lengths[other // 3])
+    rows = np.arange(len(slots))
+    # Of a half-edge in slot i, the corner at its tail is i + 1 and the one at its head i + 2.
+    at_tail = one[rows, NEXT[slots % 3]] + two[rows, PREVIOUS[other % 3]]
+    at_head = one[rows, PREVIOUS[slots % 3]] + two[rows, NEXT[other % 3]]
+    return np.pi - np.maximum(at_tail, at_head)
+
+
+# When to stop, from angles around the centre of a circle, radians; and the largest change of a log radius in one step.
+RADIUS_LIMITS = replace(ANGLE_LIMITS, steps=50, largest_step=5.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +341,7 @@ def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
     problem.base, steps = widest_pattern(problem)
     # Where circles meet at a small angle, the last bit of a log radius turns theirs by a thousand times more than
     # what is to be reached. As a small change of what was found, log radii have bits enough.
-    found, more = minimise(problem, problem.evaluate(np.zeros_like(problem.base)), LIMITS)
+    found, more = minimise(problem, problem.evaluate(np.zeros_like(problem.base)), RADIUS_LIMITS)
     log_radius = problem.base + found.place
     spread = float(np.ptp(log_radius))
     if not spread < 600:  # Squares of lengths, whose logs lie half as far from 0 each way, are to be finite.
@@ -192,8 +391,7 @@ class RadiiProblem:
     def _gaps(self, place: FloatArray) -> FloatArray:
         """Return rho_k - rho_l for each side."""
         _, own, other, _ = self.sides
-        gaps: FloatArray = (self.base[own] - self.base[other]) + (place[own] - place[other])
-        return gaps
+        return (self.base[own] - self.base[other]) + (place[own] - place[other])
 
     def half_angles(self, place: FloatArray) -> FloatArray:
         """Return (3m,) phi; those of the coherent angles at the boundary."""

@@ -60,8 +60,7 @@ def least_squares_conformal(
     Raises:
         MetricError: there is no finite solution.
     """
-    if pins is None:
-        pins = far_pins(disk, lengths)
+    pins = far_pins(disk, lengths) if pins is None else pins
     z = pinned_least_squares(conformal_equations(disk, lengths), pins)
     if not np.isfinite(z).all():
         raise MetricError(f"the least squares conformal map of {len(disk.faces):,} triangles is not finite")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ... import Flattening, TriangleMesh, measure
-from ...base import FloatArray, IntArray
+from ...base import FloatArray
 from ...errors import MetricError
 from ...geometry import double_areas, edge_lengths, signed_double_areas
 from ...mesh import uv_seams
@@ -118,8 +118,7 @@ def uvunwrap_charts(base: Flattening) -> FloatArray:
     """With its defaults."""
     import uvunwrap
 
-    corners: IntArray = base.faces
-    mesh = uvunwrap.Mesh(base.vertices.ravel().tolist(), corners.ravel().tolist())
+    mesh = uvunwrap.Mesh(base.vertices.ravel().tolist(), base.faces.ravel().tolist())
     found = uvunwrap.generate([mesh]).meshes[0]
     return np.array(found.corner_uvs, dtype=np.float64).reshape(-1, 3, 2)
 

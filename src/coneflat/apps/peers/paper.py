@@ -13,8 +13,7 @@ from ... import PAPER, ConeflatError, read_mesh
 from ...base import Progress, plural
 from ...errors import MeshError
 from ...io import find_meshes
-from .run import Comparison, compare_methods, known_methods
-from .table import as_csv, markdown, notes, written
+from .run import Comparison, as_csv, compare_methods, known_methods, markdown, notes, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -193,11 +192,13 @@ class Reproduction:
 
     def figures(self, sight: Sight) -> dict[str, Figure]:
         """Return the paper's figures, by file name."""
+        from ..view import draw_checker, draw_cones
         from . import pictures
 
-        cones = [pictures.cone_panel(m.linear, sight, f"{m.name}: {_cones(m.linear)}") for m in self.models]
-        quality, layouts, textures = [], [], []
+        cones, quality, layouts, textures = [], [], [], []
         for model in self.models:
+            label = f"{model.name}: {plural(len(model.linear.cones), 'cone')}"
+            cones.append(sight.panel(model.linear, draw_cones, label))
             shown = model.comparison.drawn
             scale = pictures.same_scale(shown)
             quality.append(_row(pictures.quality_panels(shown, scale, sight), scale))
@@ -207,7 +208,7 @@ class Reproduction:
             )
             linear = [entry for entry in shown if entry.method == "linear"]
             own = pictures.same_scale(linear)
-            texture = pictures.texture_panel(model.linear, sight, model.name)
+            texture = sight.panel(model.linear, draw_checker, model.name)
             textures.append(_row([texture, *pictures.quality_panels(linear, own, sight)], own))
         rows = (pictures.in_rows(cones), quality, layouts, textures)
         marks = (self.models[0].linear, None, None, None)
@@ -278,10 +279,6 @@ def _row(panels: Sequence[Panel], quantities: Sequence[Quantity] = ()) -> Row:
 
     inches = 2.2  # of height
     return Row([with_room(panel, inches) for panel in panels], quantities[:1], tallest=inches)
-
-
-def _cones(result: Flattening) -> str:
-    return plural(len(result.cones), "cone")
 
 
 def _written(rows: Sequence[Sequence[object]], forms: Sequence[str]) -> list[list[str]]:

@@ -9,17 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...base import FloatArray, IntArray
 from ...geometry import signed_double_areas
 from ...io import atomic_write, check_target, make_folder
 from ...mesh import label_faces
-from ..view import draw_checker, draw_cones, draw_layout, new_figure, save_figure
-from ..view.figures.camera import Eye, eye_direction, view_aspect
+from ..view import draw_layout, new_figure, save_figure
 from ..view.figures.compose import Panel, Row, compose, text_width
 from ..view.figures.cone_marks import mark_handles
 from ..view.figures.model import draw_quantity
+from ..view.figures.projection import Eye, eye_direction, view_aspect
 from ..view.figures.uv_layout import fill_layout, layout_aspect
 from ..view.quantity import Quantity, conformal_distortion
 from .run import Comparison, Entry
@@ -30,8 +28,7 @@ if TYPE_CHECKING:
     from ... import Flattening
 
 DPI = 200.0
-# Inches.
-WIDTH, TALLEST = 10.0, 2.4
+TALLEST = 2.4  # inches
 IN_A_ROW = 5
 
 
@@ -69,18 +66,20 @@ def draw_layouts(comparison: Comparison) -> Figure:
     quantities = same_scale(shown)
     panels = [
         Panel(
-            layout_aspect(result, crop=True), partial(_fill, result, quantity), labelled(entry.method, result)
+            layout_aspect(result, crop=True),
+            partial(fill_layout, result=result, quantity=quantity, dpi=DPI),
+            labelled(entry.method, result),
         )
         for entry, quantity, result in zip(shown, quantities, turned_alike(shown), strict=True)
     ]
-    return _grid(panels, quantities[:1])
+    return figure_of(in_rows(panels, quantities[:1]))
 
 
 def draw_qualities(comparison: Comparison, sight: Sight) -> Figure:
     """Return the model with the quasi-conformal distortion of all methods, on one scale."""
     quantities = same_scale(comparison.drawn)
     panels = quality_panels(comparison.drawn, quantities, sight)
-    return _grid(panels, quantities[:1])
+    return figure_of(in_rows(panels, quantities[:1]))
 
 
 def quality_panels(entries: Sequence[Entry], quantities: Sequence[Quantity], sight: Sight) -> list[Panel]:
@@ -105,26 +104,16 @@ def _turned_like(result: Flattening, model: Flattening) -> Flattening:
     same = np.array_equal(result.faces, model.faces) and result.distortion.charts == model.distortion.charts
     if result is model or not same:
         return result
-    largest = _largest_chart(model)
-    one, other = (_centred(each.corner_uv[largest]) for each in (result, model))
-    product = np.vdot(one, other)
+    count, chart = label_faces(model.uv_faces, len(model.uv))
+    areas = np.bincount(chart, np.abs(signed_double_areas(model.corner_uv)), count)
+    # The corners of the chart of most area, as complex numbers.
+    largest = chart == areas.argmax()
+    one, other = ((each.corner_uv[largest] @ np.array([1, 1j])).ravel() for each in (result, model))
+    product = np.vdot(one - one.mean(), other - other.mean())
     if product == 0:
         return result
     turned = (result.uv @ np.array([1, 1j])) * (product / abs(product))
     return replace(result, uv=np.stack([turned.real, turned.imag], axis=1))
-
-
-def _largest_chart(result: Flattening) -> IntArray:
-    """Return the triangles of the chart of most area."""
-    count, chart = label_faces(result.uv_faces, len(result.uv))
-    areas = np.bincount(chart, np.abs(signed_double_areas(result.corner_uv)), count)
-    return np.flatnonzero(chart == areas.argmax())
-
-
-def _centred(corner_uv: FloatArray) -> NDArray[np.complex128]:
-    """Return the corners of triangles in the plane, as complex numbers around their mean."""
-    corners = (corner_uv @ np.array([1, 1j])).ravel()
-    return np.asarray(corners - corners.mean())
 
 
 def labelled(method: str, result: Flattening) -> str:
@@ -144,16 +133,6 @@ def same_scale(entries: Sequence[Entry]) -> list[Quantity]:
     return [replace(one, scale=scale, label=name) for one, name in zip(quantities, names, strict=True)]
 
 
-def cone_panel(result: Flattening, sight: Sight, label: str) -> Panel:
-    """Return a panel of the model with its cones and seams."""
-    return sight.panel(result, draw_cones, label)
-
-
-def texture_panel(result: Flattening, sight: Sight, label: str) -> Panel:
-    """Return a panel of the model with a checkerboard."""
-    return sight.panel(result, draw_checker, label)
-
-
 def layout_panel(result: Flattening, label: str) -> Panel:
     """Return a panel of the charts."""
     return Panel(layout_aspect(result, crop=True), partial(draw_layout, result, crop=True), label)
@@ -161,7 +140,7 @@ def layout_panel(result: Flattening, label: str) -> Panel:
 
 def figure_of(rows: Sequence[Row], *, marks_of: Flattening | None = None) -> Figure:
     """Return rows of panels as wide as a page."""
-    return compose(rows, marks=[] if marks_of is None else mark_handles(marks_of), dpi=DPI, width=WIDTH)
+    return compose(rows, marks=[] if marks_of is None else mark_handles(marks_of), dpi=DPI, width=10.0)
 
 
 def in_rows(panels: Sequence[Panel], quantities: Sequence[Quantity] = ()) -> list[Row]:
@@ -173,14 +152,6 @@ def in_rows(panels: Sequence[Panel], quantities: Sequence[Quantity] = ()) -> lis
 def with_room(panel: Panel, height: float) -> Panel:
     """Return a panel that is wide enough for its label, if it is of a height in inches."""
     return replace(panel, aspect=max(panel.aspect, text_width(panel.label) / height))
-
-
-def _grid(panels: Sequence[Panel], quantities: Sequence[Quantity]) -> Figure:
-    return figure_of(in_rows(panels, quantities))
-
-
-def _fill(result: Flattening, quantity: Quantity, axes: object) -> None:
-    fill_layout(axes, result, quantity, DPI)  # type: ignore[arg-type]
 
 
 def open_folder(folder: Path, names: Iterable[str]) -> None:

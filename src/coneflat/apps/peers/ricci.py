@@ -31,8 +31,6 @@ from .shared import failure_notes, flat_metric
 LIMITS = Limits(1e-10, 200, goal=1e-13, halvings=30, largest_step=5.0)
 # Sum of the slopes at an edge, relative to their terms, that rounding makes.
 NOISE = 1e-14
-# Rounds of flips after which flipping stops, though an edge fails the condition by rounding.
-ROUNDS = 500
 
 
 def ricci_flow(
@@ -201,8 +199,7 @@ def packing_weights(sides: FloatArray, radii: FloatArray) -> FloatArray:
     with np.errstate(divide="ignore", invalid="ignore"):
         cots, squares = cotangents(sides), radii**2
         crossed = squares[:, NEXT] * cots[:, PREVIOUS] + squares[:, PREVIOUS] * cots[:, NEXT]
-        weights: FloatArray = cots + crossed / sides**2 - squares / double_areas(sides)[:, None]
-    return weights
+        return cots + crossed / sides**2 - squares / double_areas(sides)[:, None]
 
 
 def slopes(inversive: FloatArray, radii: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -237,7 +234,7 @@ def flip_to_weighted_delaunay(
     """
     twin, tail, length = triangulation.twin, triangulation.tail, triangulation.length
     flipped: list[int] = []
-    for _ in range(ROUNDS):
+    for _ in range(500):  # rounds after which flipping stops, though an edge fails the condition by rounding
         inversive = inversive_distances(triangulation, radii) if has_lengths else length
         slope, size = (each.ravel() for each in slopes(inversive.reshape(-1, 3), radii[triangulation.faces]))
         sums = slope + slope[twin]

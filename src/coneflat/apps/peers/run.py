@@ -1,9 +1,11 @@
-"""All methods on one mesh, with the same cones and the same cut."""
+"""All methods on one mesh, with the same cones and the same cut; and as tables."""
 
 from __future__ import annotations
 
+import csv
+import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from os import PathLike
@@ -13,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import ConeflatError, Flattening, MeshFile
-from ...base import Progress
+from ...base import Progress, list_some
 from ...errors import OptionError
 from .methods import METHODS, flatten_by
 from .packages import PEERS, installed_peers, run_peer
@@ -29,8 +31,6 @@ NAMING = ("seams", "forbidden_seams", "seamless", "seam_weights")
 TIMED = ("metric", "layout")
 #: The methods but those that stand in as they were used in 2008.
 COMPARED = tuple(name for name in METHODS if "/" not in name)
-# A mesh on which every method has its code loaded before the clock starts: a tetrahedron and its corners.
-SMALL = np.eye(4)[:, :3] - 0.25, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,15 +127,15 @@ def compare_methods(
     entries = []
     for done, name in enumerate(names, 1):
         tell(name, done)
-        if name in PEERS:
-            entries.append(_entry_of_peer(name, base))
-            continue
-        _warm_up(name)
         try:
+            if name in PEERS:
+                entries.append(Entry(name, *run_peer(name, base), PEERS[name].note))
+                continue
+            _warm_up(name)
             result = base if name == method else flatten_by(name, same, same_faces, cones=cones, **shared)
             entries.append(_entry(name, result, base))
         except ConeflatError as error:
-            entries.append(_entry_of_failure(name, error))
+            entries.append(Entry(name, None, math.nan, " ".join(str(error).split())))
     named = mesh.path if isinstance(mesh, MeshFile) else mesh if isinstance(mesh, (str, PathLike)) else None
     return Comparison("mesh" if named is None else str(named), len(base.faces), tuple(entries))
 
@@ -170,31 +170,115 @@ def _entry(name: str, result: Flattening, base: Flattening) -> Entry:
     notes = [note.rstrip(".") for note in result.notes if note not in said]
     if _cut_edges(result) != _cut_edges(base):
         notes.insert(0, "cut along other edges")
-    return Entry(name, result, _seconds(result), "; ".join(notes))
-
-
-def _seconds(result: Flattening) -> float:
-    """Return how long it took from the cones and the cut to the layout."""
-    return sum(result.seconds[stage] for stage in TIMED)
+    return Entry(name, result, sum(result.seconds[stage] for stage in TIMED), "; ".join(notes))
 
 
 def _cut_edges(result: Flattening) -> set[tuple[int, int]]:
     return {(min(pair), max(pair)) for pair in result.seams.tolist()}
 
 
-def _entry_of_peer(name: str, base: Flattening) -> Entry:
-    try:
-        result, seconds = run_peer(name, base)
-    except ConeflatError as error:
-        return _entry_of_failure(name, error)
-    return Entry(name, result, seconds, PEERS[name].note)
-
-
-def _entry_of_failure(name: str, error: ConeflatError) -> Entry:
-    return Entry(name, None, math.nan, " ".join(str(error).split()))
-
-
 def _warm_up(method: str) -> None:
-    """Load what a method needs, so that its time is that of its work."""
+    """Load what a method needs by a tetrahedron, so that its time is that of its work."""
+    vertices, faces = np.eye(4)[:, :3] - 0.25, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     with suppress(ConeflatError):
-        flatten_by(method, *SMALL, cones=dict.fromkeys(range(4), np.pi))
+        flatten_by(method, vertices, faces, cones=dict.fromkeys(range(4), np.pi))
+
+
+#: Heading of each column, and how a number below it is written.
+COLUMNS = {
+    "curvature error, pi": ".1e",
+    "QC mean": ".4f",
+    "QC 95%": ".4f",
+    "area std": ".3f",
+    "flipped": ",d",
+    "overlap": ".2%",
+    "charts": ",d",
+    "seam length": ".2f",
+    "seam mismatch": ".1e",
+    "time, s": ".2f",
+}
+
+
+def numbers(entry: Entry) -> list[float | int]:
+    """Return what the columns show of a method; NaN where there is nothing."""
+    if entry.result is None:
+        return [math.nan] * len(COLUMNS)
+    d = entry.result.distortion
+    return [
+        d.curvature_error_max,
+        d.qc_mean,
+        d.qc_p95,
+        d.area_std,
+        d.flipped + d.degenerate,
+        d.overlap,
+        d.charts,
+        d.seam_length,
+        d.seam_mismatch_max,
+        entry.seconds,
+    ]
+
+
+def written(value: float | int, form: str) -> str:
+    """Return a number as it stands in a table; nothing for NaN."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return ""
+    return format(int(value) if form.endswith("d") else value, form)
+
+
+def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table."""
+    lines = [headings, ["---"] * len(headings), *rows]
+    return "".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |\n" for line in lines)
+
+
+def comparison_rows(comparison: Comparison) -> list[list[str]]:
+    """Return a row of text for each method, without its note."""
+    return [
+        [entry.method, *(written(n, form) for n, form in zip(numbers(entry), COLUMNS.values(), strict=True))]
+        for entry in comparison.entries
+    ]
+
+
+def comparison_markdown(comparison: Comparison) -> str:
+    """Return the methods in a table, and what is to be said of them."""
+    return f"{markdown(['method', *COLUMNS], comparison_rows(comparison))}\n{notes([comparison])}"
+
+
+def notes(comparisons: Sequence[Comparison]) -> str:
+    """Return a line for each note that methods have, with the meshes that it is about where there are several."""
+    meshes: dict[tuple[str, str], list[str]] = {}
+    for comparison in comparisons:
+        for entry in comparison.entries:
+            if entry.note:
+                meshes.setdefault((entry.method, entry.note), []).append(comparison.name)
+    about = len(comparisons) > 1
+    return "".join(
+        f"- {method}{f' ({list_some(names)})' if about else ''}: {note}.\n"
+        for (method, note), names in sorted(meshes.items())
+    )
+
+
+def comparison_csv(comparison: Comparison) -> str:
+    """Return the methods as comma separated values, at full precision."""
+    rows = [[entry.method, *numbers(entry), entry.note] for entry in comparison.entries]
+    return as_csv(["method", *COLUMNS, "note"], rows)
+
+
+def as_csv(headings: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """Return comma separated values; NaN is left empty."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(headings)
+    for row in rows:
+        writer.writerow(["" if isinstance(value, float) and math.isnan(value) else value for value in row])
+    return file.getvalue()
+
+
+def comparison_lines(comparison: Comparison) -> Iterator[str]:
+    """Yield a line for each method, and the notes."""
+    rows = [["method", *COLUMNS], *comparison_rows(comparison)]
+    first, *widths = (max(map(len, column)) for column in zip(*rows, strict=True))
+    for name, *cells in rows:
+        numbers = (f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
+        yield "  ".join([f"{name:{first}}", *numbers]).rstrip()
+    yield from notes([comparison]).splitlines()

@@ -57,6 +57,7 @@ def flat_metric(
     curvature = angle_defect(faces, corner_angles(flat.reshape(-1, 3)), border)
     error = np.where(border, 0.0, np.abs(curvature - solution.target))
     triangulation.length = flat
+    statistics = SolveStatistics(newton_steps=steps, euclidean_flips=len(flips), residual=float(error.max()))
     return FlatMetric(
         mesh=mesh,
         lengths=lengths,
@@ -65,9 +66,7 @@ def flat_metric(
         log_scale=log_scale,
         is_open=border,
         is_held=np.zeros(len(border), dtype=bool),
-        statistics=SolveStatistics(
-            newton_steps=steps, euclidean_flips=len(flips), residual=float(error.max())
-        ),
+        statistics=statistics,
         triangles=straight_triangles(triangulation, flips, len(mesh.faces)),
     ).scaled(float(np.sqrt(double_areas(lengths).sum() / double_areas(flat.reshape(-1, 3)).sum())))
 

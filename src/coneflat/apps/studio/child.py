@@ -13,31 +13,30 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
 import numpy as np
 
-from ... import ConeflatError
+from ... import ConeflatError, Flattener, Flattening
 from ...base import asking
 from ...errors import NonManifoldError, NonOrientableError
-from .frames import Head, read_frame, write_frame
+from ...io import Joined, read_joined
+from ...options import MOST_TRIANGLES
+from ..view.from_uv import shown_rows
+from ..view.page.content import Model, content_of
+from ..view.page.payload import Told, head_and_block, pack
+from ..view.quantity import Quantity, own_quantity
+from .choices import Choices
 from .known import with_prints
-
-if TYPE_CHECKING:
-    from ... import Flattener, Flattening
-    from ...io import Joined
-    from ..view.page.content import Model
-    from ..view.quantity import Quantity
+from .messages import in_page, noted, strained
+from .outputs import curve_of, quads_of, saved
+from .worker import Head, read_frame, write_frame
 
 #: Polygons from which on the first layout is shown, too: of smaller meshes the last is there as soon.
 EARLY = 20_000
-#: Triangles up to which the page gets all of a mesh, to paint and draw on, where it shows fewer.
-MOST_WHOLE = 4_000_000
 #: What stands for numbers until they are known, and what the first layout is.
 TO_COME = "…"
 FIRST = "First view: distortion is yet to be evened out, and overlaps to be parted  ·  …"
-#: Failures that a repair would mend.
-REPAIRABLE = (NonManifoldError, NonOrientableError)
 
 
 class Superseded(Exception):
@@ -106,8 +105,6 @@ class Bench:
             told: called with what is being done, and the fraction that is done.
             show: called with the first layout, in the same form, before it is what it is to be.
         """
-        from .choices import Choices
-        from .warnings import noted, strained
 
         self.result, self._most = None, job.get("most")
         source, flattener = self._open(job["mesh"], job["sha256"], told)
@@ -133,8 +130,6 @@ class Bench:
 
     def _coloured(self, job: Head, result: Flattening, name: str) -> tuple[Head, bytes]:
         """Return what the page shows of a result, with colours of the user's own; without, if there are none such."""
-        from ..view.quantity import own_quantity
-        from .wording import in_page
 
         if not job.get("color"):
             return self._picture(result, name)
@@ -147,8 +142,6 @@ class Bench:
 
     def make(self, job: Head, told: Callable[[str, float], None]) -> tuple[Head, bytes]:
         """Return what is asked for beside layouts: a file of the result, quads, or a curve."""
-        from .choices import Choices
-        from .outputs import curve_of, quads_of, saved
 
         if job["do"] == "export":
             return {}, saved(self.result, job["ending"])
@@ -165,11 +158,6 @@ class Bench:
 
         own: numbers that are shown as colours.
         """
-        from ...options import MOST_TRIANGLES
-        from ..view.from_uv import shown_rows
-        from ..view.page.content import Model, content_of
-        from ..view.page.payload import Told, head_and_block
-        from .wording import in_page
 
         told = None
         if is_first:
@@ -181,7 +169,8 @@ class Bench:
         content = content_of(result, self._most or MOST_TRIANGLES, self._model, own)
         show = "checker" if own is None else "own"
         head, block = head_and_block(result, content, None, name, "y", show, told)
-        if content.left_out and len(result.faces) <= MOST_WHOLE:
+        # All of a mesh of up to so many triangles, to paint and draw on, where the page shows fewer.
+        if content.left_out and len(result.faces) <= 4_000_000:
             head, block = with_whole(head, block, self._model, result)
         head["notes"] = [in_page(note) for note in head["notes"]]
         cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
@@ -189,8 +178,6 @@ class Bench:
         return told_of, block
 
     def _open(self, mesh: str, sha256: str, told: Callable[[str, float], None]) -> tuple[Joined, Flattener]:
-        from ... import Flattener
-        from ...io import read_joined
 
         if self._source is None or self._flattener is None or self._read != (mesh, sha256):
             told("read", 0.0)
@@ -202,7 +189,6 @@ class Bench:
 
 def with_whole(head: Head, block: bytes, model: Model, result: Flattening) -> tuple[Head, bytes]:
     """Return what the page shows of a result, and all vertices and triangles of its mesh beside."""
-    from ..view.page.payload import pack
 
     arrays = {
         "whole_places": model.places.astype(np.float32),
@@ -243,19 +229,14 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
         except Superseded:
             write_frame(answers, {"job": number, "given_up": True})
         except ConeflatError as error:
-            write_frame(answers, {"job": number, **_told_failure(error)})
+            # What a repair would mend, a button of the page does.
+            mends = isinstance(error, (NonManifoldError, NonOrientableError))
+            write_frame(answers, {"job": number, "error": in_page(str(error)), "repair": mends})
         except MemoryError:
             write_frame(answers, {"job": number, "error": "not enough memory for this mesh", "repair": False})
         except Exception as error:
             said = f"internal error, please report it: {type(error).__name__}: {error}"
             write_frame(answers, {"job": number, "error": said, "repair": False})
-
-
-def _told_failure(error: ConeflatError) -> Head:
-    """Return what the page says of a failure: what a repair would mend, a button does there."""
-    from .wording import in_page
-
-    return {"error": in_page(str(error)), "repair": isinstance(error, REPAIRABLE)}
 
 
 def main() -> None:

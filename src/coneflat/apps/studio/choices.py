@@ -1,10 +1,14 @@
-"""What the user of the studio has chosen, and what that means as options of `coneflat.flatten`."""
+"""What the user of the studio has chosen, and what that means as options of `coneflat.flatten`.
+
+Also what gives the same result without the studio: a command line, and Python.
+"""
 
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from itertools import chain, pairwise
 from types import MappingProxyType
 from typing import Any
@@ -234,7 +238,32 @@ class Choices:
         Raises:
             OptionError: they do not go together.
         """
-        words = meaning(self)
+        words = dict(self.options)
+        if self.by_hand:
+            words = {name: value for name, value in words.items() if name not in NUMBERS}
+            words["cones"] = {cone.vertex: cone.curvature for cone in self.cones} or "none"
+        elif self.cones:
+            words["required_cones"] = [cone.vertex for cone in self.cones]
+        if words.get("boundary") == "rectangle":
+            # While corners are still to be picked, the boundary is free.
+            del words["boundary"]
+            if len(self.corners) == 4:
+                words["boundary"] = dict.fromkeys(self.corners)
+        if self.cuts:
+            cut = _pairs(self.cuts)
+            words["seams"] = ("input", cut) if "seams" in words else cut
+        paint = self.paint
+        if paint.no_seam:
+            words["no_seams"] = np.array([*paint.no_seam.vertices(), *chain(*self.kept)])
+        elif self.kept:
+            words["no_seams"] = _pairs(self.kept)
+        # Of what is painted, as far as it means something: cones placed by hand or locked lie where they are.
+        if paint.no_cone and not self.by_hand:
+            locked = {cone.vertex for cone in self.cones}
+            words["forbidden_cones"] = [v for v in paint.no_cone.vertices() if v not in locked]
+        # Where all angles are given there is nothing to weigh.
+        if paint.importance and (not self.by_hand or any(cone.angle is None for cone in self.cones)):
+            words["weights"] = paint.weights()
         read_options(words)
         return words
 
@@ -243,9 +272,7 @@ class Choices:
         return {
             "options": dict(self.options),
             "by_hand": self.by_hand,
-            "cones": [
-                {"vertex": cone.vertex, "angle": cone.angle, "locked": cone.locked} for cone in self.cones
-            ],
+            "cones": [asdict(cone) for cone in self.cones],
             "cuts": [list(path) for path in self.cuts],
             "kept": [list(path) for path in self.kept],
             **({"paint": self.paint.as_plain()} if self.paint else {}),
@@ -314,51 +341,6 @@ def _checked(path: Iterable[Any]) -> Path:
     return vertices
 
 
-def meaning(chosen: Choices) -> dict[str, Any]:
-    """Return keyword arguments of `coneflat.flatten`; whether they go together is not looked at."""
-    words = dict(chosen.options)
-    if chosen.by_hand:
-        words.pop("distortion", None)
-        words.pop("cone_count", None)
-        words |= _cones_by_hand(chosen)
-    elif chosen.cones:
-        words["required_cones"] = [cone.vertex for cone in chosen.cones]
-    if words.get("boundary") == "rectangle":
-        words |= _rectangle(words.pop("boundary"), chosen)
-    if chosen.cuts:
-        cut = _pairs(chosen.cuts)
-        words["seams"] = ("input", cut) if "seams" in words else cut
-    if chosen.paint.no_seam:
-        words["no_seams"] = np.array([*chosen.paint.no_seam.vertices(), *chain(*chosen.kept)])
-    elif chosen.kept:
-        words["no_seams"] = _pairs(chosen.kept)
-    return words | _painted(chosen)
-
-
-def _cones_by_hand(chosen: Choices) -> dict[str, Any]:
-    if not chosen.cones:
-        return {"cones": "none"}
-    return {"cones": {cone.vertex: cone.curvature for cone in chosen.cones}}
-
-
-def _rectangle(boundary: str, chosen: Choices) -> dict[str, Any]:
-    """Return the corners of a rectangle; while some are still to be picked, nothing, so that the boundary is free."""
-    return {"boundary": dict.fromkeys(chosen.corners)} if len(chosen.corners) == 4 else {}
-
-
-def _painted(chosen: Choices) -> dict[str, Any]:
-    """Return what is painted, as far as it means something: cones placed by hand or locked lie where they are."""
-    paint = chosen.paint
-    words: dict[str, Any] = {}
-    if paint.no_cone and not chosen.by_hand:
-        locked = {cone.vertex for cone in chosen.cones}
-        words["forbidden_cones"] = [v for v in paint.no_cone.vertices() if v not in locked]
-    # Where all angles are given there is nothing to weigh.
-    if paint.importance and (not chosen.by_hand or any(cone.angle is None for cone in chosen.cones)):
-        words["weights"] = paint.weights()
-    return words
-
-
 def _pairs(paths: Iterable[tuple[int, ...]]) -> Any:
     edges = {tuple(sorted(edge)) for path in paths for edge in edges_of(path)}
     return np.array(sorted(edges), dtype=np.int64)
@@ -367,3 +349,69 @@ def _pairs(paths: Iterable[tuple[int, ...]]) -> Any:
 def edges_of(path: tuple[int, ...]) -> set[frozenset[int]]:
     """Return the edges that a path runs along."""
     return {frozenset(edge) for edge in pairwise(path)}
+
+
+#: Numbers that are written one by one.
+FEW = 12
+
+
+def replay(mesh: str, project: str, choices: Choices) -> dict[str, str]:
+    """Return what makes the same layout without the studio: the command line, and Python."""
+    return {"command": command_line(mesh, project, choices), "python": python_lines(mesh, choices)}
+
+
+def command_line(mesh: str, project: str, choices: Choices) -> str:
+    """Return a command that flattens a mesh by what was chosen; what was drawn or painted needs the project's file."""
+    if choices.cuts or choices.kept or choices.paint:
+        return shlex.join(["coneflat", "flatten", "--project", project])
+    parts = ["coneflat", "flatten", mesh]
+    for name, value in choices.keywords().items():
+        flag = "--" + name.replace("_", "-")
+        if name == "repair":
+            parts += ["--repair"] if value else []
+        elif name == "required_cones":
+            parts += [flag, ",".join(str(vertex) for vertex in value)]
+        elif isinstance(value, dict):
+            parts += [flag, ",".join(_cone_text(vertex, curvature) for vertex, curvature in value.items())]
+        else:
+            parts += [flag, repr(value) if isinstance(value, float) else str(value)]
+    return shlex.join(parts)
+
+
+def python_lines(mesh: str, choices: Choices) -> str:
+    """Return Python that flattens a mesh by what was chosen."""
+    given = [f"    {name}={_written(value)}," for name, value in choices.keywords().items()]
+    if sum(map(len, given)) > 20_000:  # letters in the panel
+        return "# What was drawn or painted is too much to be written here; the project's file has it."
+    call = "\n".join([f"result = coneflat.flatten(\n    {mesh!r},", *given, ")"])
+    return f"import coneflat\n\n{call}"
+
+
+def _cone_text(vertex: int, curvature: float | None) -> str:
+    return str(vertex) if curvature is None else f"{vertex}:{curvature!r}"
+
+
+def _written(value: Any) -> str:
+    if hasattr(value, "tolist"):
+        return repr(value.tolist())
+    if isinstance(value, tuple):
+        return f"({', '.join(_written(each) for each in value)})"
+    if isinstance(value, list) and len(value) > FEW:
+        return f"[{_ranges(value)}]"
+    if isinstance(value, dict) and len(value) > FEW:
+        # Those that have one value are together.
+        groups: dict[Any, list[int]] = {}
+        for vertex, each in value.items():
+            groups.setdefault(each, []).append(vertex)
+        if len(groups) <= FEW:
+            parts = (
+                f"**dict.fromkeys([{_ranges(sorted(group))}], {each!r})" for each, group in groups.items()
+            )
+            return f"{{{', '.join(parts)}}}"
+    return repr(value)
+
+
+def _ranges(vertices: list[int]) -> str:
+    """Return vertices, ascending, as they stand in brackets: those that follow each other as a range."""
+    runs = Region.of_runs((vertex, vertex) for vertex in vertices).runs
+    return ", ".join(str(a) if a == b else f"*range({a}, {b + 1})" for a, b in runs)

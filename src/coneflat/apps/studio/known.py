@@ -6,11 +6,9 @@ from collections import OrderedDict
 from hashlib import blake2b
 from typing import Any
 
-from .frames import Head
+from .worker import Head
 
 Picture = tuple[Head, bytes]
-#: Pictures of which it is known what was in them: more than the page can be behind by.
-MOST = 16
 
 
 def with_prints(head: Head, block: bytes) -> Head:
@@ -36,7 +34,7 @@ class Known:
         head, block = picture
         self._count += 1
         self._prints[self._count] = {each["name"]: each["print"] for each in head["arrays"]}
-        while len(self._prints) > MOST:
+        if len(self._prints) > 16:  # pictures: more than the page can be behind by
             self._prints.popitem(last=False)
         return {**head, "number": self._count}, block
 

@@ -49,7 +49,7 @@ def saved(result: Flattening | None, ending: str) -> bytes:
     stream = BytesIO()
     if ending == ".png":
         from ..view import make_figure
-        from ..view.figures.figure import write_figure
+        from ..view.figures.compose import write_figure
 
         write_figure(make_figure(result, "layout"), stream, ending)
     else:

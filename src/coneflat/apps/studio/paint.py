@@ -147,10 +147,8 @@ class Paint:
         Raises:
             StudioError: there is none of this name.
         """
-        if flag == "no_cone":
-            return replace(self, no_cone=self.no_cone.joined(where))
-        if flag == "no_seam":
-            return replace(self, no_seam=self.no_seam.joined(where))
+        if flag in FLAGS:
+            return replace(self, **{flag: getattr(self, flag).joined(where)})
         raise StudioError(f"nothing is painted as {shown(flag)}: choose from {', '.join(FLAGS)}, importance")
 
     def weighted(self, weight: float, where: Region) -> Paint:

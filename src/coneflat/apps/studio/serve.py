@@ -23,9 +23,9 @@ def run_studio(
     port: int,
     opens: bool,
     say: Callable[[str], None],
-    tell: Callable[[str], None] | None = None,
-    color: str | None = None,
-    most_triangles: int | None = None,
+    tell: Callable[[str], None] | None,
+    color: str | None,
+    most_triangles: int,
 ) -> None:
     """Serve a session until it is interrupted.
 
@@ -46,8 +46,8 @@ def run_studio(
     server_class = studio_server()
     from .session import Session
 
-    is_project = file is not None and file.suffix.lower() == ".json"
-    session = Session(file.parent if file is not None and is_project else Path(), color, most_triangles)
+    folder = Path() if file is None or file.suffix.lower() != ".json" else file.parent
+    session = Session(folder, color, most_triangles)
     with listening(port) as listener:
         port = listener.getsockname()[1]
         token = secrets.token_urlsafe(24)

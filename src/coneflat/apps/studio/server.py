@@ -23,13 +23,12 @@ from ... import ConeflatError
 from ...errors import StudioError
 from ...io import INPUT_FORMATS
 from .guard import MOST_ASKED, Guard
-from .opening import file_within
+from .messages import in_page
 from .page import studio_page
+from .project import file_within
 from .session import Session
-from .wording import in_page
 
 MOST_UPLOADED = 512 * 1024 * 1024  # bytes of a mesh
-LONG_POLL = 20.0  # seconds that a question for news waits for some
 TYPES = {".svg": "image/svg+xml", ".obj": "text/plain", ".json": "application/json", ".png": "image/png"}
 
 
@@ -86,12 +85,7 @@ class Bell:
 
 
 def studio_app(
-    session: Session,
-    token: str,
-    port: int,
-    most_uploaded: int = MOST_UPLOADED,
-    framed: bool = False,
-    proxied: bool = False,
+    session: Session, token: str, port: int, framed: bool = False, proxied: bool = False
 ) -> ASGIApp:
     """Return the server's application.
 
@@ -99,7 +93,6 @@ def studio_app(
         session: what it shows and changes.
         token: that every request must have.
         port: at which it is served: the only one that requests may name.
-        most_uploaded: bytes of a mesh that may be dropped on the page.
         framed: notebooks of this machine may show the page in a frame.
         proxied: requests come through a proxy.
     """
@@ -110,15 +103,15 @@ def studio_app(
         return HTMLResponse(studio_page(INPUT_FORMATS))
 
     async def state(request: Request) -> Response:
-        after = request.query_params.get("after", "")
-        if _is_number(after):
-            await bell.wait_beyond(session, int(after), LONG_POLL)
-        known = request.query_params.get("chosen", "")
-        return JSONResponse(await run_sync(session.state, int(known) if _is_number(known) else 0))
+        after = _number(request, "after")
+        if isinstance(after, int):
+            await bell.wait_beyond(session, after, 20.0)  # seconds
+        known = _number(request, "chosen")
+        return JSONResponse(await run_sync(session.state, known if isinstance(known, int) else 0))
 
     async def layout(request: Request) -> Response:
-        known = request.query_params.get("known", "")
-        shown = await run_sync(session.picture, int(known) if _is_number(known) else 0)
+        known = _number(request, "known")
+        shown = await run_sync(session.picture, known if isinstance(known, int) else 0)
         if shown is None:
             raise StudioError("there is no layout yet")
         head = json.dumps(shown[0]).encode("ascii")
@@ -127,7 +120,7 @@ def studio_app(
         return Response(content, media_type="application/octet-stream")
 
     async def act(request: Request) -> Response:
-        action = json.loads(await _body(request, MOST_ASKED))
+        action = json.loads(b"".join([part async for part in _parts(request, MOST_ASKED)]))
         if not isinstance(action, dict):
             raise StudioError("an action has names and values")
         await run_sync(session.act, action)
@@ -140,7 +133,7 @@ def studio_app(
 
     async def quads(request: Request) -> Response:
         ending = f".{request.path_params['ending']}"
-        content = await run_sync(session.quads, ending, _number(request.query_params.get("count", "")))
+        content = await run_sync(session.quads, ending, _number(request, "count"))
         return Response(content, media_type=TYPES.get(ending, "application/octet-stream"))
 
     async def curve(request: Request) -> Response:
@@ -150,7 +143,7 @@ def studio_app(
         path = file_within(request.query_params.get("name", ""), session.folder)
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
             raise StudioError(f"{path.name} is no mesh that can be read: {', '.join(INPUT_FORMATS)}")
-        stored = await _store(request, path, most_uploaded)
+        stored = await _store(request, path)
         await run_sync(session.open_named, stored.name)
         return JSONResponse({"version": session.version})
 
@@ -165,36 +158,22 @@ def studio_app(
             Route("/curve", curve, methods=["POST"]),
             Route("/mesh", upload, methods=["POST"]),
         ],
-        exception_handlers={
-            ConeflatError: _said,
-            ValueError: _garbled,
-            TooLarge: _too_large,
-            ClientDisconnect: _garbled,
-        },
+        exception_handlers=dict.fromkeys((ConeflatError, ValueError, TooLarge, ClientDisconnect), _refused),
     )
     return Guard(app, token, port, framed, proxied)
 
 
-def _number(text: str) -> object:
-    """Return the number that a text of a request is, or the text."""
+def _number(request: Request, name: str) -> int | str:
+    """Return the number that a request gives by a name, or the text that is none."""
+    text = request.query_params.get(name, "")
     return int(text) if text.isdecimal() and text.isascii() and len(text) < 16 else text
 
 
-def _is_number(text: str) -> bool:
-    """Whether a request names a number."""
-    return text.isdecimal() and len(text) < 16
-
-
-async def _said(request: Request, error: Exception) -> Response:
-    return PlainTextResponse(in_page(str(error)), 400)
-
-
-async def _garbled(request: Request, error: Exception) -> Response:
-    return PlainTextResponse("this cannot be read", 400)
-
-
-async def _too_large(request: Request, error: Exception) -> Response:
-    return PlainTextResponse(str(error), 413)
+async def _refused(request: Request, error: Exception) -> Response:
+    if isinstance(error, TooLarge):
+        return PlainTextResponse(str(error), 413)
+    said = in_page(str(error)) if isinstance(error, ConeflatError) else "this cannot be read"
+    return PlainTextResponse(said, 400)
 
 
 async def _parts(request: Request, most: int) -> AsyncIterator[bytes]:
@@ -211,16 +190,12 @@ async def _parts(request: Request, most: int) -> AsyncIterator[bytes]:
         yield part
 
 
-async def _body(request: Request, most: int) -> bytes:
-    return b"".join([part async for part in _parts(request, most)])
-
-
-async def _store(request: Request, path: Path, most: int) -> Path:
+async def _store(request: Request, path: Path) -> Path:
     """Return the file that what is sent is kept in: of this name, or, where another file has it, of one like it."""
     temporary = path.with_name(f".{secrets.token_hex(8)}.upload")
     try:
         with temporary.open("xb") as stream:
-            async for part in _parts(request, most):
+            async for part in _parts(request, MOST_UPLOADED):
                 stream.write(part)
         return await run_sync(_settle, temporary, path)
     except OSError as error:

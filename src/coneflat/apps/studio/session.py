@@ -4,36 +4,34 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from ... import ConeflatError
 from ...base import shown
 from ...errors import MeshFileError, StudioError
 from ...options import as_number, as_whole
-from .choices import Choices
-from .frames import Head
+from .choices import Choices, replay
 from .known import Known
-from .opening import opened, opened_within
+from .messages import misplaced
 from .outputs import EXPORTS, MOST_QUADS, QUADS, curve_options
 from .paint import Region
-from .project import Project
-from .replay import Replay
-from .warnings import misplaced
-from .worker import Worker
+from .project import Project, file_within, opened
+from .worker import Head, Worker
 
 PATIENCE = 600.0  # seconds that saving waits for the flattening before it
 
 
 class _Layout(NamedTuple):
-    """What is shown, the cones of it, the seconds that it took, and what is to be known of it."""
+    """A layout: what is shown, the cones of it, the seconds that it took, and what is to be known of it."""
 
-    shown: tuple[Head, bytes] | None
-    found: list[int]
-    seconds: dict[str, float]
-    warnings: list[str]
+    shown: tuple[Head, bytes] | None = None
+    found: Sequence[int] = ()
+    seconds: Mapping[str, float] = MappingProxyType({})
+    warnings: Sequence[str] = ()
 
 
 def _step(change: Callable[..., Choices]) -> Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]:
@@ -142,23 +140,18 @@ class Session:
         self._sha256 = ""
         self._history = History(Choices())
         self._opened = 0  # meshes and projects until now
-        self._chosen = (
-            1  # counts changes of what is chosen, and so numbers it; 0 is nothing that anybody knows
-        )
+        # Counts changes of what is chosen, and so numbers it; 0 is nothing that anybody knows.
+        self._chosen = 1
         self._job = 0
         self._busy: dict[str, Any] | None = None
         self._trouble: dict[str, Any] | None = None
-        self._found: list[int] = []
-        self._seconds: dict[str, float] = {}
-        self._warnings: list[str] = []
-        self._misplaced: tuple[int, tuple[str, ...]] = 0, ()  # of the choices of a number
-        self._shown: tuple[Head, bytes] | None = None
+        self._now = _Layout()
+        self._of_choices: tuple[int, tuple[str, ...], dict[str, str]] = 0, (), {}
         self._known = Known()
         self._last: _Layout | None = None  # of an earlier change, while one on the way is shown
         self._questions = 0
         self._answers: dict[int, tuple[Head, bytes]] = {}
         self._curves: dict[tuple[str, str], dict[str, Any]] = {}
-        self._replay = Replay()
         self._changed = threading.Condition(threading.RLock())
         self._listeners: list[Callable[[], None]] = []
         self._worker = Worker(self._hear, self._mourn)
@@ -181,7 +174,7 @@ class Session:
             StudioError: it is no file of the folder.
             MeshFileError, ProjectError: as of `open`.
         """
-        self._begin(*opened_within(name, self.folder))
+        self._begin(*opened(file_within(name, self.folder), self.folder, only_within=True))
 
     def _begin(self, project: Project, file: Path) -> None:
         with self._changed:
@@ -189,7 +182,7 @@ class Session:
             self._history = History(project.choices)
             self._opened += 1
             self._chosen += 1
-            self._found, self._shown, self._warnings = [], None, []
+            self._now = _Layout(seconds=self._now.seconds)
             self.is_early, self._last = False, None
             self._flatten()
 
@@ -220,7 +213,7 @@ class Session:
                     self._follow(before)
             else:
                 try:
-                    chosen = STEPS[str(kind)](history.now, action, self._found)
+                    chosen = STEPS[str(kind)](history.now, action, self._now.found)
                 except (KeyError, TypeError) as error:
                     raise StudioError(f"the studio does nothing by {shown(dict(action))}") from error
                 self._take(chosen, action.get("stroke"))
@@ -283,7 +276,7 @@ class Session:
     @property
     def stages(self) -> dict[str, float]:
         """The seconds that each stage of the layout that is shown took."""
-        return dict(self._seconds)
+        return dict(self._now.seconds)
 
     def state(self, known: int = 0) -> dict[str, Any]:
         """Return all that there is to know, as plain values.
@@ -292,6 +285,7 @@ class Session:
         """
         with self._changed:
             undo, redo = self._history.depth
+            warnings, texts = self._told_of_choices()
             return {
                 "version": self.version,
                 "opened": self._opened,
@@ -302,26 +296,26 @@ class Session:
                 "redo": redo,
                 "busy": self._busy,
                 "trouble": self._trouble,
-                "layout": 0 if self._shown is None else self.layout,
+                "layout": 0 if self._now.shown is None else self.layout,
                 "early": self.is_early,
-                "found": self._found,
-                "seconds": sum(self._seconds.values()),
-                "warnings": [*self._told_misplaced(), *self._warnings],
-                **({} if known == self._chosen else self._told_choices()),
+                "found": list(self._now.found),
+                "seconds": sum(self._now.seconds.values()),
+                "warnings": [*warnings, *self._now.warnings],
+                **({} if known == self._chosen else {"choices": self._history.now.as_plain(), **texts}),
             }
 
     @property
     def _project_name(self) -> str:
         return "" if self.project_file is None else self.project_file.name
 
-    def _told_choices(self) -> dict[str, Any]:
-        chosen, name = self._history.now, None if self._mesh is None else self._mesh.name
-        return {"choices": chosen.as_plain(), **self._replay.of(name, self._project_name, chosen)}
-
-    def _told_misplaced(self) -> tuple[str, ...]:
-        if self._misplaced[0] != self._chosen:
-            self._misplaced = self._chosen, misplaced(self._history.now)
-        return self._misplaced[1]
+    def _told_of_choices(self) -> tuple[tuple[str, ...], dict[str, str]]:
+        """Return warnings of what is chosen, and what `replay` does; made once for each change."""
+        if self._of_choices[0] != self._chosen:
+            chosen, texts = self._history.now, {"command": "", "python": ""}
+            if self._mesh is not None:
+                texts = replay(self._mesh.name, self._project_name, chosen)
+            self._of_choices = self._chosen, misplaced(chosen), texts
+        return self._of_choices[1:]
 
     def picture(self, known: int = 0) -> tuple[Head, bytes] | None:
         """Return the layout that is shown: numbers and texts, and arrays; None where there is none yet.
@@ -329,7 +323,7 @@ class Session:
         known: the number of a picture whose arrays need not be told again.
         """
         with self._changed:
-            return None if self._shown is None else self._known.without(known, self._shown)
+            return None if self._now.shown is None else self._known.without(known, self._now.shown)
 
     def export(self, ending: str) -> bytes:
         """Return the result of what is chosen, as a file.
@@ -425,12 +419,13 @@ class Session:
             if "stage" in head:
                 self._busy = {"stage": head["stage"], "fraction": head["fraction"]}
             elif "early" in head:
-                self._last = self._last or _Layout(self._shown, self._found, self._seconds, self._warnings)
+                self._last = self._last or self._now
                 self._show(head["early"], body)
                 self.is_early = True
             elif "error" in head:
                 self._go_back()
-                self._trouble = {"text": head["error"], "repair": head["repair"] and not self._repairs()}
+                mends = head["repair"] and not self._history.now.options.get("repair")
+                self._trouble = {"text": head["error"], "repair": mends}
             elif "done" in head:
                 self._busy = None
                 self._show(head["done"], body)
@@ -441,15 +436,14 @@ class Session:
 
     def _show(self, told: Head, body: bytes) -> None:
         self.layout += 1
-        self._found, self._seconds = told["found"], told["seconds"]
-        self._warnings = told.get("warnings", [])
-        self._shown = self._known.numbered((told["head"], body))
+        picture = self._known.numbered((told["head"], body))
+        self._now = _Layout(picture, told["found"], told["seconds"], told.get("warnings", ()))
 
     def _go_back(self) -> None:
         """Work no more, and show the last layout that was finished instead of one on the way."""
         self._busy = None
         if self.is_early and self._last is not None and self._last.shown is not None:
-            self._shown, self._found, self._seconds, self._warnings = self._last
+            self._now = self._last
             self.layout += 1
             self.is_early, self._last = False, None
 
@@ -461,9 +455,6 @@ class Session:
             self._go_back()
             self._trouble = {"text": said, "repair": False}
             self._tell()
-
-    def _repairs(self) -> bool:
-        return bool(self._history.now.options.get("repair"))
 
     def _tell(self) -> None:
         self.version += 1

@@ -1,17 +1,25 @@
-"""The process that flattens, seen from the session: it may die, and is started again."""
+"""The process that flattens, seen from the session: it may die, and is started again.
+
+Messages to it and from it are JSON, and bytes after it.
+"""
 
 from __future__ import annotations
 
+import json
 import signal
+import struct
 import subprocess
 import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from typing import IO
+from typing import IO, Any
 
 from ...errors import StudioError
-from .frames import Head, read_frame, write_frame
+
+_SIZES = struct.Struct("<QQ")
+
+Head = dict[str, Any]
 
 COMMAND = [sys.executable, "-m", "coneflat.apps.studio.child"]
 
@@ -73,10 +81,9 @@ class Worker:
         return self._process
 
     def _listen(self, process: subprocess.Popen[bytes]) -> None:
-        stream: IO[bytes] | None = process.stdout
-        assert stream is not None
+        assert process.stdout is not None
         with suppress(OSError, ValueError):
-            while (frame := read_frame(stream)) is not None:
+            while (frame := read_frame(process.stdout)) is not None:
                 if self._process is process:
                     self._hear(*frame)
         code = process.wait()
@@ -90,3 +97,24 @@ def _end_of(code: int) -> str:
         with suppress(ValueError):
             return f"was ended by {signal.Signals(-code).name}, for want of memory perhaps"
     return f"ended with code {code}"
+
+
+def write_frame(stream: IO[bytes], head: Head, body: bytes = b"") -> None:
+    """Write a message."""
+    text = json.dumps(head).encode("ascii")
+    stream.write(_SIZES.pack(len(text), len(body)) + text)
+    if body:
+        stream.write(body)
+    stream.flush()
+
+
+def read_frame(stream: IO[bytes]) -> tuple[Head, bytes] | None:
+    """Return the next message, or None where the other side has ended."""
+    sizes = stream.read(_SIZES.size)
+    if len(sizes) < _SIZES.size:
+        return None
+    head_size, body_size = _SIZES.unpack(sizes)
+    text, body = stream.read(head_size), stream.read(body_size)
+    if len(text) < head_size or len(body) < body_size:
+        return None
+    return json.loads(text), body

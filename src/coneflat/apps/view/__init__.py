@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .figures.figure import FIGURE_FORMATS, check_figure_target, new_figure, save_figure
+from .figures.compose import FIGURE_FORMATS, check_figure_target, new_figure, save_figure
 from .figures.kinds import KINDS, Look, demo_figure, make_figure
 from .figures.model import draw_checker, draw_cone_curve, draw_cones, draw_curvature, draw_quality
 from .figures.projection import MeshPicture, render_mesh

@@ -7,7 +7,7 @@ import numpy as np
 from ...base import unit_exponent
 from ...errors import MeshFileError, MissingUVError
 from ...geometry import double_areas, edge_lengths
-from ...io import Joined, Mapped, cell_side, has_uv, of_file
+from ...io import Joined, Mapped, cell_side, of_file
 from ...measure import angle_sum_errors, as_rows
 from ...measure_uv import measure_mapped, uv_points
 from ...mesh import uv_seams
@@ -31,8 +31,6 @@ def own_flattening(source: Joined, *, strict: bool = False) -> Flattening | None
         MeshError: the triangles are no mesh.
         MeshFileError: UVs are too large to be shown.
     """
-    if not has_uv(source.mesh):
-        return None
     try:
         return flattening_of(of_file(source), strict=strict)
     except MissingUVError:

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 #: A colour scale of factors that is shorter would show noise as if it were distortion.
 LEAST_RANGE = 0.05
-#: Grey of what has no value: triangles without area, vertices of the boundary.
-UNDEFINED_COLOR = 3 * (0.6,)
 
 
 @dataclass(frozen=True)
@@ -58,12 +56,12 @@ class ColorScale:
         return np.asarray((values - low) / (high - low))
 
     def rgb(self, values: FloatArray) -> FloatArray:
-        """Return the colours (..., 3) of numbers, grey of NaN."""
+        """Return the colours (..., 3) of numbers; grey of NaN: triangles without area, vertices of the boundary."""
         from matplotlib import colormaps
 
         position = self.position(values)
         colors = np.asarray(colormaps[self.colors](np.nan_to_num(position)))[..., :3]
-        colors[np.isnan(position)] = UNDEFINED_COLOR
+        colors[np.isnan(position)] = 0.6
         return colors
 
     def mappable(self) -> ScalarMappable:
@@ -71,9 +69,8 @@ class ColorScale:
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import LogNorm, Normalize
 
-        return ScalarMappable(
-            (LogNorm if self.kind == "log" else Normalize)(self.low, self.high), self.colors
-        )
+        norm = LogNorm if self.kind == "log" else Normalize
+        return ScalarMappable(norm(self.low, self.high), self.colors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +127,11 @@ class Quantity:
 def conformal_distortion(result: Flattening) -> Quantity:
     """Return the quasi-conformal distortion of every triangle."""
     qc, areas = result.distortion.qc, _areas(result)
-    top = qc_top(qc, areas)
+    finite = np.isfinite(qc)
+    excess = quantile(qc[finite], areas[finite], 0.95) - 1.0 if finite.any() else 0.0
+    step = LEAST_RANGE if excess < 0.5 else 0.5
+    # The percentile rounded up, less a little: one at a step, up to rounding, stays there.
+    top = 1.0 + max(float(np.ceil(excess / step - 1e-9)) * step, LEAST_RANGE)
     ticks = [(float(x), f"{x:.4g}") for x in np.linspace(1.0, top, 3)]
     scale = ColorScale(1.0, top, "viridis_r", "linear", tuple(ticks))
     return Quantity("QC distortion", qc, areas, scale, ".3f")
@@ -186,15 +187,6 @@ def missing_angles(result: Flattening, flat: bool, mesh: TriangleMesh | None = N
     return np.where(inside, values, np.nan)
 
 
-def qc_top(qc: FloatArray, weights: FloatArray) -> float:
-    """Return the upper end of the colour scale: the 95th percentile rounded up, at least 1.05."""
-    finite = np.isfinite(qc)
-    excess = quantile(qc[finite], weights[finite], 0.95) - 1.0 if finite.any() else 0.0
-    step = LEAST_RANGE if excess < 0.5 else 0.5
-    # Less a little: a percentile at a step, up to rounding, stays there.
-    return 1.0 + max(float(np.ceil(excess / step - 1e-9)) * step, LEAST_RANGE)
-
-
 def _areas(result: Flattening) -> FloatArray:
     return double_areas(edge_lengths(result.vertices, result.faces)) / 2
 
@@ -205,11 +197,6 @@ def check_color_map(name: str) -> None:
 
     if name not in colormaps:
         raise OptionError(f"matplotlib has no colour map {name!r}; try viridis, cividis or magma")
-
-
-BEYOND = 0.01
-LEAST_RANGE = 0.5
-FILES = (".npy", ".npz")
 
 
 def own_quantity(result: Flattening, name: str, archive: Path | None = None) -> Quantity:
@@ -237,7 +224,7 @@ def own_quantity(result: Flattening, name: str, archive: Path | None = None) -> 
     values, corners = _fitted(result, label, values.astype(np.float64))
     values = np.where(np.isfinite(values), values, np.nan)
     if corners is None:
-        weights = double_areas(edge_lengths(result.vertices, result.faces)) / 2
+        weights = _areas(result)
     else:
         weights = np.bincount(corners.ravel(), minlength=len(values)).astype(np.float64)
     known = np.isfinite(values) & (weights > 0)
@@ -252,7 +239,7 @@ def _named(result: Flattening, name: str, archive: Path | None) -> tuple[str, Fl
     if name in properties:
         return name, np.asarray(properties[name])
     path, _, array = name.rpartition(":") if ".npz:" in name.lower() else (name, "", "")
-    if Path(path).suffix.lower() in FILES:
+    if Path(path).suffix.lower() in (".npy", ".npz"):
         return array or Path(path).stem, _read(Path(path), array)
     if archive is not None:
         return name, _read(archive, name)

@@ -1,17 +1,23 @@
-"""Figures of several panels in rows, each row with a card that explains its colours."""
+"""Figures: several panels in rows, each row with a card that explains its colours; made without a display, and written.
+
+Matplotlib is imported only when one is made.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from os import PathLike
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from ....errors import OptionError
+from ....io import atomic_write, checked_target
 from ..quantity import Quantity
 from .cone_marks import check_dpi
-from .figure import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,6 +45,20 @@ TEXT_COLOR = "#333333"
 
 MOST_PIXELS = 30e6
 """Four samples to the pixel and 16 bytes to the sample are held for pictures: 2 GB."""
+
+
+# What tells the time or the library's version is left out: the same figure gives the same bytes for longer.
+_METADATA: dict[str, dict[str, Any]] = {
+    ".png": {"Software": None},
+    ".svg": {"Date": None, "Creator": None},
+    ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+
+#: Endings of the files that `save_figure` writes.
+FIGURE_FORMATS = tuple(_METADATA)
+
+# TrueType fonts, since many journals refuse those of Type 3, and names in SVG that are the same each time.
+_SETTINGS = {"pdf.fonttype": 42, "svg.hashsalt": "coneflat"}
 
 
 @dataclass(frozen=True)
@@ -90,13 +110,8 @@ def compose(
         OptionError: the size leaves no room for the panels or has too many pixels, or matplotlib is not installed.
     """
     above = [Inches.LABEL * any(panel.label for panel in row.panels) for row in rows]
-    fixed = (
-        Inches.TITLE * bool(title)
-        + Inches.LEGEND * bool(marks)
-        + sum(above)
-        + Inches.GAP * (len(rows) - 1)
-        + 2 * Inches.MARGIN
-    )
+    fixed = sum(above) + Inches.GAP * (len(rows) - 1) + 2 * Inches.MARGIN
+    fixed += Inches.TITLE * bool(title) + Inches.LEGEND * bool(marks)
     least = [max(Inches.CARD_HEIGHT * len(row.quantities), 0.3) for row in rows]
     if size is None:
         natural = [min(_room(row, width) / _aspect(row), row.tallest) for row in rows]
@@ -112,16 +127,8 @@ def compose(
     figure = new_figure(*size, dpi=dpi)
     from matplotlib import rc_context
 
-    _write(
-        figure,
-        Inches.MARGIN,
-        size[1] - Inches.TITLE / 2 - Inches.MARGIN / 2,
-        title,
-        room=size[0] - 2 * Inches.MARGIN,
-        size=Points.TITLE,
-        weight="bold",
-        va="center",
-    )
+    middle, room = size[1] - Inches.TITLE / 2 - Inches.MARGIN / 2, size[0] - 2 * Inches.MARGIN
+    _write(figure, Inches.MARGIN, middle, title, room, size=Points.TITLE, weight="bold", va="center")
     top = size[1] - Inches.MARGIN - Inches.TITLE * bool(title)
     with rc_context({"font.size": Points.LABEL}):
         for row, height, label in zip(rows, heights, above, strict=True):
@@ -129,7 +136,14 @@ def compose(
             _draw_row(figure, row, top, height)
             top -= Inches.GAP
     if marks:
-        _draw_legend(figure, marks)
+        look = {"frameon": False, "fontsize": Points.SMALL, "labelcolor": TEXT_COLOR, "borderpad": 0.4}
+        look |= {
+            "loc": "lower left",
+            "bbox_to_anchor": (0.0, 0.0),
+            "handletextpad": 0.4,
+            "columnspacing": 1.4,
+        }
+        figure.legend(handles=list(marks), ncols=len(marks), **look)
     return figure
 
 
@@ -146,12 +160,8 @@ def check_pixels(size: tuple[float, float], dpi: float) -> None:
 
 def _room(row: Row, width: float) -> float:
     """Return the width left for panels."""
-    return (
-        width
-        - 2 * Inches.MARGIN
-        - Inches.GAP * (len(row.panels) - 1)
-        - (Inches.CARD + Inches.GAP) * bool(row.quantities)
-    )
+    card = (Inches.CARD + Inches.GAP) * bool(row.quantities)
+    return width - 2 * Inches.MARGIN - Inches.GAP * (len(row.panels) - 1) - card
 
 
 def _aspect(row: Row) -> float:
@@ -166,8 +176,8 @@ def _draw_row(figure: Figure, row: Row, floor: float, height: float) -> None:
         room = unit * panel.aspect
         _write(figure, left, floor + height + 0.05, panel.label, room=room, size=Points.LABEL, va="bottom")
         x, y = (Inches.SCALE_LEFT, Inches.SCALE_BELOW) if panel.is_graph else (0.0, 0.0)
-        panel.draw(_add_axes(figure, left + x, floor + y, unit * panel.aspect - x, height - y))
-        left += unit * panel.aspect + Inches.GAP
+        panel.draw(_add_axes(figure, left + x, floor + y, room - x, height - y))
+        left += room + Inches.GAP
     share = height / max(len(row.quantities), 1)
     for k, quantity in enumerate(row.quantities):
         _draw_card(figure, quantity, left, floor + height - (k + 1) * share, share)
@@ -185,16 +195,9 @@ def _draw_card(figure: Figure, quantity: Quantity, left: float, floor: float, he
     )
     for k, (name, percent) in enumerate(lines):
         y = top - Inches.LABEL - graph - Inches.TICKS - k * Inches.LINE
-        _write(figure, left, y, name, size=Points.SMALL, va="top")
-        _write(
-            figure,
-            left + Inches.CARD - 0.05,
-            y,
-            quantity.text(percent),
-            size=Points.SMALL,
-            va="top",
-            ha="right",
-        )
+        write = partial(_write, figure, y=y, size=Points.SMALL, va="top")
+        write(left, text=name)
+        write(left + Inches.CARD - 0.05, text=quantity.text(percent), ha="right")
 
 
 def draw_histogram(axes: Axes, quantity: Quantity) -> None:
@@ -206,14 +209,8 @@ def draw_histogram(axes: Axes, quantity: Quantity) -> None:
     place = np.minimum((position * 36).astype(np.int64), 35)
     share = np.bincount(place, weights, 36)
     colors = colormaps[quantity.scale.colors](np.linspace(0.0, 1.0, 256))
-    axes.bar(
-        np.arange(36) / 36,
-        share / (share.max() or 1.0),
-        1.0 / 36,
-        align="edge",
-        color="#8d95a1",
-        zorder=1,
-    )
+    heights = share / (share.max() or 1.0)
+    axes.bar(np.arange(36) / 36, heights, 1.0 / 36, align="edge", color="#8d95a1", zorder=1)
     axes.imshow(colors[None], extent=(0.0, 1.0, -0.22, -0.04), aspect="auto", zorder=2)
     axes.set(xlim=(0.0, 1.0), ylim=(-0.22, 1.02))
     axes.set_yticks([])
@@ -224,21 +221,6 @@ def draw_histogram(axes: Axes, quantity: Quantity) -> None:
         spine.set_visible(False)
 
 
-def _draw_legend(figure: Figure, marks: Sequence[Any]) -> None:
-    figure.legend(
-        handles=list(marks),
-        loc="lower left",
-        bbox_to_anchor=(0.0, 0.0),
-        ncols=len(marks),
-        frameon=False,
-        fontsize=Points.SMALL,
-        labelcolor=TEXT_COLOR,
-        handletextpad=0.4,
-        columnspacing=1.4,
-        borderpad=0.4,
-    )
-
-
 def _add_axes(figure: Figure, left: float, floor: float, width: float, height: float) -> Axes:
     """Return axes in a box given in inches."""
     wide, tall = figure.get_size_inches()
@@ -247,12 +229,11 @@ def _add_axes(figure: Figure, left: float, floor: float, width: float, height: f
 
 def _write(figure: Figure, x: float, y: float, text: str, room: float | None = None, **look: Any) -> None:
     """Write text at a place given in inches, smaller where the room, inches, too, is too narrow for it."""
-    wide, tall = figure.get_size_inches()
     if not text:
         return
-    written = figure.text(
-        x / wide, y / tall, text, parse_math=False, **{"ha": "left", "color": TEXT_COLOR, **look}
-    )
+    wide, tall = figure.get_size_inches()
+    look = {"ha": "left", "color": TEXT_COLOR, **look}
+    written = figure.text(x / wide, y / tall, text, parse_math=False, **look)
     if room is not None:
         needed = written.get_window_extent().width / figure.dpi
         written.set_fontsize(float(look["size"]) * min(1.0, room / needed))
@@ -266,3 +247,50 @@ def text_width(text: str, size: float = Points.LABEL) -> float:
 def _legend_width(marks: Sequence[Any]) -> float:
     """Return about how wide a legend of marks is, inches."""
     return sum(0.45 + text_width(str(mark.get_label()), Points.SMALL) for mark in marks)
+
+
+def new_figure(width: float, height: float, dpi: float = 150) -> Figure:
+    """Return an empty figure of a size in inches, tied to no window and to no global state.
+
+    Raises:
+        OptionError: matplotlib is not installed.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise OptionError('figures need matplotlib: pip install "coneflat[figures]"') from error
+    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def check_figure_target(path: str | PathLike[str]) -> Path:
+    """Return the path if `save_figure` can be expected to succeed with it; worth asking before long work.
+
+    Raises:
+        UnknownFormatError: the ending is not one of `FIGURE_FORMATS`.
+        MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
+    """
+    return checked_target(path, FIGURE_FORMATS, "figures are written as")
+
+
+def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
+    """Write a figure as PNG, SVG or PDF, by the path's ending; the file is there in full or not at all.
+
+    Raises:
+        UnknownFormatError: the ending is none of these.
+        MeshFileError: the file cannot be written.
+    """
+    path = check_figure_target(path)
+    with atomic_write(path) as stream:
+        write_figure(figure, stream, path.suffix.lower())
+    return path
+
+
+def write_figure(figure: Figure, stream: IO[bytes], ending: str) -> None:
+    """Write a figure to a binary stream; ending: one of `FIGURE_FORMATS`."""
+    from matplotlib import rc_context
+
+    with rc_context(_SETTINGS):
+        figure.savefig(stream, format=ending[1:], dpi=figure.dpi, metadata=_METADATA[ending])

@@ -16,7 +16,6 @@ from ....errors import OptionError
 from ....io import CELLS, check_cells
 from ..from_uv import is_own
 from ..quantity import Quantity, check_color_map, conformal_distortion, curvature, stretch
-from .camera import Eye, eye_direction, view_aspect
 from .compose import Panel, Row, check_pixels, compose
 from .cone_marks import mark_handles
 from .model import (
@@ -28,6 +27,7 @@ from .model import (
     draw_quality,
     draw_quantity,
 )
+from .projection import Eye, eye_direction, view_aspect
 from .uv_layout import draw_layout, fill_layout, layout_aspect
 
 if TYPE_CHECKING:
@@ -89,14 +89,10 @@ class Look:
         **options: Any,
     ) -> list[Panel]:
         """Return a panel for each eye, in which a function draws the model; faces: if they are not its triangles."""
-        options |= {"up": self.up, "dpi": self.dpi}
+        draw = partial(draw, result, up=self.up, dpi=self.dpi, **options)
         vertices = result.vertices[np.unique(result.faces if faces is None else faces)]
         return [
-            Panel(
-                view_aspect(vertices, eye, self.up),
-                partial(draw, result, eye=eye, **options),
-                label * (k == 0),
-            )
+            Panel(view_aspect(vertices, eye, self.up), partial(draw, eye=eye), label * (k == 0))
             for k, eye in enumerate(self.eyes)
         ]
 
@@ -144,10 +140,8 @@ def make_figure(shown: Flattening | ConeCurve | Quads, kind: str, **look: Any) -
 
 
 def _layout(result: Flattening, look: Look) -> _Rows:
-    panel = Panel(
-        layout_aspect(result, crop=False), partial(draw_layout, result, color_charts=look.color_charts)
-    )
-    return [Row([panel])], mark_handles(result, seams=False)
+    draw = partial(draw_layout, result, color_charts=look.color_charts)
+    return [Row([Panel(layout_aspect(result, crop=False), draw)])], mark_handles(result, seams=False)
 
 
 def _checker(result: Flattening, look: Look) -> _Rows:
@@ -159,31 +153,27 @@ def _cones(result: Flattening, look: Look) -> _Rows:
 
 
 def _quality(result: Flattening, look: Look) -> _Rows:
-    rows = []
-    for measure, find in (("qc", conformal_distortion), ("scale", stretch)):
-        options: dict[str, Any] = {"measure": measure, "colors": look.colors}
-        layout = partial(draw_quality, result, on="layout", dpi=look.dpi, **options)
-        panels = [
-            *look.views(result, draw_quality, **options),
-            Panel(layout_aspect(result, crop=True), layout),
-        ]
-        rows.append(Row(panels, [find(result).recolored(look.colors)]))
-    return rows, []
+    return [_coloured(result, look, find(result)) for find in (conformal_distortion, stretch)], []
 
 
 def _color(result: Flattening, look: Look) -> _Rows:
     if look.own is None:
         raise OptionError("a figure of the kind 'color' shows numbers: give `own`")
-    own = look.own.recolored(look.colors)
+    return [_coloured(result, look, look.own)], []
+
+
+def _coloured(result: Flattening, look: Look, quantity: Quantity) -> Row:
+    """Return views of the model, and the layout, coloured by a quantity."""
+    shown = quantity.recolored(look.colors)
 
     def on_model(result: Flattening, axes: Axes, **more: Any) -> None:
-        draw_quantity(axes, result, own, **more)
+        draw_quantity(axes, result, shown, **more)
 
     def in_layout(axes: Axes) -> None:
-        fill_layout(axes, result, own, look.dpi)
+        fill_layout(axes, result, shown, look.dpi)
 
     layout = Panel(layout_aspect(result, crop=True), in_layout)
-    return [Row([*look.views(result, on_model), layout], [own])], []
+    return Row([*look.views(result, on_model), layout], [shown])
 
 
 def _curvature(result: Flattening, look: Look) -> _Rows:
@@ -202,10 +192,6 @@ def _curve(curve: ConeCurve, look: Look) -> _Rows:
     return [Row([panel], tallest=3.2)], []
 
 
-def _quads(quads: Quads, look: Look) -> _Rows:
-    return quads.figure_rows(look)
-
-
 _ROWS: dict[str, Callable[[Any, Look], _Rows]] = {
     "layout": _layout,
     "checker": _checker,
@@ -214,7 +200,7 @@ _ROWS: dict[str, Callable[[Any, Look], _Rows]] = {
     "curvature": _curvature,
     "color": _color,
     "curve": _curve,
-    "quads": _quads,
+    "quads": lambda quads, look: quads.figure_rows(look),
 }
 
 KINDS = tuple(_ROWS)
@@ -256,5 +242,4 @@ def title(result: Flattening) -> str:
         f"seam length {measures.seam_length:.2f} √area",
     ]
     source = getattr(result, "source", None)
-    name = [source.path.name] if source is not None else []
-    return "  ·  ".join(name + parts)
+    return "  ·  ".join(parts if source is None else [source.path.name, *parts])

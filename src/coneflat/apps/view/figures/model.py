@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from .... import ConeCurve
@@ -9,9 +10,8 @@ from ....base import DISTORTION, FloatArray, IntArray
 from ....errors import OptionError
 from ....io import CELLS, cell_side
 from ..quantity import Quantity, conformal_distortion, curvature, stretch
-from .camera import Eye
 from .cone_marks import draw_cones_on_model, draw_seams_on_model, pixels_of
-from .projection import MeshPicture, render_mesh
+from .projection import Eye, MeshPicture, render_mesh
 from .uv_layout import fill_layout
 
 if TYPE_CHECKING:
@@ -50,7 +50,8 @@ def draw_checker(
         OptionError: an option makes no sense.
     """
     side = cell_side(result.uv, result.uv_faces, cells)
-    picture = _show(axes, result, eye, up, dpi, corner_uv=result.corner_uv, cell=side)
+    paint = {"corner_uv": result.corner_uv, "cell": side}
+    picture = show_mesh(axes, result.vertices, result.faces, eye, up, dpi, **paint)
     if seams:
         draw_seams_on_model(axes, picture, result)
     if cones:
@@ -65,7 +66,7 @@ def draw_cones(
     Cones are red where their curvature is positive and black where it is negative, with an area that grows with it.
     Arguments and errors are those of `draw_checker`.
     """
-    picture = _show(axes, result, eye, up, dpi)
+    picture = show_mesh(axes, result.vertices, result.faces, eye, up, dpi)
     draw_seams_on_model(axes, picture, result, through=True)
     draw_cones_on_model(axes, picture, result, through=True)
 
@@ -133,10 +134,7 @@ def draw_quantity(
     axes: Axes, result: Flattening, quantity: Quantity, eye: Eye, up: str, dpi: float
 ) -> MeshPicture:
     """Draw the model coloured by a quantity, in half the light and shade: a shadow must not read as a number."""
-    return _show(axes, result, eye, up, dpi, colors=quantity.colors(), contrast=0.5)
-
-
-def _show(axes: Axes, result: Flattening, eye: Eye, up: str, dpi: float, **paint: Any) -> MeshPicture:
+    paint = {"colors": quantity.colors(), "contrast": 0.5}
     return show_mesh(axes, result.vertices, result.faces, eye, up, dpi, **paint)
 
 
@@ -167,25 +165,12 @@ def draw_cone_curve(curve: ConeCurve, axes: Axes, *, distortion: float = DISTORT
     axes.plot(curve.counts, curve.distortions, color=CURVE_COLOR, marker="o", markersize=4, linewidth=1.5)
     axes.set_ylim(0.0, 1.1 * max(float(curve.distortions.max()), distortion))
     axes.axhline(distortion, color=WANTED_COLOR, linewidth=1.0, linestyle="--")
-    axes.annotate(
-        f"E = {distortion:g}",
-        (curve.counts[-1], distortion),
-        xytext=(0, 2),
-        textcoords="offset points",
-        color=WANTED_COLOR,
-        ha="right",
-        va="bottom",
-    )
+    note: Any = partial(axes.annotate, textcoords="offset points")
+    end, look = (curve.counts[-1], distortion), {"ha": "right", "va": "bottom"}
+    note(f"E = {distortion:g}", end, xytext=(0, 2), color=WANTED_COLOR, **look)
     axes.axvline(curve.knee, color=KNEE_COLOR, linewidth=0.8, linestyle=":")
-    axes.annotate(
-        f"knee: {curve.knee} cones",
-        (curve.knee, axes.get_ylim()[1]),
-        xytext=(3, 0),
-        textcoords="offset points",
-        color=KNEE_COLOR,
-        ha="left",
-        va="top",
-    )
+    top, look = (curve.knee, axes.get_ylim()[1]), {"ha": "left", "va": "top"}
+    note(f"knee: {curve.knee} cones", top, xytext=(3, 0), color=KNEE_COLOR, **look)
     axes.set_xlabel("number of cones")
     axes.set_ylabel("area distortion E (std. of the log scale)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))

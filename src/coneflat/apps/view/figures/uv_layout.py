@@ -80,14 +80,8 @@ def draw_layout(
 def fill_layout(axes: Axes, result: Flattening, quantity: Quantity, dpi: float) -> None:
     """Draw the layout coloured by a quantity, as a picture with outlines that are lines."""
     flat = np.column_stack([result.uv, np.zeros(len(result.uv))])
-    picture = render_mesh(
-        flat,
-        result.uv_faces,
-        size=pixels_of(axes, dpi),
-        eye=(0.0, 0.0, 1.0),
-        colors=quantity.colors(),
-        contrast=0.0,
-    )
+    size, colors = pixels_of(axes, dpi), quantity.colors()
+    picture = render_mesh(flat, result.uv_faces, size=size, eye=(0.0, 0.0, 1.0), colors=colors, contrast=0.0)
     camera = picture.camera
     width, height = camera.width / camera.scale / 2, camera.height / camera.scale / 2
     x, y = camera.centre[:2]
@@ -107,14 +101,9 @@ def draw_outlines(axes: Axes, result: Flattening, paths: list[Path], width: floa
         line = PathPatch(path, fill=False, edgecolor=SEAM_COLOR, linewidth=width, joinstyle="round", zorder=2)
         axes.add_patch(line)
     model = TriangleMesh(result.vertices, result.faces)
-    ends = boundary_ends(result, model.edge_halfedges[model.is_boundary_edge, 0])
+    sides, corners = model.edge_halfedges[model.is_boundary_edge, 0], result.uv_faces.ravel()
+    ends = result.uv[np.stack([corners[end] for end in end_corners(sides)], axis=1)]
     _draw_segments(axes, ends, "boundary", color=BOUNDARY_COLOR, width=1.2 * width, zorder=2.5)
-
-
-def boundary_ends(result: Flattening, sides: IntArray) -> FloatArray:
-    """Return the (k, 2, 2) end points in the layout of half-edges (k,) of the model."""
-    corners = result.uv_faces.ravel()
-    return result.uv[np.stack([corners[end] for end in end_corners(sides)], axis=1)]
 
 
 def frame_layout(axes: Axes, result: Flattening, crop: bool) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +13,6 @@ from ....errors import ArrayShapeError, MeshError, OptionError
 from ....geometry import signed_double_areas
 from ....io import cell_side, split_at_seams
 from ....mesh import end_corners, label_faces, point_seams
-from ..colours import page_scales
 from ..quantity import ColorScale, Quantity, conformal_distortion, missing_angles, stretch
 
 if TYPE_CHECKING:
@@ -110,8 +109,8 @@ class Content:
     """A flattening as a page shows it: v vertices, u points of the layout, m triangles, c cones.
 
     Attributes:
+        model: the surface that these are of.
         places: (v, 3) vertices, moved and scaled into the unit ball.
-        centre, radius: where the ball lies in the model's units.
         point_vertex: (u,) the vertex of each point of the layout.
         uv: (u, 2) the points.
         uv_side: the root of the area of all triangles in the plane.
@@ -126,16 +125,13 @@ class Content:
         cone_curvatures: (c,) radians.
         vertex_numbers: (v,) each vertex's number in the input, or -1.
         face_numbers: (m,) each triangle's number in the result.
-        outward: 1 if triangles run anticlockwise seen from outside, else -1.
         left_out: how many triangles are not shown.
         scales: the scale of each colour map.
-        own: numbers of the user's own at vertices, or at triangles if `own_by_face`; NaN where there is none.
-        own_title: what they are called.
+        own: numbers of the user's own, at the vertices or the triangles that are shown.
     """
 
+    model: Model
     places: FloatArray
-    centre: FloatArray
-    radius: float
     point_vertex: IntArray
     uv: FloatArray
     uv_side: float
@@ -151,12 +147,9 @@ class Content:
     cone_curvatures: FloatArray
     vertex_numbers: IntArray
     face_numbers: IntArray
-    outward: int
     left_out: int
     scales: dict[str, ColorScale]
-    own: FloatArray | None = None
-    own_by_face: bool = False
-    own_title: str = ""
+    own: Quantity | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +183,12 @@ class Model:
         places, centre, radius = _into_unit_ball(result.vertices[used])
         curvature = missing_angles(result, False, mesh)[used] / np.pi
         number = np.cumsum(is_used) - 1
-        return cls(mesh, used, places, centre, radius, curvature, _outward(places[number[mesh.faces]]))
+        corners = places[number[mesh.faces]]
+        centroids = corners.mean(axis=1)
+        # Normals point away from the middle, by and large.
+        away = (centroids - centroids.mean(axis=0)) * np.cross(*sides(corners))
+        outward = -1 if float(away.sum()) < 0 else 1
+        return cls(mesh, used, places, centre, radius, curvature, outward)
 
     def is_of(self, result: Flattening) -> bool:
         """Return whether it is the surface of a result."""
@@ -244,10 +242,14 @@ def content_of(
         points, faces = np.unique(corners, return_inverse=True)
         vertices, point_vertex = np.unique(vertex[points], return_inverse=True)
     numbers = np.arange(len(result.vertices)) if result.vertex_origin is None else result.vertex_origin
+    scales = _scales(qc, scale, model.curvature)
+    if own is not None:
+        colors = "diverging" if own.scale.low < 0 < own.scale.high else "sequential"
+        scales = {"own": replace(own.scale, colors=colors), **scales}
+        own = replace(own, values=own.values[shown if own.corners is None else used[vertices]])
     return Content(
+        model=model,
         places=places[vertices],
-        centre=model.centre,
-        radius=model.radius,
         point_vertex=point_vertex.reshape(-1),
         uv=split.uv[points],
         uv_side=cell_side(split.uv, split.faces, 1.0),
@@ -263,13 +265,35 @@ def content_of(
         cone_curvatures=result.curvatures,
         vertex_numbers=numbers[used[vertices]],
         face_numbers=shown,
-        outward=model.outward,
         left_out=len(split.faces) - len(shown),
-        scales=page_scales(qc, scale, model.curvature, own),
-        own=None if own is None else own.values[shown] if own.corners is None else own.values[used][vertices],
-        own_by_face=own is not None and own.corners is None,
-        own_title="" if own is None else own.label,
+        scales=scales,
+        own=own,
     )
+
+
+def _scales(qc: Quantity, area: Quantity, curvature: FloatArray) -> dict[str, ColorScale]:
+    """Return the scale of each colour map of a page; both curvatures have that of the model.
+
+    That scale has four decades to either side of zero; almost all curvatures lie within its ends.
+
+    Args:
+        qc, area: distortion.
+        curvature: of the model, in units of pi.
+    """
+    amounts = np.abs(curvature[np.isfinite(curvature) & (curvature != 0)])
+    largest = float(np.percentile(amounts, 99.9)) if len(amounts) else 1.0
+    top = int(np.clip(np.ceil(np.log10(largest)), -12, 1))
+    superscripts = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+    powers = (top, top - 2)
+    ticks = [(10.0**power, f"10{str(power).translate(superscripts)}" if power else "1") for power in powers]
+    both = [*((-value, f"−{label}") for value, label in ticks), (0.0, "0"), *reversed(ticks)]
+    bent = ColorScale(10.0 ** (top - 4), 10.0**top, "diverging", "signed log", tuple(both))
+    return {
+        "qc": replace(qc.scale, colors="sequential"),
+        "area": replace(area.scale, colors="diverging"),
+        "curvature": bent,
+        "flat": bent,
+    }
 
 
 def outline_halfedges(mesh: TriangleMesh, uv_faces: IntArray) -> tuple[IntArray, int]:
@@ -299,10 +323,3 @@ def _charts(faces: IntArray, uv: FloatArray) -> IntArray:
     rank = np.full(count, -1, dtype=np.int64)
     rank[np.argsort(-np.bincount(chart, weights=areas, minlength=count), kind="stable")] = np.arange(count)
     return rank[chart]
-
-
-def _outward(corners: FloatArray) -> int:
-    """Return 1 if normals point away from the middle, by and large, else -1; `corners` is (m, 3, 3)."""
-    centroids = corners.mean(axis=1)
-    away = (centroids - centroids.mean(axis=0)) * np.cross(*sides(corners))
-    return -1 if float(away.sum()) < 0 else 1

@@ -26,11 +26,6 @@ from .payload import Told, as_payload, head_and_block
 if TYPE_CHECKING:
     from .... import Flattening
 
-MOST_IN_NOTEBOOK = 100_000
-"""The same in a notebook, which stores every page that it shows."""
-
-ENDINGS = (".html", ".htm")
-
 # In the order in which they must run: names are shared.
 _SCRIPTS = (
     "state", "model", "corners", "camera", "shaders", "graphics", "renderer", "marks", "gestures", "facts",
@@ -81,9 +76,9 @@ def page_of(
     content = content_of(result, most_triangles, own=own)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
-    payload = as_payload(*head_and_block(result, content, picture, name, up, show, told))
-    before_head, after_head, after_arrays = _template()
-    return "".join((before_head, payload.head, after_head, payload.arrays, after_arrays))
+    head, arrays = as_payload(*head_and_block(result, content, picture, name, up, show, told))
+    before, between, after = _template()
+    return "".join((before, head, between, arrays, after))
 
 
 def check_page(path: str | PathLike[str]) -> Path:
@@ -93,7 +88,7 @@ def check_page(path: str | PathLike[str]) -> Path:
         UnknownFormatError: it does not end with .html or .htm.
         MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
     """
-    return checked_target(path, ENDINGS, "pages are written as")
+    return checked_target(path, (".html", ".htm"), "pages are written as")
 
 
 def write_page(page: str, path: str | PathLike[str] | None) -> Path:
@@ -131,8 +126,8 @@ def open_address(address: str) -> bool:
 
 
 def notebook_html(result: Flattening) -> str:
-    """Return HTML with the page in a frame, for notebooks."""
-    page = page_of(result, most_triangles=MOST_IN_NOTEBOOK)
+    """Return HTML with the page in a frame, for notebooks, which store every page that they show."""
+    page = page_of(result, most_triangles=100_000)
     return (
         f'<iframe srcdoc="{html.escape(page)}" title="coneflat" loading="lazy" '
         f'style="width: 100%; height: 560px; border: 1px solid #8886; border-radius: 6px"></iframe>'
@@ -142,15 +137,12 @@ def notebook_html(result: Flattening) -> str:
 @cache
 def _template() -> tuple[str, str, str]:
     """Return the parts of the page before, between and after its two blocks of data."""
-    page = page_around(POLICY, DATA, script=_read("from_page.js"))
+    data = """<script type="application/json" id="head">{{head}}</script>
+<script type="text/plain" id="arrays">{{arrays}}</script>"""
+    page = page_around(POLICY, data, script=_read("from_page.js"))
     before, rest = page.split("{{head}}")
     between, after = rest.split("{{arrays}}")
     return before, between, after
-
-
-#: Where a page carries its data.
-DATA = """<script type="application/json" id="head">{{head}}</script>
-<script type="text/plain" id="arrays">{{arrays}}</script>"""
 
 
 def page_around(

@@ -1,19 +1,60 @@
-"""What the user of the studio should know of cones that were set by hand: said on the page, and noted on the result."""
+"""What the page says: messages in its words, and warnings of cones that were set by hand.
+
+The warnings are noted on the result, too.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ...base import MAX_CONE_ANGLE, MIN_CONE_ANGLE, list_some, plural
+from ...mesh import REPAIR_ADVICE
 from .choices import Choices
 from .paint import Region
 
 if TYPE_CHECKING:
     from ... import Flattening
+
+#: By the name of an option: what is written on the control that sets it.
+CONTROLS = {
+    "distortion": "Distortion",
+    "cone_count": "Number",
+    "required_cones": "Lock",
+    "forbidden_cones": "No cones",
+    "weights": "Important",
+    "seams": "Keep those of the file's UVs",
+    "no_seams": "No seams",
+    "sharp_angle": "Cut edges sharper than",
+    "hide_seams": "Hide them",
+    "boundary": "Boundary",
+    "stretch": "From angles to areas",
+    "charts": "Charts",
+    "resolution": "Texels a side",
+    "padding": "Texels between charts",
+    "repair": "Repair the mesh",
+}
+#: A flag, or a name that is no word; a name that is one means an option where a message begins with it.
+_NAMED = re.compile(
+    r"--(?P<flag>[a-z]+(?:-[a-z]+)*)(?: (?:greedy|exact|linear)\b)?"
+    rf"|\b(?P<name>{'|'.join(name for name in CONTROLS if '_' in name)})\b"
+    rf"|\A(?P<first>{'|'.join(CONTROLS)})(?= (?:must|cannot|is|needs)\b)"
+)
+
+
+def in_page(message: str) -> str:
+    """Return a message with the page's controls for options and flags; of those without one, whose flag it is."""
+    return _NAMED.sub(_control, message.replace(REPAIR_ADVICE, "repair the mesh"))
+
+
+def _control(found: re.Match[str]) -> str:
+    flag = found["flag"]
+    name = flag.replace("-", "_") if flag else found["name"] or found["first"]
+    return f"“{CONTROLS[name]}”" if name in CONTROLS else f"{found[0]} of coneflat flatten"
 
 
 def misplaced(chosen: Choices) -> tuple[str, ...]:
@@ -21,10 +62,10 @@ def misplaced(chosen: Choices) -> tuple[str, ...]:
     inside = within(chosen.paint.no_cone, [cone.vertex for cone in chosen.cones])
     if not inside:
         return ()
-    verb = "lies" if len(inside) == 1 else "lie"
+    verb, what = ("lies", "vertex") if len(inside) == 1 else ("lie", "vertices")
     return (
         f"{plural(len(inside), 'cone')} set by hand or locked {verb} where none are to be, as painted: "
-        f"{_vertices(inside)}. Searches keep off such places; what is set by hand stays.",
+        f"{what} {list_some(inside)}. Searches keep off such places; what is set by hand stays.",
     )
 
 
@@ -65,7 +106,3 @@ def strained(chosen: Choices, result: Flattening) -> tuple[str, ...]:
 def noted(result: Flattening, chosen: Choices) -> Flattening:
     """Return a result of what was chosen with what is to be known of it among its notes."""
     return replace(result, notes=(*result.notes, *misplaced(chosen), *strained(chosen, result)))
-
-
-def _vertices(vertices: list[int]) -> str:
-    return f"{'vertex' if len(vertices) == 1 else 'vertices'} {list_some(vertices)}"
