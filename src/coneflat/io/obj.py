@@ -110,7 +110,6 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
     for known, none in ((textures, -1), (normals, 0), (shading, 0)):
         if len(known):
             known.add(np.full(len(corners) - len(known), none))
-    has_colours = len(colours) == len(vertices)
     mesh = MeshFile(
         path,
         vertices=vertices.done(),
@@ -121,7 +120,7 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
             normals=normals.done() if len(normals) else None,
             newline=newline,
         ),
-        properties=dict(zip(COLOURS, colours.done().T, strict=True)) if has_colours else {},
+        properties=dict(zip(COLOURS, colours.done().T, strict=True)) if len(colours) == len(vertices) else {},
         texture=textures.done() if len(textures) else None,
         # Some programs number UV points that they do not write.
         uv=uv.done() if len(textures) and len(uv) else None,
@@ -138,11 +137,8 @@ def _uv_points(block: TextBlock, rows: IntArray) -> FloatArray:
     if len(rows) and words.counts.min() < 1:
         block.fail(int(rows[np.argmin(words.counts)]), "a UV point needs at least 1 number, but has none")
     numbers, first = words.floats(), np.cumsum(words.counts) - words.counts
-    points = np.zeros((len(rows), 2))
-    points[:, 0] = numbers[first]
-    has_v = words.counts > 1
-    points[has_v, 1] = numbers[first[has_v] + 1]
-    return points
+    second = np.where(words.counts > 1, np.append(numbers, 0)[first + 1], 0)
+    return np.stack([numbers[first], second], axis=1)
 
 
 def _directions(block: TextBlock, rows: IntArray) -> FloatArray:
