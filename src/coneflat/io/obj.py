@@ -81,6 +81,7 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
             i = int(np.argmax(counts < 3))
             block.fail(int(rows[i]), f"a face needs at least 3 corners, but has {counts[i]}")
         given, texture, normal = words.corners()
+        del words  # whose text would take room beside that of the next block
         above = len(vertices) + np.cumsum(kinds == _VERTEX)[rows]
         for polygon, text in _texts(block, kinds, newline):
             gaps[len(sizes) + polygon] += text
@@ -215,9 +216,8 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
         stream: a binary file.
         folder: where the file will be, for paths of material libraries.
     """
-    source, text = result.source, ObjText({}, None, b"\n")
+    source, text, normals = result.source, ObjText({}, None, b"\n"), None
     vertices, faces, face_corners = result.vertices, result.faces, result.face_corners
-    normals = None
     if source is not None and face_corners is not None:
         vertices, offsets, numbers = source.vertices, source.offsets, source.corners + 1
         if source.obj is not None:
