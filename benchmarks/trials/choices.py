@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from coneflat.options.reading import ASKING
+from coneflat.options.combined import ASKING
 
 from .topology import Topology
 

@@ -109,7 +109,9 @@ def merge_convex(uv: FloatArray, loops: list[Loop]) -> list[Loop]:
         if here == there:
             continue
         one, two = merged[here], merged[there]
-        joined = _joined(one, two, a, b)
+        # The first runs from a to b along the side that they share, the second back.
+        i, j = one.index(b), two.index(a)
+        joined = (one[i:] + one[:i]) + (two[j:] + two[:j])[1:-1]
         if _is_convex(uv, joined):
             merged[here] = joined
             del merged[there]
@@ -120,12 +122,6 @@ def merge_convex(uv: FloatArray, loops: list[Loop]) -> list[Loop]:
 
 def _sides(loop: Loop) -> list[tuple[Node, Node]]:
     return list(zip(loop, loop[1:] + loop[:1], strict=True))
-
-
-def _joined(one: Loop, two: Loop, a: Node, b: Node) -> Loop:
-    """Return two loops as one; the first runs from a to b along the side that they share, the second back."""
-    i, j = one.index(b), two.index(a)
-    return (one[i:] + one[:i]) + (two[j:] + two[:j])[1:-1]
 
 
 def _is_convex(uv: FloatArray, loop: Loop) -> bool:

@@ -79,13 +79,15 @@ class Joined:
         for name in ("cones", "boundary"):
             given = found.get(name)
             if isinstance(given, Mapping):
-                found[name] = {self._used(v): curvature for v, curvature in given.items()}
-                if len(found[name]) < len(given):
-                    first, second = self._same(list(given))
-                    raise OptionError(
-                        f"vertices {first} and {second} lie at the same place and have become one: name one of them, "
-                        "or add --no-weld"
-                    )
+                seen: dict[int, int] = {}
+                for vertex in given:
+                    other = seen.setdefault(self._used(vertex), vertex)
+                    if other != vertex:
+                        raise OptionError(
+                            f"vertices {other} and {vertex} lie at the same place and have become one: name one of "
+                            "them, or add --no-weld"
+                        )
+                found[name] = dict(zip(seen, given.values(), strict=True))
         for name in ("required_cones", "forbidden_cones"):
             if found.get(name) is not None:
                 found[name] = tuple(dict.fromkeys(self._used(v) for v in found[name]))
@@ -106,15 +108,6 @@ class Joined:
         """Return the vertex that is used for one; numbers of none stay, for others to refuse."""
         return int(self.used[vertex]) if 0 <= vertex < len(self.used) else vertex
 
-    def _same(self, vertices: Sequence[int]) -> tuple[int, int]:
-        """Return the first two vertices that have become one."""
-        seen: dict[int, int] = {}
-        for vertex in vertices:
-            other = seen.setdefault(self._used(vertex), vertex)
-            if other != vertex:
-                return other, vertex
-        raise AssertionError("all vertices are different")
-
 
 def join_borders(mesh: MeshFile) -> Joined:
     """Return a mesh with borders joined where two sides, and no more, have the same places and run opposite ways.
@@ -127,7 +120,9 @@ def join_borders(mesh: MeshFile) -> Joined:
     faces = faces[(faces != faces[:, [1, 2, 0]]).all(axis=1)]
     tails, heads = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
     every = np.arange(len(mesh.vertices))
-    border = _border(tails, heads, len(every))
+    order, first = sort_pairs(tails, heads, len(every))
+    # Half-edges of edges that have no other.
+    border = np.sort(order[first & np.append(first[1:], True)])
     if not len(border):
         return Joined(mesh, every)
     place = number_places(mesh.vertices)[1]
@@ -151,18 +146,9 @@ def join_borders(mesh: MeshFile) -> Joined:
     if not len(one):
         return Joined(mesh, every, left=left)
     joined = replace(
-        mesh,
-        corners=used[mesh.corners],
-        unwelded=mesh.corners,
-        welded=int(np.count_nonzero(used != every)),
+        mesh, corners=used[mesh.corners], unwelded=mesh.corners, welded=int(np.count_nonzero(used != every))
     )
     return Joined(joined, used, len(one), left)
-
-
-def _border(tails: IntArray, heads: IntArray, count: int) -> IntArray:
-    """Return the half-edges of edges that have no other."""
-    order, first = sort_pairs(tails, heads, count)
-    return np.sort(order[first & np.append(first[1:], True)])
 
 
 def _opposite(

@@ -15,7 +15,9 @@ from ..errors import ArrayShapeError, MissingUVError
 from ..mesh.polygons import fan_corners
 from .join import Joined
 from .mesh_file import MeshFile
+from .npz import read_flattening
 from .packages import as_input
+from .read import read_joined
 
 if TYPE_CHECKING:
     from ..result import Flattening
@@ -58,11 +60,7 @@ def as_mapped(
         return _of_arrays(mesh, faces, corner_uv)
     if isinstance(mesh, (str, PathLike)):
         if Path(mesh).suffix.lower() == ".npz":
-            from .npz import read_flattening
-
             return _of_result(read_flattening(mesh))
-        from .read import read_joined
-
         return of_file(read_joined(mesh, weld))
     if isinstance(mesh, MeshFile):
         return of_file(Joined(mesh, np.arange(len(mesh.vertices))))
@@ -80,14 +78,12 @@ def of_file(joined: Joined) -> Mapped:
         MissingUVError: it gives none.
     """
     mesh = joined.mesh
-    if not has_uv(mesh):
+    if mesh.texture is None or mesh.uv is None or not has_uv(mesh):
         raise MissingUVError(
             f"{mesh.path} has no UV coordinates: `coneflat flatten` makes some"
             if mesh.texture is None or mesh.uv is not None
             else f"{mesh.path} numbers UV coordinates, but does not hold them"
         )
-    assert mesh.texture is not None
-    assert mesh.uv is not None
     points = np.append(mesh.uv, [[np.nan, np.nan]], axis=0)
     texture = np.where(mesh.texture < 0, len(mesh.uv), mesh.texture)
     fans = fan_corners(mesh.offsets)
@@ -110,9 +106,8 @@ def has_uv(mesh: MeshFile) -> bool:
 
 
 def _of_result(result: Flattening) -> Mapped:
-    source = result.source
-    count = len(result.faces)
-    return Mapped(result.vertices, result.faces, result.corner_uv, count, 0, 0, source=source)
+    faces = result.faces
+    return Mapped(result.vertices, faces, result.corner_uv, len(faces), 0, 0, source=result.source)
 
 
 def _of_arrays(vertices: ArrayLike, faces: ArrayLike, corner_uv: ArrayLike | None) -> Mapped:

@@ -22,7 +22,6 @@ from ..errors import MeshFileError
 from .files import PathName, as_path, read_bytes, readable
 
 if TYPE_CHECKING:
-    from ..measure.seam_data import Rotations
     from ..result import Flattening
 
 #: The arrays that make a result. The others of an archive, those of `SeamData`, follow from them.
@@ -70,6 +69,7 @@ def read_flattening(path: PathName) -> Flattening:
 def _flattening(reading: CheckedArrays) -> Flattening:
     from ..measure.distortion import Distortion
     from ..measure.report import MEASURES
+    from ..measure.seam_data import Rotations
     from ..result import Flattening
     from ..stages import SolveStatistics
 
@@ -101,6 +101,10 @@ def _flattening(reading: CheckedArrays) -> Flattening:
     if not (np.isfinite(uv_scale) and uv_scale > 0):
         raise MeshFileError(f"{path} is no result of coneflat: its UV scale is {uv_scale:g}")
     measures: dict[str, Any] = {name: number(report.get(name)) for name in MEASURES}
+    settings, rotations = report["settings"], None
+    if report["rotation_deviation"] is not None:
+        quantum = settings.get("quantise", settings.get("quantum"))  # as it was called at first
+        rotations = Rotations(quantum, report["rotation_deviation"], tuple(report["handle_deviations"]))
     return Flattening(
         vertices=vertices,
         faces=faces,
@@ -119,25 +123,15 @@ def _flattening(reading: CheckedArrays) -> Flattening:
         ),
         seconds=report["seconds"],
         notes=notes,
-        settings=report["settings"],
+        settings=settings,
         solve=SolveStatistics(
             **{field.name: number(report.get(field.name, field.default)) for field in fields(SolveStatistics)}
         ),
-        rotations=_rotations(report),
+        rotations=rotations,
         vertex_origin=indices("vertex_origin", (n,), None),
         face_origin=indices("face_origin", (m,), None),
         lengths=floats("lengths", (m, 3)) if "lengths" in arrays else None,
     )
-
-
-def _rotations(report: dict[str, Any]) -> Rotations | None:
-    from ..measure.seam_data import Rotations
-
-    if report["rotation_deviation"] is None:
-        return None
-    settings = report["settings"]
-    quantum = settings.get("quantise", settings.get("quantum"))  # as it was called at first
-    return Rotations(quantum, report["rotation_deviation"], tuple(report["handle_deviations"]))
 
 
 Made = TypeVar("Made")
@@ -260,11 +254,11 @@ def _arrays(path: Path, content: bytes, names: Iterable[str]) -> dict[str, NDArr
     arrays: dict[str, NDArray[Any]] = {}
     left = _MOST_UNPACKED * len(content)
     with zipfile.ZipFile(BytesIO(content)) as archive:
+        held = archive.namelist()
         for name in names:
-            try:
-                member = archive.getinfo(f"{name}.npy")
-            except KeyError:
+            if f"{name}.npy" not in held:
                 continue
+            member = archive.getinfo(f"{name}.npy")
             left -= member.file_size
             if left < 0:
                 raise MeshFileError(

@@ -81,6 +81,7 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
             i = int(np.argmax(counts < 3))
             block.fail(int(rows[i]), f"a face needs at least 3 corners, but has {counts[i]}")
         given, texture, normal = words.corners()
+        del words  # whose text would take room beside that of the next block
         above = len(vertices) + np.cumsum(kinds == _VERTEX)[rows]
         for polygon, text in _texts(block, kinds, newline):
             gaps[len(sizes) + polygon] += text
@@ -110,7 +111,6 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
     for known, none in ((textures, -1), (normals, 0), (shading, 0)):
         if len(known):
             known.add(np.full(len(corners) - len(known), none))
-    has_colours = len(colours) == len(vertices)
     mesh = MeshFile(
         path,
         vertices=vertices.done(),
@@ -121,7 +121,7 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
             normals=normals.done() if len(normals) else None,
             newline=newline,
         ),
-        properties=dict(zip(COLOURS, colours.done().T, strict=True)) if has_colours else {},
+        properties=dict(zip(COLOURS, colours.done().T, strict=True)) if len(colours) == len(vertices) else {},
         texture=textures.done() if len(textures) else None,
         # Some programs number UV points that they do not write.
         uv=uv.done() if len(textures) and len(uv) else None,
@@ -138,11 +138,8 @@ def _uv_points(block: TextBlock, rows: IntArray) -> FloatArray:
     if len(rows) and words.counts.min() < 1:
         block.fail(int(rows[np.argmin(words.counts)]), "a UV point needs at least 1 number, but has none")
     numbers, first = words.floats(), np.cumsum(words.counts) - words.counts
-    points = np.zeros((len(rows), 2))
-    points[:, 0] = numbers[first]
-    has_v = words.counts > 1
-    points[has_v, 1] = numbers[first[has_v] + 1]
-    return points
+    second = np.where(words.counts > 1, np.append(numbers, 0)[first + 1], 0)
+    return np.stack([numbers[first], second], axis=1)
 
 
 def _directions(block: TextBlock, rows: IntArray) -> FloatArray:
@@ -219,9 +216,8 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
         stream: a binary file.
         folder: where the file will be, for paths of material libraries.
     """
-    source, text = result.source, ObjText({}, None, b"\n")
+    source, text, normals = result.source, ObjText({}, None, b"\n"), None
     vertices, faces, face_corners = result.vertices, result.faces, result.face_corners
-    normals = None
     if source is not None and face_corners is not None:
         vertices, offsets, numbers = source.vertices, source.offsets, source.corners + 1
         if source.obj is not None:

@@ -16,6 +16,7 @@ from ..errors import ArrayShapeError, OptionError
 from ..geometry.triangulate import triangulate
 from ..source.input_mesh import InputMesh
 from .mesh_file import MeshFile, offsets_of
+from .read import read_mesh
 from .split import split_at_seams
 
 if TYPE_CHECKING:
@@ -37,8 +38,6 @@ def as_input(mesh: Any, faces: ArrayLike | None = None) -> InputMesh:
     if faces is not None:
         return InputMesh(mesh, faces)
     if isinstance(mesh, (str, PathLike)):
-        from . import read_mesh
-
         mesh = read_mesh(mesh)
     if isinstance(mesh, MeshFile):
         triangles, corners = triangulate(mesh.vertices, mesh.corners, mesh.offsets)

@@ -95,8 +95,8 @@ class TextBlock:
         filled = np.flatnonzero(self.counts)
         starts = self._word_starts[self._first_words[filled]]
         second = self._codes[starts + 1]
-        heads[filled] = self._codes[starts].astype(np.int64) << 8
-        heads[filled] |= np.where(_is_blank(second), ord(" "), second)
+        second = np.where(_is_blank(second), np.uint8(ord(" ")), second)
+        heads[filled] = self._codes[starts].astype(np.int64) << 8 | second
         return heads
 
     def beginning_with(self, word: bytes) -> IntArray:

@@ -200,7 +200,6 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
     """Return the result with polygons in fans, as most programs read them."""
     if np.all(np.diff(offsets) == 3):
         return result
-    assert result.source is not None
     pieces = find_pieces(result.uv, result.uv_faces, offsets, face_corners)
     corners, uv_faces = pieces.fans()
     vertex = np.full(int(offsets[-1]), -1, dtype=np.int64)
@@ -234,15 +233,13 @@ def left_out(result: Flattening, ending: str) -> tuple[str, ...]:
     source = result.source
     if source is None or result.face_corners is None or ending == ".npz":
         return ()
-    notes = []
+    notes, lost = [], f"of the file are not kept in {ending}:"
     if source.scene is not None and ending != ".glb":
         tree = source.scene.data.tree
         if tree.get("materials") or len(tree.get("nodes", [])) > 1:
-            notes.append(
-                f"Nodes, materials and textures of the file are not kept in {ending}: .glb keeps them."
-            )
+            notes.append(f"Nodes, materials and textures {lost} .glb keeps them.")
     if source.obj is not None and ending != ".obj" and any(map(_MATERIAL.search, source.obj.gaps.values())):
-        notes.append(f"Groups and materials of the file are not kept in {ending}: .obj keeps them.")
+        notes.append(f"Groups and materials {lost} .obj keeps them.")
     if source.has_colours and ending != ".ply" and (source.obj is None or ending != ".obj"):
-        notes.append(f"Vertex colours of the file are not kept in {ending}: .ply keeps them.")
+        notes.append(f"Vertex colours {lost} .ply keeps them.")
     return tuple(notes)

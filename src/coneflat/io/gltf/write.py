@@ -78,12 +78,9 @@ class Glb:
     def add(self, kind: str, item: Item) -> int:
         """Put something new into a list, and return its number there: one that is free, or the next."""
         every = self.tree.setdefault(kind, [])
-        if self._free[kind]:
-            place = self._free[kind].pop()
-            every[place] = item
-            return place
-        every.append(item)
-        return len(every) - 1
+        place = self._free[kind].pop() if self._free[kind] else len(every)
+        every[place : place + 1] = [item]
+        return place
 
     def append(self, content: bytes) -> int:
         """Return where in the buffer some bytes are now."""
@@ -180,11 +177,8 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
             "scenes": [{"nodes": [0]}],
             "nodes": [{"mesh": 0, "name": "flattened"}],
             "meshes": [{"name": "flattened", "primitives": [primitive]}],
-            "materials": [],
-            "accessors": [],
-            "bufferViews": [],
-            "buffers": [],
         }
+        | {name: [] for name in ("materials", "accessors", "bufferViews", "buffers")}
     )
     glb.add_array(split.faces.reshape(-1, 1).astype("<u4"), {"componentType": 5125, "type": "SCALAR"})
     for name, kind, values in (
