@@ -233,6 +233,11 @@ class Surface:
         """The intrinsic Delaunay triangulation, and the half-edges flipped for it."""
         return intrinsic_delaunay(self.mesh, self.lengths)
 
+    def prepare(self, method: str) -> None:
+        """Find what a metric by a method will need, but on huge surfaces, where memory is what matters."""
+        if method == "exact" and len(self.mesh.faces) <= HUGE:
+            _ = self.delaunay
+
     @property
     def known_delaunay(self) -> tuple[IntrinsicTriangulation, IntArray] | None:
         """The same, if it is known or will be used again; else None."""

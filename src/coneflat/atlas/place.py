@@ -15,9 +15,9 @@ from ..errors import OptionError
 from .charts import Outlines
 
 # Columns of the grid at least, those that so many charts need, and cells of all tiles at most.
-COLUMNS, COLUMNS_PER_CHART, MOST_CELLS = 500, 24.0, 4_000_000
+COLUMNS, COLUMNS_PER_CHART, MOST_CELLS = 400, 24.0, 4_000_000
 # Changes that are tried, and work that ends them earlier, in comparisons of runs of cells: about a second.
-TRIES, WORK = 300, 40_000_000
+TRIES, WORK = 150, 40_000_000
 # So few charts may keep to the right, too, and one does in this part of the tries. Of more, that does harm.
 FEW, SET_ASIDE = 5, 0.3
 # Of more charts than MANY, those whose boxes differ by less than this factor count as alike.

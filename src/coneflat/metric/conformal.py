@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csc_matrix
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..base.compiled import compiled
@@ -24,6 +25,8 @@ LARGEST_STEP = 5.0
 COARSEST = 0.05
 # Below so many vertices a factorization takes less time than the calls that conjugate gradients are made of.
 SMALL = 200
+# Log scales that differ by less than this have nearly the same Hessian.
+NEARLY = 0.05
 # Halvings of a step at most where the surface can be doubled instead of creeping along triangles that are about to
 # break.
 HALVINGS_BOUNDED = 6
@@ -80,6 +83,7 @@ class ConformalProblem:
     last: State | None = None
     _pattern: HessianPattern | None = None
     _factor: Factor | None = None
+    _known: tuple[Inverse, FloatArray, Inverse] | None = None
 
     @cached_property
     def is_bounded(self) -> bool:
@@ -157,7 +161,7 @@ class ConformalProblem:
         if self.preconditioner is not None and len(here.place) >= SMALL:
             accuracy = min(max(state.largest, GOAL / state.largest / 4), COARSEST)
             hessian = self._pattern.matrix(state.cots, self.fixed)
-            inverse = corrected(self.preconditioner, hessian, self.fixed)
+            inverse = self._corrected(self.preconditioner, hessian, state.place)
             step = conjugate_gradients(hessian, state.residual, inverse, accuracy)
             if step is not None:
                 return np.where(self.fixed, 0.0, step), False
@@ -166,6 +170,13 @@ class ConformalProblem:
         self._factor = factorize(hessian, self._factor)
         self.preconditioner = HeldInverse(self._factor, hessian, held)
         return self.preconditioner.solve(state.residual), True
+
+    def _corrected(self, inverse: Inverse, hessian: csc_matrix, log_scale: FloatArray) -> Inverse:
+        """Return an inverse corrected for the Hessian, or for one that was nearly the same."""
+        known = self._known
+        if known is None or known[0] is not inverse or np.ptp(log_scale - known[1]) > NEARLY:
+            known = self._known = inverse, log_scale, corrected(inverse, hessian, self.fixed)
+        return known[2]
 
 
 def find_scale(

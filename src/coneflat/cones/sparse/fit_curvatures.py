@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
+from ...base.compiled import compiled
 from ..solution import TIE
 
 # What is added to the diagonal, as a share of its largest entry: cones on neighbouring vertices are nearly dependent.
@@ -72,21 +73,6 @@ class _Program:
     most: FloatArray
     total: float
 
-    def _best_free(self, state: IntArray, curvatures: FloatArray) -> tuple[IntArray, FloatArray, float]:
-        """Return the free variables, their best values with the others held, and the multiplier of the sum."""
-        free, gram = np.flatnonzero(state == 0), self.gram
-        right = -self.slope
-        if len(free) < len(state):
-            right = (right - gram @ np.where(state, curvatures, 0.0))[free]
-            gram = gram[free[:, None], free]
-        if not len(free):
-            return free, right, 0.0
-        has_sum = not math.isnan(self.total)
-        if has_sum:
-            right = np.append(right, self.total - curvatures[state != 0].sum())
-        solution = inverse_with_sum(gram, has_sum) @ right
-        return free, solution[: len(free)], float(solution[-1]) if has_sum else 0.0
-
     def _gradient(self, curvatures: FloatArray) -> tuple[FloatArray, float]:
         """Return gram k + slope (s,), and what of it counts as nothing."""
         gradient = self.gram @ curvatures + self.slope
@@ -100,7 +86,7 @@ class _Program:
         """
         state, curvatures = np.zeros(len(self.slope), dtype=np.int64), np.zeros(len(self.slope))
         for _ in range(AT_ONCE):
-            free, best, multiplier = self._best_free(state, curvatures)
+            free, best, multiplier = best_free(self.gram, self.slope, self.total, state, curvatures)
             if not len(free):
                 return None
             curvatures[free] = best
@@ -118,7 +104,7 @@ class _Program:
         size, has_sum, multiplier = len(self.slope), not math.isnan(self.total), 0.0
         state, curvatures = np.zeros(size, dtype=np.int64), self._start()
         for _ in range(20 * size + 20):
-            free, best, multiplier = self._best_free(state, curvatures)
+            free, best, multiplier = best_free(self.gram, self.slope, self.total, state, curvatures)
             # As far there as the bounds allow.
             here = curvatures[free]
             bound = np.where(best > here, self.most[free], self.least[free])
@@ -165,3 +151,48 @@ class _Program:
                 break
             curvatures = np.clip(curvatures + missing / room, self.least, self.most)
         return curvatures
+
+
+@compiled
+def best_free(
+    gram: FloatArray, slope: FloatArray, total: float, state: IntArray, curvatures: FloatArray
+) -> tuple[IntArray, FloatArray, float]:
+    """Return the free variables, in state 0, their best values with the others held, and the multiplier of the sum.
+
+    Sets of cones are fitted by the hundred: by array operations, a flattening takes up to a third longer.
+    """
+    free = np.flatnonzero(state == 0)
+    count, largest, left = len(free), 0.0, total
+    best, ones, lower = -slope[free], np.ones(count), np.empty((count, count))
+    for j in range(len(state)):
+        if state[j] != 0:
+            left -= curvatures[j]
+            for i in range(count):
+                best[i] -= gram[free[i], j] * curvatures[j]
+    for i in range(count):
+        largest = max(largest, gram[free[i], free[i]])
+    # The Cholesky factor, and what it makes of both right sides.
+    for i in range(count):
+        for j in range(i + 1):
+            value = gram[free[i], free[j]]
+            for m in range(j):
+                value -= lower[i, m] * lower[j, m]
+            lower[i, j] = math.sqrt(max(value, SMALLEST_PIVOT * largest)) if i == j else value / lower[j, j]
+        for j in range(i):
+            best[i] -= lower[i, j] * best[j]
+            ones[i] -= lower[i, j] * ones[j]
+        best[i] /= lower[i, i]
+        ones[i] /= lower[i, i]
+    sum_best, sum_ones = 0.0, 0.0
+    for i in range(count - 1, -1, -1):
+        for j in range(i + 1, count):
+            best[i] -= lower[j, i] * best[j]
+            ones[i] -= lower[j, i] * ones[j]
+        best[i] /= lower[i, i]
+        ones[i] /= lower[i, i]
+        sum_best += best[i]
+        sum_ones += ones[i]
+    if math.isnan(total) or count == 0:
+        return free, best, 0.0
+    multiplier = (sum_best - left) / sum_ones
+    return free, best - multiplier * ones, multiplier

@@ -22,6 +22,7 @@ from scipy.sparse import csc_matrix
 from ...base.arrays import BoolArray, FloatArray, IntArray
 from ...base.defaults import DISTORTION, MAX_CONE_ANGLE, MIN_CONE_ANGLE
 from ...base.text import list_some, plural
+from ...base.threads import concurrently
 from ...errors import CurvatureError, OptionError
 from ...geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths, mollify
 from ...geometry.operators import vertex_areas, weighted_areas
@@ -35,9 +36,10 @@ from .exact_model import ExactModel
 from .limits import MOST_CONES, Limits
 from .linear_model import LinearModel
 
-# How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself, as are
-# those of a size whose best misses by less.
+# How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself.
 COARSE_DOUBT = 1.35
+# Where the best set of a size misses by less than this factor of E^2, moves on the mesh may make up for it.
+NEAR = 1.15
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,9 @@ class ConeSearch:
             self._least = np.maximum(self._least, np.minimum(FULL_TURN - room[vertices], 0.0))
         self._required = self.unknowns_of(cones)
         self.exact = ExactModel(linear, self._required, limits, self._least)
-        self.restrict(usable)
+        # The exact model needs the score next, the coarse one does not.
+        with concurrently(lambda: linear.score, 2 * len(vertices)):
+            self.restrict(usable)
 
     @classmethod
     def from_mesh(cls, mesh: TriangleMesh, lengths: FloatArray | None = None, **options: Any) -> ConeSearch:
@@ -270,9 +274,7 @@ class ConeSearch:
             return False
         coarse, exact = self.coarse.best, self.exact.best
         expected = exact.energy(count + 1) * coarse.energy(count)
-        return exact.energy(count) <= COARSE_DOUBT * goal or expected <= COARSE_DOUBT * goal * coarse.energy(
-            count + 1
-        )
+        return exact.energy(count) <= NEAR * goal or expected <= NEAR * goal * coarse.energy(count + 1)
 
     def _climb(self, bound: float, most: int, count: int) -> None:
         """Find sets on the coarse model, of at most `most` cones; it is an error if none has `count` or fewer."""
