@@ -35,11 +35,11 @@ CEILINGS = {
     "apps.batch": 397,
     "apps.cli": 1478,
     "apps.peers": 1400,
-    "apps.quads": 3177,
+    "apps.quads": 3180,
     "apps.studio": 1695,
     "apps.view": 1618,
     "atlas": 1491,
-    "base": 350,
+    "base": 354,
     "cone_curve": 108,
     "cones": 2084,
     "evaluate": 194,
@@ -49,7 +49,7 @@ CEILINGS = {
     "io": 2800,
     "layout": 2245,
     "linalg": 468,
-    "measure": 823,
+    "measure": 836,
     "measure_uv": 168,
     "mesh": 712,
     "metric": 994,
@@ -57,11 +57,11 @@ CEILINGS = {
     "result": 96,
     "sample": 5,
     "seams": 178,
-    "source": 518,
-    "stages": 230,
+    "source": 522,
+    "stages": 228,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_941, 225, 25_744
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_960, 225, 25_766
 CONSTANTS, KERNELS, NAMES, LEVELS = 293, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

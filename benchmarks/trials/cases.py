@@ -191,9 +191,13 @@ _calls: Calls | None = None
 
 def _plain(options: dict[str, Any]) -> dict[str, Any]:
     """Return the options that the checks take as they are; what is odder was used up or is not of one type."""
+    values = {
+        name: value.item() if isinstance(value, np.ndarray) and not value.ndim else value
+        for name, value in options.items()
+    }
     plain = {
         name: value
-        for name, value in options.items()
+        for name, value in values.items()
         if isinstance(value, (bool, int, float, str, list, dict))
     }
     lists = ("cones", "boundary", "required_cones", "forbidden_cones")

@@ -291,10 +291,6 @@ class ConeSolution:
         """(s,) target curvature of each cone, radians."""
         return self.target[self.cones]
 
-    def shifted(self, constant: float) -> ConeSolution:
-        """Return the same solution with a constant added to the log scale."""
-        return replace(self, log_scale=self.log_scale + constant)
-
 
 @dataclass(frozen=True, eq=False)
 class Cut:

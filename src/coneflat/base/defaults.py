@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 
-#: Defaults: the area distortion allowed, radians of the sharpest cone and of the widest saddle, and
-#: the largest number of cones of a curve.
-DISTORTION, MIN_CONE_ANGLE, MAX_CONE_ANGLE, MOST_CONES = 0.2, math.pi / 2, 4 * math.pi, 30
+#: The area distortion allowed.
+DISTORTION = 0.2
+#: Radians of the sharpest cone, and of the widest saddle.
+MIN_CONE_ANGLE = math.pi / 2
+MAX_CONE_ANGLE = 4 * math.pi
+#: Cones at most, of a curve.
+MOST_CONES = 30
 #: Texels along a side of a texture, and between charts.
-RESOLUTION, PADDING = 1024, 2.0
+RESOLUTION = 1024
+PADDING = 2.0
 # A preference for hidden places of 1 makes seams ten times cheaper; with a factor of more than 1e10, the
 # lengths of seams are beneath the rounding of their costs.
 MOST_PREFERENCE = 10.0

@@ -95,13 +95,13 @@ def searches(surface: Surface, spec: ConeSpec) -> bool:
 
 def has_many_handles(surface: Surface, spec: ConeSpec) -> bool:
     """Whether a mesh has so many handles that the sparse search would take too long for the cones they need."""
-    from .sparse.limits import MOST_CONES
+    from .sparse.limits import MOST_SEARCHED
 
     mesh = surface.mesh
     if spec.strategy != "auto" or spec.has_wishes or mesh.is_boundary_vertex.any():
         return False
     # Each handle but one takes two cones of 4 pi.
-    return -mesh.euler_characteristic > MOST_CONES // 2
+    return -mesh.euler_characteristic > MOST_SEARCHED // 2
 
 
 def polyhedron_corners(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
@@ -207,7 +207,7 @@ def _searched(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holo
     mesh = surface.mesh
     only = only_choice(surface, spec)
     if only is not None:
-        return only
+        return replace(only, notes=_unmet(mesh.genus(), len(only.cones), 0.0, spec))
     search = open_search(surface, spec, watch)
     distortion, count, most = spec.distortion, spec.count, spec.max_count
     found: SparseCones | QuantisedCones

@@ -87,7 +87,7 @@ class Patches:
 
         Newton's method with the Hessian made positive triangle by triangle. All patches take their steps together, in
         one system, but every patch has its own regularisation and step length, and stops as soon as it is done or
-        stuck: `solver.newton` has one of each.
+        stuck: `linalg.newton` has one of each.
         """
         shifts = np.zeros(len(self.vertices), dtype=np.complex128)
         gap = ENOUGH - self.worst(shifts)

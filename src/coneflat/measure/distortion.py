@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, dots
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats, dots
 from ..base.compiled import compiled
-from ..errors import ArrayShapeError
+from ..base.text import list_some, shown
+from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..geometry.intrinsic import check_lengths
 from ..geometry.overlap import Overlaps, overlaps_of_mesh
 from ..geometry.straight import place_triangles
@@ -113,9 +114,11 @@ def measure(
 
     Raises:
         ArrayShapeError, NonFiniteError: the arrays do not fit the mesh, or UVs are not finite.
+        FaceIndexError: faces have indices of no vertex.
+        OptionError: cones are no vertices.
         LengthError: the lengths are no metric.
     """
-    _check_shapes(mesh, corner_uv, prescribed)
+    _check_arrays(mesh, corner_uv, cones, prescribed)
     own = None if lengths is None else check_lengths(mesh, lengths, flat=True)
     measured = measure_map(mesh, corner_uv, curvature_error, cones, own)
     found = overlaps_of_mesh(mesh.edge_halfedges, corner_uv) if overlaps is None else overlaps
@@ -125,8 +128,20 @@ def measure(
     return replace(measured, overlap=found.fraction, overlapping_pairs=len(found.pairs))
 
 
-def _check_shapes(mesh: TriangleMesh, corner_uv: FloatArray, prescribed: FloatArray | None) -> None:
-    """Refuse arrays that compiled loops would read beyond their ends."""
+def _check_arrays(
+    mesh: TriangleMesh, corner_uv: FloatArray, cones: IntArray | None, prescribed: FloatArray | None
+) -> None:
+    """Refuse what is no mesh with UVs; compiled loops would read beyond the ends of arrays."""
+    if not isinstance(mesh, TriangleMesh):
+        raise ArrayShapeError(
+            f"mesh must be a TriangleMesh, check_mesh(vertices, faces).mesh say, not {shown(mesh)}"
+        )
+    as_faces(mesh.faces, len(mesh.vertices))
+    if not np.isfinite(as_floats("corner_uv", corner_uv)).all():
+        raise NonFiniteError("corner_uv has points that are NaN or infinite")
+    bad = [] if cones is None else [v for v in np.asarray(cones).tolist() if not 0 <= v < len(mesh.vertices)]
+    if bad:
+        raise OptionError(f"cones are no vertices of the mesh: {list_some(bad)}")
     for name, found, wanted in (
         ("corner_uv", np.shape(corner_uv), (*np.shape(mesh.faces), 2)),
         (

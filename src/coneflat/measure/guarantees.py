@@ -117,7 +117,7 @@ def _upright(result: Flattening) -> Iterator[str]:
         if count
     ]
     if parts:
-        advice = "refine the mesh there" if _is_exact(result) else "--method exact has fewest"
+        advice = "refine the mesh there" if _is_exact(result) else "method exact has fewest"
         verb, broken = "is" if parts[0].startswith("1 ") else "are", result.solve.broken
         why = f" ({plural(broken, 'triangle')} broke the triangle inequality in the metric)" if broken else ""
         yield f"There {verb} {' and '.join(parts)} in the plane{why}: {advice}."

@@ -191,7 +191,7 @@ class ConeOptions(ConeNumber, ConeBounds, ConeQuanta):
             takes three to six times as many. none: none, for bounded meshes and tori. Or vertices, each with its
             curvature or without: those without have the curvatures of the least area distortion. auto:
             sparse, but none where the boundary is prescribed, the corners of a polyhedron that has few, and greedy
-            where handles need over a hundred.
+            on closed surfaces with over 51 handles.
         max_cones: Searches stop at so many cones per component.
     """
 

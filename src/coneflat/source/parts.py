@@ -156,6 +156,10 @@ class Source:
         # Asked once, as what is kept is no longer free.
         count = len(checked.mesh.faces)
         self._fits.of(count, lambda: check_memory(count))
+        if options.boundary_kind != "free" and not any(part.mesh.is_boundary_vertex.any() for part in parts):
+            notes.append(
+                "The surface has no boundary, so that none of it is flattened to a given shape or length."
+            )
         return Prepared(given, checked, tuple(notes), parts, checked.mesh.edges[marked], own)
 
     def _check(self, repair: bool) -> tuple[CheckedMesh, BoolArray]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import http.client
+import http.server
 import re
+import threading
 import urllib.error
 import urllib.request
 
@@ -77,14 +80,21 @@ def test_files_and_projects(tmp_path, monkeypatch):
         coneflat.studio(np.zeros((3, 3)), np.zeros((1, 3)))
 
 
-def test_a_frame_of_a_notebook_shows_it_and_of_no_other_page(browser, page):
+def test_a_frame_of_a_notebook_shows_it_and_of_no_other_page(browser, page, tmp_path):
     assert page.result is not None
+    (tmp_path / "index.html").write_text(page._repr_html_())
+    handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=str(tmp_path))
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
     context = browser.new_context(viewport={"width": 1200, "height": 760}, reduced_motion="reduce")
     try:
-        for place in ("http://localhost:8888/", "http://elsewhere.example/"):
-            # A page that the browser plays.
+        for place in (f"http://localhost:{server.server_port}/", "http://elsewhere.example/"):
             outer = context.new_page()
-            outer.route(place, lambda route: route.fulfill(body=page._repr_html_(), content_type="text/html"))
+            if "elsewhere" in place:
+                # A page of the web, played by the browser.
+                outer.route(
+                    place, lambda route: route.fulfill(body=page._repr_html_(), content_type="text/html")
+                )
             outer.goto(place)
             if "elsewhere" in place:
                 assert outer.frames[-1].url.startswith("chrome-error:")
@@ -102,6 +112,8 @@ def test_a_frame_of_a_notebook_shows_it_and_of_no_other_page(browser, page):
             )
     finally:
         context.close()
+        server.shutdown()
+        server.server_close()
 
 
 def test_through_a_proxy_the_token_alone_opens_it():

@@ -94,7 +94,7 @@ def nearest_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[Flo
     the Lagrangian diagonal with nothing neglected, and convergence quadratic where it stays positive.
 
     A step that would take angles more than half way to 0 or pi is shortened to that, and their weights grow. The
-    Lagrangian has a saddle point and no minimum, so that a line search as in `solver.newton` would have no measure.
+    Lagrangian has a saddle point and no minimum, so that a line search as in `linalg.newton` would have no measure.
 
     Args:
         conditions: to be fulfilled.

@@ -22,11 +22,11 @@ from .packages import PEERS, installed_peers, run_peer
 
 # Options that do not say which cones there are, nor how to get from them to a layout.
 SHARED = (
-    "repair", "strict", "solver", "seams", "sharp_angle", "forbidden_seams", "seamless", "creases", "hide_seams",
-    "seam_weights", "charts", "resolution", "padding", "tiles", "up",
+    "repair", "strict", "seams", "no_seams", "sharp_angle", "hide_seams", "seam_weights", "charts", "resolution",
+    "padding", "tiles", "up",
 )  # fmt: skip
 # Those of them that name vertices of the input.
-NAMING = ("seams", "forbidden_seams", "seamless", "seam_weights")
+NAMING = ("seams", "no_seams", "seam_weights")
 # The stages that lead from cones and cut to a layout.
 TIMED = ("metric", "layout")
 #: The methods but those that stand in as they were used in 2008.

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import FloatArray, dots
+from ...base import FloatArray, dots, shown
+from ...errors import ArrayShapeError
 from ...geometry import edge_lengths
 from .nearest import surface_distances
 from .quad_mesh import QuadMesh, least_jacobians
@@ -80,7 +81,13 @@ class QuadMeasures:
 
 
 def measure_quads(quads: QuadMesh) -> QuadMeasures:
-    """Return the measures of a quad mesh on a surface."""
+    """Return the measures of a quad mesh on a surface.
+
+    Raises:
+        ArrayShapeError: it is no `QuadMesh`.
+    """
+    if not isinstance(quads, QuadMesh):
+        raise ArrayShapeError(f"quads must be a QuadMesh, as `IntegerGrid.quads` has, not {shown(quads)}")
     points = quads.vertices
     off = np.abs(corner_angles_of(quads) - 90.0)
     length = np.linalg.norm(points[quads.edges[:, 0]] - points[quads.edges[:, 1]], axis=1)

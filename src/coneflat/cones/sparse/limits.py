@@ -13,7 +13,7 @@ from ...errors import CurvatureError, OptionError
 from ..solution import FULL_TURN, TIE
 
 # More cones than these, beside the required ones, are not searched for: a seam through them all is no use.
-MOST_CONES = 200
+MOST_SEARCHED = 200
 
 
 @dataclass(frozen=True)
@@ -94,11 +94,11 @@ class Limits:
 
     def check_available(self, usable: BoolArray, required: IntArray) -> None:
         """Raise CurvatureError if cones at (n,) usable vertices and the required ones cannot carry the curvature."""
-        if self.fewest > MOST_CONES + len(required):
+        if self.fewest > MOST_SEARCHED + len(required):
             raise CurvatureError(
                 f"a total curvature of {self.total / np.pi:.4g} pi needs {self.fewest:,} cones or more within these "
-                f"bounds, and the sparse search finds {MOST_CONES} at most: allow other angles, or choose the greedy "
-                "search (--cones greedy), which has no bounds"
+                f"bounds, and the sparse search finds {MOST_SEARCHED} at most: allow other angles, or choose the "
+                "greedy search (--cones greedy), which has no bounds"
             )
         available = np.count_nonzero(usable) + np.count_nonzero(~usable[required])
         if available < self.fewest:

@@ -33,7 +33,7 @@ from ..solution import FULL_TURN, TIE
 from .coarse_model import candidates
 from .dense_model import ConeSet, DenseModel
 from .exact_model import ExactModel
-from .limits import MOST_CONES, Limits
+from .limits import MOST_SEARCHED, Limits
 from .linear_model import LinearModel
 
 # How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself.
@@ -183,7 +183,7 @@ class ConeSearch:
     @property
     def most_cones(self) -> int:
         """The largest number of cones searched for."""
-        most = min(MOST_CONES + len(self._required), len(self.places))
+        most = min(MOST_SEARCHED + len(self._required), len(self.places))
         return most if self.limits.largest is None else min(most, self.limits.largest)
 
     def fewest(self, distortion: float = DISTORTION, most: int | None = None) -> SparseCones:
