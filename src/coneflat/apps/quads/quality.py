@@ -95,7 +95,7 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
     Examples:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
         >>> measures = coneflat.measure_quads(coneflat.quads(*square, quads=4))
-        >>> measures.quads, measures.irregular, measures.edge_mean
+        >>> measures.quads, measures.irregular, round(measures.edge_mean, 6)
         (4, 0, 0.5)
         >>> round(measures.angle_max, 6), round(measures.jacobian_min, 6)
         (0.0, 1.0)
