@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import doctest
 import subprocess
 import sys
 
@@ -104,3 +105,30 @@ print(count(6, *pairs), count.stats.cache_hits.total(), label_nodes.stats.cache_
     printed = [subprocess.run(run, capture_output=True, text=True, cwd=tmp_path).stdout for run in runs]
     # Six nodes and two edges between them.
     assert [line.split() for line in printed[1:]] == [["4", "1", "1"], ["4", "1", "0"]]
+
+
+@pytest.mark.parametrize("name", coneflat.__all__)
+def test_examples_of_public_names_run(name, tmp_path, monkeypatch):
+    """Those of its own docstring; plain values have none, and theirs are in the docstring of the package."""
+    documented = getattr(coneflat, name)
+    if isinstance(documented, (dict, str)):
+        documented = coneflat
+    if name in ("make_figure", "save_figure"):
+        pytest.importorskip("matplotlib")
+    if name == "studio":
+        pytest.importorskip("starlette")
+        pytest.importorskip("uvicorn")
+    monkeypatch.chdir(tmp_path)
+    found = doctest.DocTestFinder(recurse=False).find(
+        documented, name, globs={"coneflat": coneflat, "np": np}
+    )
+    examples = [example for test in found for example in test.examples]
+    run = [example.source for example in examples if not example.options.get(doctest.SKIP)]
+    about = [source for source in run if name in source] if documented is coneflat else run
+    assert about
+    printed = []
+    runner = doctest.DocTestRunner(verbose=False)
+    for test in found:
+        runner.run(test, out=printed.append)
+    assert "".join(printed) == ""
+    assert list(tmp_path.iterdir()) == []

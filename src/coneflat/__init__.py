@@ -1,10 +1,28 @@
 """Conformal flattening of triangle meshes with automatic cone singularities.
 
-    >>> import coneflat
-    >>> result = coneflat.flatten(vertices, faces)
-    >>> result.uv[result.uv_faces]     # (m, 3, 2), a point of the plane for every triangle corner
-
 Names are imported on first use, so that `import coneflat` takes no time.
+
+Examples:
+    A file is flattened, and every triangle corner has a point of the plane:
+
+    >>> import coneflat
+    >>> result = coneflat.flatten(coneflat.sample_path())
+    >>> result.uv[result.uv_faces].shape
+    (10600, 3, 2)
+
+    `PAPER` holds the options of the published method:
+
+    >>> coneflat.PAPER["cones"], coneflat.PAPER["method"]
+    ('greedy', 'linear')
+    >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+    >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+    >>> coneflat.flatten(vertices, faces, **coneflat.PAPER).settings["method"]
+    'linear'
+
+    `__version__` is the version of the package, as text:
+
+    >>> len(coneflat.__version__.split("."))
+    3
 """
 
 from __future__ import annotations

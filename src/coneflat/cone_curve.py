@@ -31,7 +31,7 @@ class FoundCones:
     Attributes:
         vertices: (s,) in the input's numbering.
         curvatures: (s,) radians.
-        distortion: E of the linear model with them.
+        distortion: E of the linear model with them: the standard deviation of the log of the scale, by area.
     """
 
     vertices: IntArray
@@ -45,6 +45,15 @@ class ConeCurve:
 
     Attributes:
         sets: the cones, fewer first; the distortion falls.
+
+    Examples:
+        >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+        >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+        >>> curve = coneflat.cone_curve(vertices, faces)
+        >>> curve.counts  # no fewer cones carry the curvature of a sphere
+        array([3, 4])
+        >>> curve.sets[-1].vertices
+        array([0, 1, 2, 3])
     """
 
     sets: tuple[FoundCones, ...]
@@ -95,8 +104,29 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
     """Find the cones of the largest component of a mesh, without flattening it.
 
     Args:
-        mesh, faces: as for `coneflat.flatten`, and so are the errors.
+        mesh, faces: as for `coneflat.flatten`.
         options: see below.
+
+    Returns:
+        Vertices in the input's numbering, their curvatures in radians, and the area distortion that is left; without
+        cones the arrays are empty.
+
+    Raises:
+        MeshError: the mesh cannot be flattened; see `coneflat.errors` for its kinds.
+        MeshFileError: its file cannot be read.
+        CurvatureError: no cones that are allowed carry the curvature of the surface.
+        OptionError: an option is unknown or makes no sense.
+        MetricError: the computation found no finite result.
+        TooLargeError: it does not fit into the memory that is free.
+
+    Examples:
+        >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+        >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+        >>> found = coneflat.find_cones(vertices, faces)
+        >>> found.vertices
+        array([0, 1, 2, 3])
+        >>> np.round(found.curvatures / np.pi, 6)
+        array([1., 1., 1., 1.])
     """
     asked = read_options(options, FindOptions)
     chosen = Options(**vars(asked))
@@ -117,8 +147,29 @@ def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Con
     """Search for the best cones of every number of them, on the largest component of a mesh.
 
     Args:
-        mesh, faces: as for `coneflat.flatten`, and so are the errors.
+        mesh, faces: as for `coneflat.flatten`.
         options: see below.
+
+    Returns:
+        One set of cones for each number that has one, up to `most`, fewer first. Vertices are in the input's
+        numbering, curvatures in radians.
+
+    Raises:
+        MeshError: the mesh cannot be flattened; see `coneflat.errors` for its kinds.
+        MeshFileError: its file cannot be read.
+        CurvatureError: no cones that are allowed carry the curvature of the surface.
+        OptionError: an option is unknown or makes no sense, or no set of up to `most` cones carries the curvature.
+        MetricError: the computation found no finite result.
+        TooLargeError: it does not fit into the memory that is free.
+
+    Examples:
+        >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+        >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+        >>> curve = coneflat.cone_curve(vertices, faces, most=4)
+        >>> for count, distortion in zip(curve.counts, curve.distortions):
+        ...     print(count, f"{distortion:.3f}")
+        3 0.785
+        4 0.000
     """
     asked = read_options(options, CurveOptions)
     chosen = Options(**{name: value for name, value in vars(asked).items() if name != "most"})

@@ -1,13 +1,28 @@
 """The package's exceptions; every failure a user can cause ends in one of these.
 
 All derive from `ConeflatError`. Messages are one line: what is wrong, where, and what to do about it.
+
+Examples:
+    >>> try:
+    ...     coneflat.read_mesh("missing.obj")
+    ... except coneflat.errors.MeshFileError as error:
+    ...     print(error)
+    missing.obj: there is no such file
 """
 
 from __future__ import annotations
 
 
 class ConeflatError(Exception):
-    """Base of every exception that coneflat raises on purpose."""
+    """Base of every exception that coneflat raises on purpose.
+
+    Examples:
+        >>> try:
+        ...     coneflat.flatten([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 9]])
+        ... except coneflat.ConeflatError as error:
+        ...     print(error)
+        1 face with a vertex index outside 0..2: 0; face 0 is (0, 1, 9)
+    """
 
 
 class MeshError(ConeflatError, ValueError):

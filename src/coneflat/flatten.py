@@ -64,11 +64,21 @@ def flatten(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatte
 
     Raises:
         MeshError: the mesh cannot be flattened; see `coneflat.errors` for its kinds.
+        MeshFileError: its file cannot be read.
         CurvatureError: no metric has the curvatures asked for.
         OptionError: an option makes no sense.
         SeamError: every set of seams needs forbidden edges.
         MetricError: the computation found no finite result.
         TooLargeError: it does not fit into the memory that is free.
+
+    Examples:
+        >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+        >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+        >>> result = coneflat.flatten(vertices, faces)
+        >>> result
+        <Flattening: 4 triangles, 4 cones, 1 chart, QC 1.0000>
+        >>> result.uv[result.uv_faces].shape  # a point of the plane for every triangle corner
+        (4, 3, 2)
     """
     return flatten_source(Source(as_input(mesh, faces)), read_options(options))
 

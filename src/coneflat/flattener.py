@@ -32,7 +32,15 @@ class Flattener:
         mesh, faces: as of `coneflat.flatten`; arrays must not change afterwards.
 
     Raises:
-        MeshError: it is no mesh, or its file cannot be read.
+        MeshError: it is no mesh.
+        MeshFileError: its file cannot be read.
+
+    Examples:
+        >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+        >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+        >>> flattener = coneflat.Flattener(vertices, faces)
+        >>> [len(flattener.flatten(cones=cones).cones) for cones in ([0, 1, 2], [0, 1, 2, 3])]
+        [3, 4]
     """
 
     def __init__(self, mesh: Any, faces: ArrayLike | None = None) -> None:

@@ -64,6 +64,13 @@ class UVMeasures:
         counts: the other measures by their names; see `report`.
         notes: what is left out of the measures, and what was done to the mesh, one sentence each.
         path: of the file, if there is one.
+
+    Examples:
+        >>> vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+        >>> faces = np.array([[0, 1, 2], [0, 2, 3]])
+        >>> measures = coneflat.measure_uv(vertices, faces, vertices[faces][:, :, :2])
+        >>> measures.counts["triangles"], measures.report()["flipped"], measures.notes
+        (2, 0, ())
     """
 
     mesh: TriangleMesh
@@ -125,6 +132,12 @@ def measure_uv(
     Raises:
         MissingUVError: there are no UVs, or none that are finite.
         MeshError, MeshFileError: it is no mesh, or cannot be read.
+
+    Examples:
+        >>> vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+        >>> faces = np.array([[0, 1, 2], [0, 2, 3]])
+        >>> coneflat.measure_uv(vertices, faces, vertices[faces][:, :, :2])
+        <UVMeasures: 2 triangles, 1 chart, QC 1.0000, 0 flipped, overlap 0>
     """
     return measure_mapped(as_mapped(mesh, faces, corner_uv, weld), strict=strict)
 

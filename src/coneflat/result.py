@@ -56,6 +56,15 @@ class Flattening:
             triangle corner; else None.
         source: the file it was read from, if any.
         lengths: (m, 3) the side lengths that were given as a metric of its own, column i opposite corner i; else None.
+
+    Examples:
+        >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+        >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+        >>> result = coneflat.flatten(vertices, faces)
+        >>> np.round(result.curvatures / np.pi, 6)  # all four corners are cones of half a turn
+        array([1., 1., 1., 1.])
+        >>> result.uv.shape, result.seams.shape
+        ((6, 2), (3, 2))
     """
 
     vertices: FloatArray

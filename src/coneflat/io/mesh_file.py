@@ -41,6 +41,13 @@ class MeshFile:
         normals: (k, 3) the normals that the file gives, of any length, in the directions of its positions.
         normal: (c,) index into `normals` of every corner, -1 where it has none; None where the file has none at all.
         scene: what else there is in a glTF file, which a GLB written keeps.
+
+    Examples:
+        >>> mesh = coneflat.read_mesh(coneflat.sample_path())
+        >>> len(mesh.vertices), len(mesh.offsets) - 1, len(mesh.corners)  # vertices, polygons, corners
+        (5300, 10600, 31800)
+        >>> mesh.path.name, mesh.uv is None
+        ('sample.obj', True)
     """
 
     path: Path

@@ -62,6 +62,14 @@ def read_flattening(path: PathName) -> Flattening:
 
     Raises:
         MeshFileError: the file is not there, may not be read, or is not such a result.
+
+    Examples:
+        >>> import tempfile
+        >>> result = coneflat.flatten(np.eye(4)[:, :3], [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     again = coneflat.read_flattening(result.save(folder + "/result.npz"))
+        >>> bool((again.uv == result.uv).all())
+        True
     """
     return read_archive(as_path(path), (*_NAMES, *_NEWER), _flattening)
 

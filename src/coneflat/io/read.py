@@ -60,6 +60,15 @@ def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
         MeshFileError: the file is not there, may not be read, or is not what its ending says.
         EmptyMeshError: it has no vertex or no face.
         FaceIndexError: a face names a vertex that does not exist.
+
+    Examples:
+        >>> mesh = coneflat.read_mesh(coneflat.sample_path())
+        >>> mesh.vertices.shape, mesh.triangles.shape
+        ((5300, 3), (10600, 3))
+        >>> coneflat.read_mesh("missing.obj")
+        Traceback (most recent call last):
+            ...
+        coneflat.errors.MeshFileError: missing.obj: there is no such file
     """
     path = as_path(path)
     if path == PIPE:

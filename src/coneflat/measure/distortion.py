@@ -51,6 +51,15 @@ class Distortion:
             what it is to be: 2 pi (pi on the boundary) less the curvature prescribed; NaN if none is known.
         curvature_error: ||target - K||_2 / n of the metric, in units of pi (Table 1 of the paper).
         curvature_error_max: largest |target - K|, in units of pi.
+
+    Examples:
+        >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+        >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+        >>> found = coneflat.flatten(vertices, faces).distortion
+        >>> found.flipped, found.overlapping_pairs, found.charts
+        (0, 0, 1)
+        >>> round(found.qc_mean, 6)  # a polyhedron opens without distortion
+        1.0
     """
 
     qc: FloatArray
@@ -117,6 +126,14 @@ def measure(
         FaceIndexError: faces have indices of no vertex.
         OptionError: cones are no vertices.
         LengthError: the lengths are no metric.
+
+    Examples:
+        >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+        >>> mesh = coneflat.check_mesh(*square).mesh
+        >>> stretched = mesh.vertices[mesh.faces][:, :, :2] * [2, 1]
+        >>> found = coneflat.measure(mesh, stretched)
+        >>> round(found.qc_mean, 6), found.flipped
+        (2.0, 0)
     """
     _check_arrays(mesh, corner_uv, cones, prescribed)
     own = None if lengths is None else check_lengths(mesh, lengths, flat=True)

@@ -58,6 +58,15 @@ class SeamData:
         vertex_log_scale: (n,) log of the length scale from the model to the plane, UV units per model unit: half the
             log of the area of the triangles around in the plane over that on the model. NaN where none has area.
         log_area_scale: (m,) the same of each triangle; that of `Distortion`.
+
+    Examples:
+        >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+        >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+        >>> cut = coneflat.flatten(vertices, faces).seam_data
+        >>> cut.seams.shape, cut.seam_faces.shape, cut.seam_points.shape
+        ((3, 2), (3, 2), (3, 2, 2))
+        >>> bool(np.allclose(cut.seam_scale, 1.0)), bool(np.allclose(cut.cone_angles, np.pi))
+        (True, True)
     """
 
     seams: IntArray

@@ -73,6 +73,15 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -
         DegenerateFaceError: a face uses a vertex twice.
         NonManifoldError: an edge has more than two faces, or a vertex more than one fan.
         NonOrientableError: the faces cannot be oriented consistently.
+
+    Examples:
+        >>> vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+        >>> checked = coneflat.check_mesh(vertices, [[0, 1, 2], [0, 3, 2]])
+        >>> checked.is_turned  # the second face ran the other way
+        array([False,  True])
+        >>> checked.mesh.faces
+        array([[0, 1, 2],
+               [0, 2, 3]])
     """
     points = _as_vertices(vertices)
     triangles = as_faces(faces, len(points))

@@ -65,11 +65,18 @@ def sort_pairs(one: IntArray, two: IntArray, bound: int) -> tuple[IntArray, Bool
 class TriangleMesh:
     """A manifold, consistently oriented triangle mesh without isolated vertices.
 
-    `coneflat.mesh.check.check_mesh` makes one out of arbitrary arrays, or says why it cannot.
+    The arrays are kept as they are, without a copy, and nothing is checked: neither their types and shapes nor that
+    the mesh is a manifold. `coneflat.check_mesh` makes one out of arbitrary arrays, or says why it cannot.
 
     Attributes:
-        vertices: (n, 3) positions.
-        faces: (m, 3) vertex indices.
+        vertices: (n, 3) positions, float64, in model units.
+        faces: (m, 3) vertex indices from 0, int64.
+
+    Examples:
+        >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+        >>> mesh = coneflat.check_mesh(*square).mesh
+        >>> mesh.edges.shape, int(mesh.is_boundary_edge.sum())
+        ((5, 2), 4)
     """
 
     vertices: FloatArray

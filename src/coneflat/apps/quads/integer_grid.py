@@ -70,6 +70,14 @@ def integer_grid(
         there costs at least; and the layout is relaxed with these (integer-grid maps: Bommes, Campen, Ebke, Alliez,
         Kobbelt 2013), from the smooth one by steps that turn no triangle over. Edges from cone to cone are split
         before.
+
+    Examples:
+        >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+        >>> grid = coneflat.integer_grid(*square, quads=16)
+        >>> round(grid.size, 6)  # sides of the squares, in model units
+        0.25
+        >>> grid.corners, grid.corner_quarters
+        (array([0, 1, 2, 3]), array([1, 1, 1, 1]))
     """
     wanted, name = (size, "size") if size is not None else (QUADS if quads is None else quads, "quads")
     if quads is not None and size is not None:

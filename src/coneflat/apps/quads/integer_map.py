@@ -44,6 +44,14 @@ class IntegerGrid:
         corner_quarters: (k,) the quarter turns of their angle.
         features: (f, 2) vertices of sharp edges that lie on grid lines.
         seconds: wall time of each stage; files do not keep it.
+
+    Examples:
+        >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+        >>> grid = coneflat.integer_grid(*square, quads=4)
+        >>> grid.corner_grid.shape, grid.turns.shape, grid.shifts.shape
+        ((8, 3, 2), (24,), (24, 2))
+        >>> len(grid.cones), len(coneflat.quads(grid).quads)
+        (0, 4)
     """
 
     vertices: FloatArray

@@ -35,6 +35,14 @@ class QuadMesh:
         surface: the triangle mesh.
         notes: what was done, and what falls short, one sentence each.
         seconds: wall time of each stage; files do not keep it.
+
+    Examples:
+        >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+        >>> mesh = coneflat.quads(*square, quads=9)
+        >>> len(mesh.quads), len(mesh.irregular), mesh.euler_characteristic
+        (9, 0, 1)
+        >>> mesh.barycentric.shape
+        (16, 3)
     """
 
     vertices: FloatArray

@@ -45,6 +45,12 @@ def quads(
         GridError: no grid of this size was found that turns no triangle over, or it is too coarse for quads.
         OptionError: an option makes no sense.
         MeshError, CurvatureError, SeamError, MetricError: as `coneflat.flatten`.
+
+    Examples:
+        >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+        >>> mesh = coneflat.quads(*square, quads=9)
+        >>> mesh.quads.shape, mesh.vertices.shape
+        ((9, 4), (16, 3))
     """
     progress = options.get("progress")
     if isinstance(mesh, IntegerGrid):

@@ -83,11 +83,29 @@ class QuadMeasures:
 def measure_quads(quads: QuadMesh) -> QuadMeasures:
     """Return the measures of a quad mesh on a surface.
 
+    Angles are in degrees, lengths and distances in model units; Jacobians and `edge_cv` are ratios. Distances to the
+    surface and back are the largest of samples, see `surface_gaps`.
+
+    Args:
+        quads: p quads, at least one, with q vertices on their surface, as `coneflat.quads` returns them or
+            `QuadMesh.load` reads them. Nothing of it is changed.
+
+    Returns:
+        Numbers of Python, not arrays: see `QuadMeasures`.
+
     Raises:
         ArrayShapeError: it is no `QuadMesh`.
+
+    Examples:
+        >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+        >>> measures = coneflat.measure_quads(coneflat.quads(*square, quads=4))
+        >>> measures.quads, measures.irregular, round(measures.edge_mean, 6)
+        (4, 0, 0.5)
+        >>> round(measures.angle_max, 6), round(measures.jacobian_min, 6)
+        (0.0, 1.0)
     """
     if not isinstance(quads, QuadMesh):
-        raise ArrayShapeError(f"quads must be a QuadMesh, as `IntegerGrid.quads` has, not {shown(quads)}")
+        raise ArrayShapeError(f"quads must be a QuadMesh, as `coneflat.quads` returns, not {shown(quads)}")
     points = quads.vertices
     off = np.abs(corner_angles_of(quads) - 90.0)
     length = np.linalg.norm(points[quads.edges[:, 0]] - points[quads.edges[:, 1]], axis=1)

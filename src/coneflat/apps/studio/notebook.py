@@ -189,9 +189,22 @@ def _proxied(through: str, port: int, token: str) -> str:
 def studio(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Studio:
     """Return the studio on a mesh, as a page that notebooks show; see `Studio` for the arguments and what it has.
 
-    >>> page = coneflat.studio("bunny.obj")
-    >>> page                # its page, in a cell of a notebook
-    >>> page.choices        # what was chosen there
-    >>> page.result         # the flattening
+    Args:
+        mesh, faces: a file or a project, or a mesh as `coneflat.flatten` takes it.
+        options: the other arguments of `Studio`.
+
+    Raises:
+        ArrayShapeError: it is no mesh.
+        MeshFileError, ProjectError: the file cannot be read.
+        OptionError: the extra `studio` is not installed, or `through` names no port.
+
+    Examples:
+        >>> page = coneflat.studio(coneflat.sample_path())  # doctest: +SKIP
+        >>> page  # its page, in a cell of a notebook  # doctest: +SKIP
+        >>> page.choices, page.result  # what was chosen there, and the flattening  # doctest: +SKIP
+        >>> coneflat.studio([[0.0, 0.0]], [[0, 1, 2]])
+        Traceback (most recent call last):
+            ...
+        coneflat.errors.ArrayShapeError: vertices must have the shape (n, 3), not (1, 2)
     """
     return Studio(mesh, faces, **options)

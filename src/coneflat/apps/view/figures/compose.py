@@ -281,6 +281,13 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
     Raises:
         UnknownFormatError: the ending is none of these.
         MeshFileError: the file cannot be written.
+
+    Examples:
+        >>> import tempfile
+        >>> result = coneflat.flatten(np.eye(4)[:, :3], [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     coneflat.save_figure(coneflat.make_figure(result, "layout"), folder + "/layout.svg").name
+        'layout.svg'
     """
     path = check_figure_target(path)
     with atomic_write(path) as stream:

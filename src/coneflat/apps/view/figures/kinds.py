@@ -123,6 +123,13 @@ def make_figure(shown: Flattening | ConeCurve | Quads, kind: str, **look: Any) -
 
     Raises:
         OptionError: an option makes no sense, or matplotlib is not installed.
+
+    Examples:
+        >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+        >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+        >>> figure = coneflat.make_figure(coneflat.flatten(vertices, faces), "layout", size=(4, 4))
+        >>> len(figure.axes)
+        1
     """
     if not isinstance(kind, str) or kind not in KINDS:
         raise OptionError(f"unknown kind of figure {as_shown(kind)}: choose from {', '.join(KINDS)}")
