@@ -153,7 +153,7 @@ def coherent_angles(
     Notes:
         Without the sums, each edge has a problem of its own, to project two angles to a triangle. The sums
         are equations, whose multipliers minimise a convex function that has what they are off by for its gradient;
-        its second derivative jumps where bounds begin or cease to hold; Newton's method converges all the same.
+        its second derivative is discontinuous where bounds become active or inactive; Newton's method still converges.
         Where none holds, the first step is the least squares solution.
     """
     count = len(angles)
@@ -201,7 +201,7 @@ class _Dual:
         return angles, own, np.where(slides, -0.5, 0.0)
 
     def evaluate(self, place: FloatArray) -> Point:
-        """Return by how much each sum falls short, which is minus the gradient."""
+        """Return the residual of each equation, which is minus the gradient."""
         return Point(place, self.right - self.equations @ self.project(place)[0])
 
     def direction(self, here: Point, exactly: bool) -> tuple[FloatArray, bool]:

@@ -353,7 +353,7 @@ def _relaxed(
 def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> ComplexArray:
     """Return the points with seams that are whole motions of each other to the last bit, and cones on grid points.
 
-    Coordinates become multiples of a power of two so small that their sums with whole numbers are exact.
+    Coordinates become multiples of a power of two so small that their sums with integers are exact.
     """
     largest = float(np.abs(found.points).max(initial=1.0)) + float(np.abs(values).max(initial=0))
     bits = min(40, 50 - int(np.ceil(np.log2(largest))))

@@ -30,7 +30,7 @@ class IntegerGrid:
         corner_grid: (m, 3, 2) the point of the grid of every triangle corner, in units of the grid; no triangle is
             turned over.
         turns: (3m,) from 0 to 3; -1 on the boundary.
-        shifts: (3m, 2) whole numbers; 0 on the boundary.
+        shifts: (3m, 2) integers; 0 on the boundary.
         cones: (s,) vertices that lie on grid points and have other than four quads.
         quarters: (s,) how many they have, the quarter turns of their angle.
         size: of a square of the grid, in model units: the root of the surface's area by the grid's.
