@@ -275,7 +275,7 @@ def packages_by_level(package: Path = PACKAGE) -> list[list[Package]]:
 
 # Points of the drawing: height of a row, gap between two, width of a letter of a name and of small print.
 ROW, GAP, LETTER, SMALL = 58.0, 34.0, 8.6, 6.0
-WIDTH = 1000.0
+WIDTH = 1640.0
 
 
 def draw_structure(package: Path = PACKAGE) -> str:
