@@ -151,3 +151,22 @@ def test_real_models_flatten_exactly(shared, name):
     expected = np.full(len(result.vertices), 2 * np.pi)
     expected[result.cones] -= result.curvatures
     np.testing.assert_allclose(untouched[inside], expected[inside], atol=1e-6)
+
+
+def test_components_without_a_corner_are_as_if_free():
+    vertices, faces = shapes.hill()
+    two = np.concatenate([vertices, vertices + 9]), np.concatenate([faces, faces + len(vertices)])
+    on_boundary = np.flatnonzero(TriangleMesh(vertices, faces).is_boundary_vertex)
+    corners = on_boundary[:: len(on_boundary) // 4][:4]
+    result = flatten(*two, boundary=corners, charts="one")
+    free = flatten(vertices, faces, charts="one")
+    other = result.vertex_origin >= len(vertices)
+    np.testing.assert_allclose(
+        result.curvatures[np.isin(result.cones, np.flatnonzero(other))], free.curvatures
+    )
+    np.testing.assert_allclose(
+        result.distortion.qc[result.faces[:, 0] >= len(vertices)], free.distortion.qc, rtol=1e-6
+    )
+    assert np.isnan(
+        result.prescribed[other & np.isin(result.vertex_origin - len(vertices), on_boundary)]
+    ).all()

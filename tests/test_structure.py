@@ -35,7 +35,7 @@ CEILINGS = {
     "apps.batch": 397,
     "apps.cli": 1478,
     "apps.peers": 1400,
-    "apps.quads": 3180,
+    "apps.quads": 3182,
     "apps.studio": 1695,
     "apps.view": 1618,
     "atlas": 1491,
@@ -49,20 +49,20 @@ CEILINGS = {
     "io": 2800,
     "layout": 2245,
     "linalg": 468,
-    "measure": 836,
+    "measure": 840,
     "measure_uv": 168,
     "mesh": 712,
-    "metric": 994,
+    "metric": 993,
     "options": 551,
     "result": 96,
     "sample": 5,
     "seams": 178,
-    "source": 522,
+    "source": 524,
     "stages": 228,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_960, 225, 25_766
-CONSTANTS, KERNELS, NAMES, LEVELS = 293, 110, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_965, 225, 25_773
+CONSTANTS, KERNELS, NAMES, LEVELS = 294, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

@@ -44,10 +44,11 @@ def charts_of(uv_faces: np.ndarray) -> np.ndarray:
 
 
 def flipped(corners: np.ndarray, chart: np.ndarray) -> np.ndarray:
-    """Return (m,) True for triangles that run against the area of their chart."""
+    """Return (m,) True for triangles that run against the area of their chart; those without area have no side."""
     areas = double_areas(corners)
-    against = np.sign(np.bincount(chart, areas))[chart] * areas
-    return against < -NO_AREA * side_lengths(corners).max(axis=1) ** 2
+    areas[np.abs(areas) <= NO_AREA * side_lengths(corners).max(axis=1) ** 2] = 0.0
+    against: np.ndarray = np.sign(np.bincount(chart, areas))[chart] * areas < 0
+    return against
 
 
 def overlap_depths(corners: np.ndarray) -> np.ndarray:

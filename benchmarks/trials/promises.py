@@ -254,6 +254,11 @@ def _check_boundary_turns(trial: Trial) -> None:
     length[trial.topology.edge_of_halfedges(trial.result.faces)] = trial.sides.ravel()
     np.add.at(share, edge_at.ravel(), np.repeat(length[topology.count == 1] / 2, 2))
     for loop in topology.border_loops():
+        if (
+            isinstance(named, dict)
+            and not np.isin(topology.component[corner_at], topology.component[loop]).any()
+        ):
+            continue  # components without a corner are free
         if np.isin(corner_at, loop).any():
             sides = np.setdiff1d(loop, corner_at)
             off = np.abs(curvature[sides]) - slack[sides]

@@ -86,10 +86,17 @@ def read_trimesh(path: Path) -> Read:
     """Return the triangles as trimesh reads them, with its transforms, v upwards again."""
     import trimesh
 
-    mesh = trimesh.load(path, process=False, force="mesh")
-    assert isinstance(mesh, trimesh.Trimesh)
+    mesh = _load(path)
     assert isinstance(mesh.visual, trimesh.visual.TextureVisuals)
     return mesh.vertices[mesh.faces], np.asarray(mesh.visual.uv)[mesh.faces]
+
+
+def _load(path: Path) -> Any:
+    import trimesh
+
+    mesh = trimesh.load(path, process=False, force="mesh")
+    assert isinstance(mesh, trimesh.Trimesh)
+    return mesh
 
 
 def read_npz(path: Path) -> Read:
@@ -118,10 +125,11 @@ def check_file(outcome: Outcome, result: Any, path: Path) -> None:
         except Exception as error:
             # trimesh drops the UVs of what has no material.
             drops = reader is read_trimesh and ending == ".glb" and isinstance(error, AttributeError)
-            if not drops and not _is_unreadable(reader, result.source):
+            if not drops and not _reads_otherwise(reader, result.source, ending):
                 outcome.breach(f"{name}: cannot be read", f"{type(error).__name__}: {error}")
             continue
-        _compare(outcome, name, result, space, flat, reader is read_glb)
+        if len(space) == len(result.faces) or not _reads_otherwise(reader, result.source, ending):
+            _compare(outcome, name, result, space, flat, reader is read_glb)
     if ending == ".npz":
         from coneflat import read_flattening
 
@@ -130,15 +138,16 @@ def check_file(outcome: Outcome, result: Any, path: Path) -> None:
             outcome.breach("file .npz: reads back differently", "")
 
 
-def _is_unreadable(reader: Callable[[Path], Read], source: Any) -> bool:
-    """Return whether the input could not be read by this either: lines that are no OBJ are kept as they are."""
-    if source is None or source.path.suffix.lower() != ".obj" or not source.path.is_file():
+def _reads_otherwise(reader: Callable[[Path], Read], source: Any, ending: str) -> bool:
+    """Return whether the input was something else to this reader: what no format knows is kept as it is."""
+    if source is None or source.path.suffix.lower() != ending or not source.path.is_file():
         return False
     try:
-        reader(source.path)
+        # Of trimesh without the UVs, which the input need not have.
+        count = len(_load(source.path).faces) if reader is read_trimesh else len(reader(source.path)[0])
     except Exception as error:
-        return not isinstance(error, AttributeError)  # It may have no UVs.
-    return False
+        return not isinstance(error, AttributeError)
+    return count != len(source.corners) - 2 * (len(source.offsets) - 1)
 
 
 def check_report(outcome: Outcome, report: dict[str, Any], path: Path) -> None:

@@ -30,8 +30,9 @@ WINDING = 1.0
 # Mean of QC, and what a twentieth of the area is above, from which on a layout is unfit for most uses, though every
 # triangle is upright. Single triangles are worse on many models.
 EXTREME_QC, EXTREME_TAIL = 1.25, 2.0
-# Radians by which a round boundary may turn otherwise than a circle: it is found in rounds, to a thousandth.
-NOT_ROUND = 0.01
+# By how much a round boundary may turn otherwise than a circle at a vertex: it is found in rounds, to a thousandth of
+# a radian, and as a part of what the circle turns by, so that it looks round.
+NOT_ROUND, NOT_ROUND_SHARE = 1e-3, 0.02
 # Relative difference of the sides of marked seams that methods without a flat metric are let go.
 ROUGH = 0.01
 
@@ -202,7 +203,11 @@ def _round_boundary(result: Flattening, unit: float) -> Iterator[str]:
     turns = np.bincount(loop[on_round], -missing[on_round], count)[loop[on_round]]
     around = np.bincount(loop[on_round], share[on_round], count)[loop[on_round]]
     even = turns * share[on_round] / np.maximum(around, np.finfo(float).tiny)
-    off = np.abs(-missing[on_round] - even) - ROUNDINGS * unit * change[on_round]
+    off = (
+        np.abs(-missing[on_round] - even)
+        - ROUNDINGS * unit * change[on_round]
+        - NOT_ROUND_SHARE * np.abs(even)
+    )
     worst = int(np.argmax(off))
     if off[worst] > NOT_ROUND:
         yield (

@@ -83,13 +83,12 @@ def loop_rotations(surface: Surface, spec: MetricSpec) -> Callable[[ConeSolution
 
 def _exact_choices(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> ExactChoices:
     mesh, boundary = surface.mesh, None
-    if mesh.is_boundary_vertex.any():
-        if spec.boundary == "straight":
-            boundary = straight_boundary(mesh, solution.target)
-        elif spec.boundary == "disk" or len(spec.corners):
-            total = float(solution.curvatures.sum())
-            corners = spec.corners.vertices, spec.corners.curvatures
-            boundary = prescribed_boundary(mesh, surface.lengths, total, *corners, spec.names)
+    if spec.boundary == "straight":
+        boundary = straight_boundary(mesh, solution.target)
+    elif spec.boundary in ("disk", "polygon"):
+        total = float(solution.curvatures.sum())
+        corners = spec.corners.vertices, spec.corners.curvatures
+        boundary = prescribed_boundary(mesh, surface.lengths, total, *corners, spec.names)
     return ExactChoices(
         scale_at_cones=spec.prescribes_scale,
         boundary=boundary,

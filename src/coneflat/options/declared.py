@@ -208,7 +208,7 @@ class MetricOptions:
         boundary: Exact metric: free has the least area distortion. lengths is the same at the model's own scale, so
             that lengths on the boundary are kept. disk is round. straight has straight sides between corners that the
             search finds like cones. Or the corners of a polygon, vertices with curvatures, or all without for equal
-            angles.
+            angles; components without one are free.
         relax: Exact metric: less distortion of triangles, with the same cones, curvatures and seams. auto: those that
             cones bend most, and three rings around them. whole: all. off: none, so that the map is discretely conformal
             everywhere.

@@ -229,7 +229,9 @@ def _part(
         options: of everything.
     """
     mesh, vertices, faces, lengths = piece
-    kind, sides = options.boundary_kind, mesh.edge_halfedges[:, 0]
+    has_boundary, sides = bool(mesh.is_boundary_vertex.any()), mesh.edge_halfedges[:, 0]
+    is_free = not has_boundary or (options.boundary_kind == "polygon" and not len(said.corners))
+    kind = "free" if is_free else options.boundary_kind
     on_marks = np.zeros(len(vertices), dtype=bool) if said.on_marks is None else said.on_marks
     on_marks = mesh.is_boundary_vertex & on_marks
     cones = ConeSpec(
@@ -248,14 +250,14 @@ def _part(
         weights=said.weights,
         # Corners of a straightened boundary are searched like cones inside; but not on marked seams.
         absorbs_curvature=on_marks if kind == "straight" else mesh.is_boundary_vertex,
-        prescribes_boundary=kind in ("disk", "polygon") and bool(mesh.is_boundary_vertex.any()),
-        searches_corners=kind == "straight" and bool(mesh.is_boundary_vertex.any()),
+        prescribes_boundary=kind in ("disk", "polygon"),
+        searches_corners=kind == "straight",
         prescribes_scale=options.scale_at_cones and options.method == "exact",
         names=said.names,
     )
     metric = MetricSpec(
         method=options.method,
-        boundary=kind if mesh.is_boundary_vertex.any() else "free",
+        boundary=kind,
         corners=said.corners,
         # On marked seams, so that both sides are equal.
         keeps_length=mesh.is_boundary_vertex if kind == "lengths" else on_marks,

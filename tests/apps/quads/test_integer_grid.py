@@ -7,6 +7,8 @@ import pytest
 import shapes
 
 from coneflat import errors, flatten, integer_grid
+from coneflat.apps.quads.layout import aligned, between_whole, split_edges
+from coneflat.apps.quads.transitions import find_transitions
 from coneflat.mesh.connectivity import TriangleMesh
 
 TURNS = np.array([1, 1j, -1, -1j])
@@ -190,3 +192,15 @@ def test_cones_that_are_no_quarter_turns_are_refused():
         integer_grid(free)
     with pytest.raises(errors.OptionError, match="faces and options"):
         integer_grid(free, charts="one")
+
+
+def test_charts_stay_joined_where_edges_between_them_are_split(shared):
+    result = flatten(shared("knight.off"), **{**QUARTER, "charts": "atlas", "correct_handles": True})
+    layout = aligned(result, 1000, None)
+    is_split = between_whole(layout)
+    assert result.distortion.charts > 1
+    assert is_split.any()
+    split = split_edges(layout, is_split)
+    transitions = find_transitions(split)
+    np.testing.assert_allclose(transitions.equations @ transitions.values, 0, atol=1e-9)
+    check_laws(integer_grid(result, quads=1000))

@@ -325,10 +325,13 @@ def split_edges(layout: Layout, is_split: BoolArray) -> Layout:
     whole_mesh = TriangleMesh(np.concatenate([mesh.vertices, middle]), faces)
     lengths: FloatArray = np.abs(places[:, PREVIOUS] - places[:, NEXT])
     new_points = np.concatenate([points, points[pairs].mean(axis=1)])
-    split = replace(layout, mesh=whole_mesh, lengths=lengths, corners=new_corners, points=new_points)
+    # Other edges come first along the seams now, so that charts may be joined at other chains.
+    split, component = joined_charts(
+        replace(layout, mesh=whole_mesh, lengths=lengths, corners=new_corners, points=new_points)
+    )
     # Components whose boundary has straight sides go on to have them.
-    component = charts_of(split, split.chains())[1]
-    return replace(split, sides=find_sides(split, np.isin(component, component[layout.sides.points])))
+    sides = find_sides(split, np.isin(component, component[layout.sides.points]))
+    return at_origin(replace(split, sides=sides), component)
 
 
 def _pieces(kind: IntArray) -> tuple[IntArray, IntArray]:
