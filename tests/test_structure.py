@@ -36,7 +36,7 @@ CEILINGS = {
     "apps.cli": 1478,
     "apps.peers": 1400,
     "apps.quads": 3182,
-    "apps.studio": 1695,
+    "apps.studio": 1697,
     "apps.view": 1618,
     "atlas": 1491,
     "base": 354,
@@ -49,8 +49,8 @@ CEILINGS = {
     "io": 2800,
     "layout": 2245,
     "linalg": 468,
-    "measure": 840,
-    "measure_uv": 168,
+    "measure": 838,
+    "measure_uv": 167,
     "mesh": 712,
     "metric": 993,
     "options": 551,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 228,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_965, 225, 25_773
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_962, 225, 25_772
 CONSTANTS, KERNELS, NAMES, LEVELS = 294, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -19,7 +19,7 @@ from .geometry.overlap import find_overlaps
 from .geometry.planar import signed_double_areas
 from .io.mapped import Mapped, as_mapped
 from .measure.distortion import Distortion, measure_map
-from .measure.report import MEASURES, path_text
+from .measure.report import MAP_MEASURES, path_text
 from .mesh.charts import joined_edges, label_charts
 from .mesh.check import CheckedMesh, check_mesh, left_out
 from .mesh.connectivity import TriangleMesh, corner_fans, end_corners
@@ -31,9 +31,6 @@ MOST_PAIRS, FEW_PAIRS = 8, 10_000
 
 #: A power of two beyond which there are no numbers.
 MOST_EXPONENT = 1100
-
-#: Of the measures of a flattening, those of a map alone.
-MAP_MEASURES = tuple(name for name in MEASURES if not name.startswith(("curvature", "angle_sum")))
 
 #: What is measured besides.
 COUNTS = (

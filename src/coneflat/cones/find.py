@@ -70,7 +70,7 @@ def find_cones(
         )
     elif len(spec.given):
         solution = _fitted(surface, spec)
-    else:
+    else:  # "none", or none of the given ones is here
         solution = cones_at(*given, spec.given.vertices)
     if spec.prescribes_scale:
         check_enough(len(solution.cones), mesh)

@@ -1,4 +1,7 @@
-"""Cones that the user gives: positions, positions and curvatures, or positions and some curvatures."""
+"""Cones at given vertices: curvatures that phi = 0 there leads to, curvatures given, or the best of those left open.
+
+What a user gives goes to `fitted_cones`, no cones at all to `cones_at`.
+"""
 
 from __future__ import annotations
 

@@ -19,10 +19,8 @@ if TYPE_CHECKING:
 #: A measure, its value, and what it means.
 Row: TypeAlias = tuple[str, str, str]
 
-MEASURES = (
-    "curvature_error",
-    "curvature_error_max",
-    "angle_sum_error",
+#: Measures of any map of a mesh to the plane.
+MAP_MEASURES = (
     "qc_mean",
     "qc_p95",
     "qc_max",
@@ -40,6 +38,8 @@ MEASURES = (
     "overlap",
     "overlapping_pairs",
 )
+#: Those of a flattening.
+MEASURES = ("curvature_error", "curvature_error_max", "angle_sum_error", *MAP_MEASURES)
 
 
 def as_dict(result: Flattening) -> dict[str, Any]:

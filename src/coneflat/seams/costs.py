@@ -14,7 +14,8 @@ from ..geometry.visibility import visible_share
 from ..mesh.connectivity import TriangleMesh
 from ..stages import SeamSpec
 
-# Radians: edges that bend less are not creases, those that bend more are full ones.
+# Radians: edges that bend less are not creases, those that bend more are full ones. The studio draws cuts by the same
+# numbers (`apps/studio/page/graph.js`; a test compares them).
 SMOOTH, SHARP = np.radians(20), np.radians(60)
 # What a full crease costs of its length, and, where hiding is 1, what can hardly be seen.
 CHEAPEST = 0.1

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
+from importlib.resources import files
 
+import numpy as np
 import pytest
 import shapes
 
@@ -14,6 +17,7 @@ from starlette.testclient import TestClient
 
 from coneflat.apps.studio.server import studio_app
 from coneflat.apps.studio.session import Session
+from coneflat.seams.costs import CHEAPEST, SHARP, SMOOTH
 
 TOKEN, PORT = "a-token-of-some-length", 8123
 BASE = f"http://127.0.0.1:{PORT}"
@@ -168,3 +172,14 @@ class TestUploads:
         # The same once more is the same file.
         assert page.post("/mesh?name=ball.obj", content=ball.read_bytes()).status_code == 200
         assert page.get("/state").json()["mesh"] == "ball-2.obj"
+
+
+def test_the_page_costs_edges_as_seams_do():
+    """Cuts are drawn along the paths that seams would take."""
+    script = files("coneflat.apps.studio.page").joinpath("graph.js").read_text("utf-8")
+    numbers = re.search(
+        r"const \[SMOOTH, SHARP, CHEAPEST\] = \[Math.PI / (\d+), Math.PI / (\d+), ([.\d]+)\]", script
+    )
+    assert numbers is not None
+    smooth, sharp, cheapest = map(float, numbers.groups())
+    np.testing.assert_allclose([np.pi / smooth, np.pi / sharp, cheapest], [SMOOTH, SHARP, CHEAPEST])

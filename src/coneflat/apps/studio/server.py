@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import mimetypes
 import secrets
 import socket
 import struct
@@ -29,7 +30,6 @@ from .project import file_within
 from .session import Session
 
 MOST_UPLOADED = 512 * 1024 * 1024  # bytes of a mesh
-TYPES = {".svg": "image/svg+xml", ".obj": "text/plain", ".json": "application/json", ".png": "image/png"}
 
 
 class StudioServer(uvicorn.Server):
@@ -129,12 +129,12 @@ def studio_app(
     async def export(request: Request) -> Response:
         ending = f".{request.path_params['ending']}"
         content = await run_sync(session.export, ending)
-        return Response(content, media_type=TYPES.get(ending, "application/octet-stream"))
+        return Response(content, media_type=_media_type(ending))
 
     async def quads(request: Request) -> Response:
         ending = f".{request.path_params['ending']}"
         content = await run_sync(session.quads, ending, _number(request, "count"))
-        return Response(content, media_type=TYPES.get(ending, "application/octet-stream"))
+        return Response(content, media_type=_media_type(ending))
 
     async def curve(request: Request) -> Response:
         return JSONResponse(await run_sync(session.curve))
@@ -161,6 +161,10 @@ def studio_app(
         exception_handlers=dict.fromkeys((ConeflatError, ValueError, TooLarge, ClientDisconnect), _refused),
     )
     return Guard(app, token, port, framed, proxied)
+
+
+def _media_type(ending: str) -> str:
+    return mimetypes.guess_type(f"it{ending}")[0] or "application/octet-stream"
 
 
 def _number(request: Request, name: str) -> int | str:
