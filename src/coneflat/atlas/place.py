@@ -140,16 +140,18 @@ def cover(
         for row in range(rows):
             around, on, inside = 0, 0, False
             for column in range(columns):
+                if winding[row, column] == 0 and touched[row, column] == 0:
+                    continue
                 around += winding[row, column]
                 on += touched[row, column]
                 is_in = around != 0 or on > 0
                 if is_in and not inside:
                     if found == len(runs):
                         runs = np.concatenate((runs, np.empty_like(runs)))
-                    runs[found, 0], runs[found, 1] = row, column
+                    runs[found, 0], runs[found, 1], runs[found, 2] = row, column, columns - 1
                     found += 1
-                if is_in:
-                    runs[found - 1, 2] = column
+                elif inside and not is_in:
+                    runs[found - 1, 2] = column - 1
                 inside = is_in
         first[j + 1] = found
     return runs[:found], first
