@@ -38,10 +38,10 @@ CEILINGS = {
     "apps.quads": 3182,
     "apps.studio": 1697,
     "apps.view": 1618,
-    "atlas": 1491,
+    "atlas": 1493,
     "base": 354,
     "cone_curve": 108,
-    "cones": 2084,
+    "cones": 2096,
     "evaluate": 194,
     "flatten": 176,
     "flattener": 35,
@@ -61,8 +61,8 @@ CEILINGS = {
     "stages": 228,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_962, 225, 25_772
-CONSTANTS, KERNELS, NAMES, LEVELS = 294, 110, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_976, 225, 25_786
+CONSTANTS, KERNELS, NAMES, LEVELS = 294, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

@@ -39,10 +39,9 @@ def fit_curvatures(
     feasible = not has_sum or bool(least.sum() - slack <= total <= most.sum() + slack)
     if not feasible:
         least, most = np.full(len(slope), -np.inf), np.full(len(slope), np.inf)
-    program = _Program(gram, slope, least, most, total)
-    found = program.change_at_once()
+    found = change_at_once(gram, slope, least, most, total)
     if found is None:
-        found = program.change_one_by_one()
+        found = _Program(gram, slope, least, most, total).change_one_by_one()
     return *found, feasible
 
 
@@ -73,32 +72,6 @@ class _Program:
     most: FloatArray
     total: float
 
-    def _gradient(self, curvatures: FloatArray) -> tuple[FloatArray, float]:
-        """Return gram k + slope (s,), and what of it counts as nothing."""
-        gradient = self.gram @ curvatures + self.slope
-        return gradient, RELEASE * float(np.abs(gradient).max())
-
-    def change_at_once(self) -> tuple[FloatArray, float] | None:
-        """Return the optimum and the multiplier, by changing all bounds that are in the way, or no longer, at once.
-
-        The primal-dual active set method (M. Hintermueller, K. Ito, K. Kunisch, "The primal-dual active set strategy
-        as a semismooth Newton method", 2003): a handful of steps where it ends; None where it does not.
-        """
-        state, curvatures = np.zeros(len(self.slope), dtype=np.int64), np.zeros(len(self.slope))
-        for _ in range(AT_ONCE):
-            free, best, multiplier = best_free(self.gram, self.slope, self.total, state, curvatures)
-            if not len(free):
-                return None
-            curvatures[free] = best
-            gradient, nothing = self._gradient(curvatures)
-            beyond = (curvatures > self.most).astype(np.int64) - (curvatures < self.least)
-            stays = state * (gradient + multiplier) <= nothing
-            new = np.where(state == 0, beyond, np.where(stays, state, 0))
-            if (new == state).all():
-                return curvatures, multiplier
-            state, curvatures = new, np.clip(curvatures, self.least, self.most)
-        return None
-
     def change_one_by_one(self) -> tuple[FloatArray, float]:
         """Return the optimum and the multiplier by a primal active set method, which always ends."""
         size, has_sum, multiplier = len(self.slope), not math.isnan(self.total), 0.0
@@ -120,7 +93,8 @@ class _Program:
                 curvatures[blocking] = bound[first]
                 continue
             # Whether one held at a bound would rather leave it.
-            gradient, nothing = self._gradient(curvatures)
+            gradient = self.gram @ curvatures + self.slope
+            nothing = RELEASE * float(np.abs(gradient).max())
             high = int(np.where(state == 1, gradient, -np.inf).argmax())
             low = int(np.where(state == -1, gradient, np.inf).argmin())
             has_high, has_low = state[high] == 1, state[low] == -1
@@ -196,3 +170,40 @@ def best_free(
         return free, best, 0.0
     multiplier = (sum_best - left) / sum_ones
     return free, best - multiplier * ones, multiplier
+
+
+@compiled
+def change_at_once(
+    gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float
+) -> tuple[FloatArray, float] | None:
+    """Return the optimum and the multiplier, by changing all bounds that are in the way, or no longer, at once.
+
+    The primal-dual active set method (M. Hintermueller, K. Ito, K. Kunisch, "The primal-dual active set strategy
+    as a semismooth Newton method", 2003): a handful of steps where it ends; None where it does not.
+    """
+    size = len(slope)
+    state, curvatures, gradient = np.zeros(size, np.int64), np.zeros(size), np.empty(size)
+    for _ in range(AT_ONCE):
+        free, best, multiplier = best_free(gram, slope, total, state, curvatures)
+        if not len(free):
+            return None
+        curvatures[free] = best
+        nothing, is_same = 0.0, True
+        for i in range(size):
+            gradient[i] = slope[i]
+            for j in range(size):
+                gradient[i] += gram[i, j] * curvatures[j]
+            nothing = max(nothing, RELEASE * abs(gradient[i]))
+        for i in range(size):
+            new = state[i]
+            if new == 0:
+                new = int(curvatures[i] > most[i]) - int(curvatures[i] < least[i])
+            elif new * (gradient[i] + multiplier) > nothing:
+                new = 0
+            is_same = is_same and new == state[i]
+            state[i] = new
+        if is_same:
+            return curvatures, multiplier
+        for i in range(size):
+            curvatures[i] = min(max(curvatures[i], least[i]), most[i])
+    return None
