@@ -34,7 +34,7 @@ CEILINGS = {
     "apps.ahead": 38,
     "apps.batch": 397,
     "apps.cli": 1478,
-    "apps.peers": 1400,
+    "apps.peers": 1406,
     "apps.quads": 3182,
     "apps.studio": 1697,
     "apps.view": 1618,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 228,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_976, 225, 25_786
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_976, 225, 25_792
 CONSTANTS, KERNELS, NAMES, LEVELS = 294, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

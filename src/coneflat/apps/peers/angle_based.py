@@ -269,6 +269,10 @@ def least_change(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the x that minimises x.(stiffness x) / 2 + pull.x with slopes x = -off, and triangles rid of their excess.
 
+    The conditions on triangles involve three angles each, so they are eliminated with these: what is left is one
+    system in the multipliers of vertices, two for each inner one (the reduction of ABF++, Sheffer et al. 2005).
+    Its matrix is made as a sum of squares, two of them for the two directions in which a triangle's angles can change.
+
     Args:
         slopes, off: (k, 3m) and (k,) the conditions.
         excess: (m,) of the sums of triangles.
@@ -278,16 +282,21 @@ def least_change(
     Returns:
         (3m,) the change, and (k,) the Lagrange multipliers of the conditions.
     """
-    sides = len(stiffness)
-    triangles = csr_matrix((np.ones(sides), (np.arange(sides) // 3, np.arange(sides))))
-    rows = csr_matrix(vstack([triangles, slopes]))
-    # With the root of the stiffness on both sides, the matrix is a sum of squares.
-    half = rows @ diags(stiffness**-0.5)
+    i, j, k = stiffness.reshape(-1, 3).T
+    pairs = i * j + j * k + k * i
+    given = -(np.stack([j * k, k * i, i * j], axis=1) * (excess / pairs)[:, None]).ravel()
+    one = np.stack([j + k, -k, -j], axis=1) / np.sqrt(pairs * (j + k))[:, None]
+    two = np.stack([np.zeros(len(i)), np.ones(len(i)), -np.ones(len(i))], axis=1) / np.sqrt(j + k)[:, None]
+    columns = np.arange(2 * len(i)).repeat(3)
+    rows = np.tile(np.arange(len(stiffness)), 2)
+    directions = csr_matrix((np.concatenate([one, two], axis=None), (rows, columns)))
+    half = csr_matrix(slopes @ directions)
     matrix = csc_matrix(half @ half.T)
     matrix.sort_indices()
     factor = factorize(matrix)
-    right = np.concatenate([excess, off]) - rows @ (pull / stiffness)
+    pulled = directions.T @ pull
+    right = off + slopes @ given - half @ pulled
     forces = factor.solve(right)
     # Once more, for what rounding has left.
     forces += factor.solve(right - half @ (half.T @ forces))
-    return -(pull + rows.T @ forces) / stiffness, forces[len(excess) :]
+    return given - directions @ (pulled + half.T @ forces), forces
