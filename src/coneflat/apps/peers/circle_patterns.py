@@ -311,13 +311,11 @@ class CirclePattern:
     """Circles around flat triangles.
 
     Attributes:
-        log_radius: (m,) log of the radius of each triangle's circle.
         lengths: (3m,) of the half-edges, both sides of an edge with the same bits.
         residual: largest error of the angles around the centre of a circle, radians.
         steps: Newton steps.
     """
 
-    log_radius: FloatArray
     lengths: FloatArray
     residual: float
     steps: int
@@ -354,7 +352,7 @@ def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
     lengths = 2 * np.exp(np.repeat(log_radius, 3)) * np.sin(half)
     upper = np.flatnonzero(twin > np.arange(len(half)))
     lengths[twin[upper]] = lengths[upper]
-    return CirclePattern(log_radius, lengths, found.largest, steps + more)
+    return CirclePattern(lengths, found.largest, steps + more)
 
 
 @dataclass(eq=False)
@@ -440,7 +438,9 @@ def widest_pattern(problem: RadiiProblem) -> tuple[FloatArray, int]:
     slots, own, other, half_theta = problem.sides
     half = problem.coherent.angles.copy()
     radii = np.zeros(len(half) // 3)
-    for steps in range(1, 61):  # noqa: B007 - returned
+    steps = 0
+    while steps < 60:
+        steps += 1
         one, two = half[slots], half[problem.twin[slots]]
         wanted = np.log(np.sin(two) / np.sin(one))
         weight = np.sin(one) * np.sin(two) / np.sin(2 * half_theta)

@@ -170,7 +170,7 @@ class GltfData:
             rows = self._rows(index, item, form.length, form.item_bytes, stride)
         sparse = item.get("sparse")
         if sparse is not None:
-            rows = self._with_sparse(index, self.entry(item, "sparse", dict), rows, form.kind)
+            rows = self._with_sparse(index, self.entry(item, "sparse", dict), rows)
         return rows
 
     def values(self, index: Any, columns: int) -> FloatArray:
@@ -217,7 +217,7 @@ class GltfData:
             self.fail(f"accessor {index} ends at {end:,} of the {len(data):,} bytes of its buffer view")
         return np.ndarray((count, size), np.uint8, data, start, (step, 1))
 
-    def _with_sparse(self, index: Any, sparse: Item, rows: ByteRows, kind: np.dtype[Any]) -> ByteRows:
+    def _with_sparse(self, index: Any, sparse: Item, rows: ByteRows) -> ByteRows:
         """Return an array with those elements replaced that the accessor lists."""
         count = self.count(sparse, "count")
         where, new = self.entry(sparse, "indices", dict), self.entry(sparse, "values", dict)
