@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 
-from ...view.page.webpage import page_around
+from ...view import page_around
 
 #: What the page may do: draw, and talk to the server that it came from.
 POLICY = (

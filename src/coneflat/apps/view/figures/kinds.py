@@ -18,15 +18,7 @@ from ..from_uv import is_own
 from ..quantity import Quantity, check_color_map, conformal_distortion, curvature, stretch
 from .compose import Panel, Row, check_pixels, compose
 from .cone_marks import mark_handles
-from .model import (
-    DOTS_PER_INCH,
-    draw_checker,
-    draw_cone_curve,
-    draw_cones,
-    draw_curvature,
-    draw_quality,
-    draw_quantity,
-)
+from .model import DOTS_PER_INCH, draw_checker, draw_cone_curve, draw_cones, draw_curvature, draw_quantity
 from .projection import Eye, eye_direction, view_aspect
 from .uv_layout import draw_layout, fill_layout, layout_aspect
 
@@ -227,14 +219,15 @@ def demo_figure(result: Flattening, *, up: str = "y", dpi: float = 220.0) -> Fig
     front, back = "front-right", "back-left"
     vertices = result.vertices[np.unique(result.faces)]
     checker = partial(draw_checker, result, up=up, cones=True, dpi=dpi)
-    distortion = partial(draw_quality, result, up=up, dpi=dpi)
+    quality = conformal_distortion(result)
+    distortion = partial(draw_quantity, result=result, quantity=quality, up=up, dpi=dpi)
     panels = [
         Panel(view_aspect(vertices, front, up), checker, "Model, textured by its UVs"),
         Panel(layout_aspect(result, crop=True), partial(draw_layout, result, crop=True), "UV layout"),
         Panel(view_aspect(vertices, front, up), partial(distortion, eye=front), "Distortion, front and back"),
         Panel(view_aspect(vertices, back, up), partial(distortion, eye=back)),
     ]
-    rows = [Row(panels, [conformal_distortion(result)])]
+    rows = [Row(panels, [quality])]
     return compose(rows, title=title(result), marks=mark_handles(result), dpi=dpi, width=10.0)
 
 

@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from .... import ConeCurve
 from ....base import DISTORTION, FloatArray, IntArray
-from ....errors import OptionError
 from ....io import CELLS, cell_side
-from ..quantity import Quantity, conformal_distortion, curvature, stretch
+from ..quantity import Quantity, curvature
 from .cone_marks import draw_cones_on_model, draw_seams_on_model, pixels_of
 from .projection import Eye, MeshPicture, render_mesh
-from .uv_layout import fill_layout
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,40 +67,6 @@ def draw_cones(
     picture = show_mesh(axes, result.vertices, result.faces, eye, up, dpi)
     draw_seams_on_model(axes, picture, result, through=True)
     draw_cones_on_model(axes, picture, result, through=True)
-
-
-def draw_quality(
-    result: Flattening,
-    axes: Axes,
-    *,
-    measure: str = "qc",
-    on: str = "model",
-    eye: Eye = "front-right",
-    up: str = "y",
-    colors: str | None = None,
-    dpi: float = DOTS_PER_INCH,
-) -> Quantity:
-    """Draw how much the triangles are distorted, by colours, and return what is shown.
-
-    Args:
-        measure: "qc" for quasi-conformal distortion, 1 where angles are kept; "scale" for lengths in the layout over
-            those on the model, over the mean of this.
-        on: where to draw it, on the "model" or in the "layout".
-        colors: a colour map of matplotlib; by default viridis, or purple to orange.
-
-    The other arguments and errors are those of `draw_checker`. The colour bar of what is returned is
-    `figure.colorbar(quantity.scale.mappable(), ax=axes)`.
-    """
-    if measure not in ("qc", "scale"):
-        raise OptionError(f"unknown measure {measure!r}: choose from qc, scale")
-    quantity = (conformal_distortion if measure == "qc" else stretch)(result).recolored(colors)
-    if on == "layout":
-        fill_layout(axes, result, quantity, dpi)
-    elif on == "model":
-        draw_quantity(axes, result, quantity, eye, up, dpi)
-    else:
-        raise OptionError(f"nothing can be drawn on {on!r}: choose from model, layout")
-    return quantity
 
 
 def draw_curvature(
