@@ -197,7 +197,7 @@ def steps_figure(measured: Measured) -> Any:
     eye, look = "front-right", {"dpi": DPI}
 
     def draw(quantity: Quantity, axes: Any) -> None:
-        draw_quantity(axes, result, quantity, eye, "y", DPI)
+        draw_quantity(result, axes, quantity, eye, "y", DPI)
 
     curved = on_vertices(result, even_curvature(result), "RdGy_r", 95)
     scaled = on_vertices(result, result.log_scale - np.nanmean(result.log_scale), "PuOr_r", 99)

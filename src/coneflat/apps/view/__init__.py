@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from .figures.camera import Eye, eye_direction, view_aspect
 from .figures.compose import Panel, Row, check_figure, compose, new_figure, save_figure, write_figure
 from .figures.cone_marks import DOT_REACH, mark_handles, mark_scale
 from .figures.kinds import Look, demo_figure, make_figure
 from .figures.model import DOTS_PER_INCH, draw_checker, draw_cones, draw_quantity, show_mesh
-from .figures.projection import Eye, eye_direction, view_aspect
 from .figures.uv_layout import draw_layout, fill_layout, layout_aspect
 from .from_uv import flattening_of, own_flattening, shown_rows
 from .page.content import Model, content_of, outline_halfedges

@@ -9,8 +9,9 @@ from .... import ConeCurve
 from ....base import DISTORTION, FloatArray, IntArray
 from ....io import CELLS, cell_side
 from ..quantity import Quantity, curvature
+from .camera import Eye
 from .cone_marks import draw_cones_on_model, draw_seams_on_model, pixels_of
-from .projection import Eye, MeshPicture, render_mesh
+from .render import MeshPicture, render_mesh
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,24 +79,25 @@ def draw_curvature(
     up: str = "y",
     colors: str | None = None,
     dpi: float = DOTS_PER_INCH,
-) -> Quantity:
-    """Draw the curvature of every vertex, the angles missing around it, by colours, and return what is shown.
+) -> None:
+    """Draw the curvature of every vertex, the angles missing around it, by colours.
 
     Args:
+        result, axes, eye, up, dpi: as of `draw_checker`.
         flat: of the flat metric, where only cones should have curvature; else of the model.
         colors: a colour map of matplotlib.
 
-    The other arguments and errors are those of `draw_checker`.
+    Raises:
+        OptionError: an option makes no sense.
     """
     quantity = curvature(result, flat).recolored(colors)
-    picture = draw_quantity(axes, result, quantity, eye, up, dpi)
+    picture = draw_quantity(result, axes, quantity, eye, up, dpi)
     if flat:
         draw_cones_on_model(axes, picture, result)
-    return quantity
 
 
 def draw_quantity(
-    axes: Axes, result: Flattening, quantity: Quantity, eye: Eye, up: str, dpi: float
+    result: Flattening, axes: Axes, quantity: Quantity, eye: Eye, up: str, dpi: float
 ) -> MeshPicture:
     """Draw the model coloured by a quantity, in half the light and shade: a shadow must not read as a number."""
     paint = {"colors": quantity.colors(), "contrast": 0.5}
