@@ -36,7 +36,7 @@ CEILINGS = {
     "apps.cli": 1474,
     "apps.peers": 1400,
     "apps.quads": 3180,
-    "apps.studio": 1692,
+    "apps.studio": 1695,
     "apps.view": 1617,
     "atlas": 1487,
     "base": 354,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 226,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_946, 233, 25_744
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_946, 233, 25_747
 CONSTANTS, KERNELS, NAMES, LEVELS = 293, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

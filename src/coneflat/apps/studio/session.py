@@ -155,9 +155,7 @@ class Session:
 
     def _require_mesh(self) -> None:
         if self._mesh is None:
-            raise StudioError(
-                "there is no mesh yet: drop one on the page, or name its file, coneflat studio MESH"
-            )
+            raise StudioError("there is no mesh yet: drop one on the page, or run coneflat studio MESH")
 
     def _take(self, chosen: Choices, stroke: object) -> None:
         """Take a step, if it is one."""
