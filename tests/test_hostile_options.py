@@ -114,7 +114,7 @@ def test_costs_of_seams_that_overflow_when_summed():
 
 @pytest.mark.parametrize("quantum", [1e-20, 1e-300, LEAST_QUANTUM / 2, math.inf, -1.0, 7.0])
 def test_a_quantum_outside_its_bounds_is_refused_with_them(quantum):
-    with pytest.raises(errors.OptionError, match="quantum must be from 0.0001 radians"):
+    with pytest.raises(errors.OptionError, match="quantise must be from 0.0001 radians"):
         coneflat.flatten(*shapes.sphere(1), quantise=quantum)
 
 

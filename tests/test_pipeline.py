@@ -135,6 +135,7 @@ def test_cones_of_the_users_own():
         ({"cones": [1, 2, -1]}, errors.OptionError, "cone -1"),
         ({"cones": [1.5]}, errors.OptionError, "whole number"),
         ({"cones": 3.5}, errors.OptionError, "cones must be vertices"),
+        ({"cones": 10}, errors.OptionError, "give cone_count=10"),
         ({"cones": None}, errors.OptionError, "not NoneType"),
         ({"cones": {10**30: 1.0}}, errors.OptionError, "whole number"),
         ({"cones": [True, False]}, errors.OptionError, "whole number"),
@@ -152,6 +153,11 @@ def test_cones_of_the_users_own():
 def test_bad_options_are_named(options, kind, message):
     with pytest.raises(kind, match=message):
         flatten(*SHAPES["sphere"], **options)
+
+
+def test_a_file_has_faces_of_its_own():
+    with pytest.raises(errors.ArrayShapeError, match="leave out faces"):
+        flatten("hand.obj", [[0, 1, 2]])
 
 
 def test_cones_on_boundaries_and_loose_vertices_are_refused():

@@ -33,35 +33,35 @@ CEILINGS = {
     "apps": 0,
     "apps.ahead": 38,
     "apps.batch": 397,
-    "apps.cli": 1478,
+    "apps.cli": 1474,
     "apps.peers": 1406,
     "apps.quads": 3182,
     "apps.studio": 1697,
-    "apps.view": 1618,
-    "atlas": 1493,
+    "apps.view": 1617,
+    "atlas": 1489,
     "base": 354,
     "cone_curve": 108,
-    "cones": 2096,
+    "cones": 2094,
     "evaluate": 194,
     "flatten": 176,
     "flattener": 35,
     "geometry": 1592,
-    "io": 2800,
+    "io": 2799,
     "layout": 2245,
     "linalg": 468,
     "measure": 838,
     "measure_uv": 167,
-    "mesh": 712,
+    "mesh": 711,
     "metric": 993,
-    "options": 551,
+    "options": 548,
     "result": 96,
     "sample": 5,
     "seams": 178,
-    "source": 524,
-    "stages": 228,
+    "source": 523,
+    "stages": 226,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_976, 225, 25_792
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_962, 233, 25_773
 CONSTANTS, KERNELS, NAMES, LEVELS = 294, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
@@ -101,10 +101,10 @@ def test_stages_stand_side_by_side(stage: str):
 @pytest.mark.parametrize("name", sorted(name for name in MODULES if not is_core(name)))
 def test_applications_import_what_packages_export(name: str):
     module = MODULES[name]
-    inside = {
-        other for other in module.imports | module.late_imports if is_core(other) and other.count(".") > 0
-    }
-    assert inside == set()
+    imported = module.imports | module.late_imports
+    assert {other for other in imported if is_core(other) and other.count(".") > 0} == set()
+    if not name.startswith("apps.view"):
+        assert {other for other in imported if other.startswith("apps.view.")} == set()
 
 
 @pytest.mark.parametrize("name", sorted(filter(is_core, MODULES)))

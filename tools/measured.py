@@ -13,7 +13,7 @@ from typing import Any
 from markers import ROOT
 
 import coneflat
-from coneflat.apps.cli.options import parse_angle
+from coneflat.apps.cli.values import parse_angle
 from coneflat.apps.peers import Comparison, compare_methods, flatten_by
 from coneflat.options import Options, declarations
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from coneflat.apps.cli.main import cli
 from coneflat.apps.cli.options import flag_of, shown_default
 from coneflat.apps.quads.options import QuadOptions
-from coneflat.options import declarations
+from coneflat.options import declarations, kinds
 from coneflat.options.declared import (
     AtlasOptions,
     ConeOptions,
@@ -16,18 +16,6 @@ from coneflat.options.declared import (
     MetricOptions,
     RunOptions,
     SeamOptions,
-)
-from coneflat.options.kinds import (
-    Choice,
-    Direction,
-    Edges,
-    Flag,
-    Kind,
-    Number,
-    Vertices,
-    VerticesOrEdges,
-    Weights,
-    WordOrVertices,
 )
 
 #: As people think of them; each group's docstring is its title.
@@ -96,73 +84,75 @@ def _flags(name: str, command: str) -> str:
     return ", ".join(f"`{flag}`" for flag in spellings or [flag_of(name)])
 
 
-def _words(kind: Kind) -> list[str]:
+def _words(kind: kinds.Kind) -> list[str]:
     return [f"`{word}`" for word in getattr(kind, "words", ())]
 
 
-def _values(kind: Kind) -> str:
+def _values(kind: kinds.Kind) -> str:
     """Return what is written after a flag."""
     match kind:
-        case Flag():
+        case kinds.Flag():
             return ""
-        case Choice():
+        case kinds.Choice():
             return ", ".join(_words(kind))
-        case Number(is_angle=True):
+        case kinds.Number(is_angle=True):
             return "`1.57`, `pi/2`, `90deg`"
-        case Number():
+        case kinds.Number():
             return f"{kind.text}; alone it is 1" if kind.is_strength else kind.text
-        case Direction():
+        case kinds.Direction():
             return "`z`, `-y`, `0,0.5,1`"
-        case Vertices():
+        case kinds.Vertices():
             return "`3,17,8` or a file"
-        case VerticesOrEdges():
+        case kinds.VerticesOrEdges():
             return "`3,17,8`, or a file of such or of pairs"
-        case WordOrVertices():
+        case kinds.WordOrVertices():
             return ", ".join([*_words(kind), "`3,17`, `3:pi/2,17:-1.5`", "or a file"])
-        case Edges():
+        case kinds.Edges():
             return " or ".join([*_words(kind), "a file of pairs"])
-        case Weights():
+        case kinds.Weights():
             return "a name or a file"
     return ""
 
 
 def _flag_default(declaration: Declaration) -> str:
-    if isinstance(declaration.kind, Flag) and (declaration.command_default or declaration.default is True):
+    if isinstance(declaration.kind, kinds.Flag) and (
+        declaration.command_default or declaration.default is True
+    ):
         return "yes"
     shown = shown_default(declaration)
     return f"`{shown}`" if shown else ""
 
 
-def _python_values(kind: Kind) -> str:
+def _python_values(kind: kinds.Kind) -> str:
     """Return what a keyword takes."""
     match kind:
-        case Flag():
+        case kinds.Flag():
             return "`True`, `False`"
-        case Choice() | WordOrVertices() | Edges():
+        case kinds.Choice() | kinds.WordOrVertices() | kinds.Edges():
             words = ", ".join(f'`"{word}"`' for word in kind.words)
             more = {
-                WordOrVertices: "a list of vertices, or a map to curvatures",
-                Edges: "(k, 2) pairs of vertices",
+                kinds.WordOrVertices: "a list of vertices, or a map to curvatures",
+                kinds.Edges: "(k, 2) pairs of vertices",
             }
             return ", ".join(each for each in (words, more.get(type(kind), "")) if each)
-        case Vertices():
+        case kinds.Vertices():
             return "a list of vertices"
-        case VerticesOrEdges():
+        case kinds.VerticesOrEdges():
             return "(k,) vertices, or (k, 2) pairs of them"
-        case Direction():
+        case kinds.Direction():
             return "three numbers"
-        case Number(is_angle=True):
+        case kinds.Number(is_angle=True):
             return "radians"
-        case Number():
+        case kinds.Number():
             return kind.text
-        case Weights():
+        case kinds.Weights():
             return "(n,) numbers from 0, some vertices with theirs, or the name of a property"
     return "a function"
 
 
 def _python_default(declaration: Declaration) -> str:
     value, kind = declaration.default, declaration.kind
-    if isinstance(value, float) and isinstance(kind, Number) and kind.is_angle:
+    if isinstance(value, float) and isinstance(kind, kinds.Number) and kind.is_angle:
         turns = value / math.pi
         return f"{turns:g} π" if turns >= 1 else f"π/{1 / turns:g}"
     return (

@@ -23,13 +23,23 @@ from tables import ALLOWED, GALLERY, TRADED, TRADEOFF, tradeoff
 import coneflat
 from coneflat.apps.peers.pictures import draw_layouts
 from coneflat.apps.peers.run import COMPARED
-from coneflat.apps.view import demo_figure, draw_checker, draw_cones, draw_curvature, draw_layout, new_figure
-from coneflat.apps.view.figures.compose import Panel, Row, compose
-from coneflat.apps.view.figures.cone_marks import mark_handles
-from coneflat.apps.view.figures.model import draw_quantity
-from coneflat.apps.view.figures.projection import view_aspect
-from coneflat.apps.view.figures.uv_layout import layout_aspect
-from coneflat.apps.view.quantity import ColorScale, Quantity, curvature
+from coneflat.apps.view import (
+    Panel,
+    Quantity,
+    Row,
+    compose,
+    demo_figure,
+    draw_checker,
+    draw_cones,
+    draw_layout,
+    draw_quantity,
+    layout_aspect,
+    mark_handles,
+    new_figure,
+    view_aspect,
+)
+from coneflat.apps.view.figures.model import draw_curvature
+from coneflat.apps.view.quantity import ColorScale, curvature
 from coneflat.geometry.operators import vertex_areas
 
 sys.path.insert(0, str(ROOT / "tests"))
@@ -187,7 +197,7 @@ def steps_figure(measured: Measured) -> Any:
     eye, look = "front-right", {"dpi": DPI}
 
     def draw(quantity: Quantity, axes: Any) -> None:
-        draw_quantity(axes, result, quantity, eye, "y", DPI)
+        draw_quantity(result, axes, quantity, eye, "y", DPI)
 
     curved = on_vertices(result, even_curvature(result), "RdGy_r", 95)
     scaled = on_vertices(result, result.log_scale - np.nanmean(result.log_scale), "PuOr_r", 99)

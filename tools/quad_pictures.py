@@ -12,9 +12,9 @@ from measured import Measured
 
 import coneflat
 from coneflat.apps.quads.figure import draw_quads
-from coneflat.apps.view.figures.compose import Panel, Row, compose
+from coneflat.apps.view import Panel, Row, compose, view_aspect
 from coneflat.apps.view.figures.cone_marks import pixels_of
-from coneflat.apps.view.figures.projection import render_mesh, view_aspect
+from coneflat.apps.view.figures.render import render_mesh
 
 sys.path.insert(0, str(ROOT / "examples"))
 from catmull_clark import catmull_clark

@@ -15,7 +15,7 @@ from playwright.sync_api import sync_playwright
 
 import coneflat
 from coneflat.apps.quads.page import page_of_quads
-from coneflat.apps.view.page.webpage import write_page
+from coneflat.apps.view import write_page
 
 WIDE, NARROW = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
 #: Name, size, theme, and what is done on the page first.

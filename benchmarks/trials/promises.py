@@ -31,7 +31,7 @@ SENTENCES = {
     "sides": r"The two sides of seams differ in length",
     "lengths": r"Lengths along the boundary are not kept",
     "round": r"The boundary is not quite round",
-    "rotations": r"Seams turn by up to .* beside multiples of the quantum",
+    "rotations": r"Seams turn by up to .* beside multiples of [\d.e+-]+ rad",
     "cone count": r"[\d,]+ cones? instead of the [\d,]+ asked for",
 }
 

@@ -204,7 +204,7 @@ class Flattening:
             ArrayShapeError, MeshError: there are no UVs, or the mesh cannot be thinned to so few triangles.
             UnknownFormatError, MeshFileError: a file cannot be read or written.
         """
-        from .apps.view.page.webpage import check_page, open_page, page_of, write_page
+        from .apps.view import check_page, open_page, page_of, write_page
         from .options.declared import MOST_TRIANGLES
 
         if path is not None:
@@ -219,7 +219,7 @@ class Flattening:
 
     def _repr_html_(self) -> str:
         """Return the page in a frame, which notebooks show."""
-        from .apps.view.page.webpage import notebook_html
+        from .apps.view import notebook_html
 
         return notebook_html(self)
 

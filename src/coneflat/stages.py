@@ -249,20 +249,16 @@ class LaplacianInverse:
     """A factorized Laplacian, as a function of (n,) sources, up to a constant where nothing is held at zero.
 
     Attributes:
-        apply: the function.
+        solve: returns (n,) the solution for a source (n,).
         laplacian: (n, n), of all vertices.
         is_zero: (n,) the vertices where its solutions are zero.
         break_even: how many solutions take as long as another factorization.
     """
 
-    apply: Callable[[FloatArray], FloatArray]
+    solve: Callable[[FloatArray], FloatArray]
     laplacian: csc_matrix
     is_zero: BoolArray
     break_even: int
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Return (n,) the solution for a source (n,)."""
-        return self.apply(right)
 
 
 @dataclass(frozen=True, eq=False)

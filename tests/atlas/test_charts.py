@@ -7,8 +7,9 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_flow
 
 import coneflat
-from coneflat.atlas import ChartLayout, Seams, injective_charts
+from coneflat.atlas.charts import ChartLayout, Seams
 from coneflat.atlas.glue import glue_charts
+from coneflat.atlas.injective import injective_charts
 from coneflat.atlas.sheet import Sheet
 from coneflat.atlas.split import _label_ordered, _layers, largest_layers, split_overlaps
 from coneflat.geometry.overlap import find_overlaps

@@ -200,7 +200,7 @@ class TestCosts:
         weights[:10] = 2.0
         costs = edge_costs(mesh, lengths_of(mesh), edge_weights=weights)
         np.testing.assert_allclose(costs[10:], lengths_of(mesh)[10:] * 2e-3)
-        assert cut_open(mesh, find_seams(mesh, np.array([3, 50, 80]), costs)).pieces == 1
+        assert cut_open(mesh, find_seams(mesh, np.array([3, 50, 80]), costs)).mesh.components[0] == 1
 
     @pytest.mark.parametrize(
         ("constraints", "message"),

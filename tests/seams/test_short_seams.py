@@ -84,7 +84,7 @@ def test_larger_trees_are_nearly_the_shortest(name):
 def test_loops_around_handles_have_no_loose_ends(name):
     mesh = TriangleMesh(*SURFACES[name])
     seams = find_seams(mesh, NONE, lengths_of(mesh))
-    assert cut_open(mesh, seams).pieces == 1
+    assert cut_open(mesh, seams).mesh.components[0] == 1
     assert np.unique(mesh.edges[seams], return_counts=True)[1].min() == 2
 
 

@@ -158,6 +158,7 @@ def find_outlines(
         corners: (m, 3) of the triangles.
         flipped: (m,) True for triangles upside down.
         chart: (m,) chart of each triangle, below `count`. Every chart has a triangle.
+        count: number of charts.
         is_open: (m, 3) the sides, from each corner on, that are not known to cancel in pairs; None for all.
     """
     if flipped.any():

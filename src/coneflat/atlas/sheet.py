@@ -262,7 +262,7 @@ def part_piece(
         piece: (m,) the piece of each triangle, changed.
         own: the piece.
         cut: the edges, between triangles of it.
-        owner: (m,) -1, and (e,) `is_cut` False; on return again.
+        owner, is_cut: (m,) -1 and (e,) False, scratch; on return again.
         following: the number of the next new piece.
         first: the first triangle of the piece, or one before it.
     """

@@ -1,6 +1,5 @@
 """Where the curvature goes: cone placement and target curvatures, a file per strategy."""
 
-from ..stages import ConeSolution
 from .find import ROOM, close_search, find_cones, only_choice, open_search
 from .given import cones_at, cones_with_curvature
 from .greedy import greedy_cones
@@ -11,7 +10,6 @@ from .sparse.search import ConeSearch
 
 __all__ = [
     "ConeSearch",
-    "ConeSolution",
     "GroundedLaplacian",
     "ROOM",
     "SparseCones",

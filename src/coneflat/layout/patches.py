@@ -253,7 +253,8 @@ def add_derivatives(
     """Add up the gradient by the shifts of vertices, and the positive part of each triangle's Hessian.
 
     Args:
-        a, b: (f,) the maps. epsilon: (f,).
+        a, b: (f,) the maps.
+        epsilon: (f,) by which the determinants are smoothed, see `fill_energies`.
         a_of, b_of: (f, 3) their derivatives by the shift of each corner, as complex factors.
         corners: (f, 3) the vertex that is shifted with a corner, -1 for none.
         slots: (f, 3, 3) the block of the matrix for each pair of corners.

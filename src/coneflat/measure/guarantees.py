@@ -231,7 +231,7 @@ def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:
     if (off * shorter > EXACT * shorter + ROUNDINGS * unit).any():
         along = np.abs(rotations.handles).max(initial=0.0) > EXACT
         advice = ", as loops along handles do: correct them (correct_handles=True)" if along else ""
-        yield f"Seams turn by up to {rotations.worst:.2g} rad beside multiples of the quantum{advice}."
+        yield f"Seams turn by up to {rotations.worst:.2g} rad beside multiples of {rotations.quantum:.4g} rad{advice}."
 
 
 def _distortion(result: Flattening) -> Iterator[str]:

@@ -318,6 +318,7 @@ def has_one_fan_each(faces: IntArray, count: int, edge_of: IntArray, sides: IntA
 
     Args:
         faces: (m, 3), oriented alike.
+        count: number of vertices.
         edge_of, sides: (3m,) the edge of each half-edge, and (e, 2) the half-edges of each edge, one or two.
     """
     valence, corner = np.zeros(count, dtype=np.int64), np.full(count, -1)

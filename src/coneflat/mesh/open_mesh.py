@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,12 +20,10 @@ class CutMesh:
     Attributes:
         mesh: the cut mesh; its faces are those of the mesh before the cut, in the same order.
         origin: (c,) the vertex before the cut of each of its vertices; ascending.
-        pieces: into how many disks it falls; more than one where seams close curves. 0 if that was not asked.
     """
 
     mesh: TriangleMesh
     origin: IntArray
-    pieces: int = 0
 
 
 def cut_open(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
@@ -53,7 +51,7 @@ def cut_open(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
             f"cutting along {plural(len(seams), 'edge')} leaves no disk: Euler characteristic {euler}, "
             f"{plural(loops, 'boundary loop')}"
         )
-    return replace(cut, pieces=pieces)
+    return cut
 
 
 def open_along(mesh: TriangleMesh, seams: IntArray) -> CutMesh:

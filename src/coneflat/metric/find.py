@@ -128,7 +128,7 @@ def corrected_flat_metric(
             change = float(np.abs(np.log(lengths / given)).max())
             note = (
                 f"Rotations around holes and along handles were off by up to {first:.2g} rad; edge lengths were "
-                f"changed by up to {100 * change:.2g}% to make them multiples of the quantum."
+                f"changed by up to {100 * change:.2g}% to make them multiples of {quantum:.4g} rad (quantise)."
             )
             return replace(metric, notes=(*metric.notes, note))
         if changes is None:

@@ -1,6 +1,5 @@
 """Options: declared once, parsed at the door."""
 
-from ..base.defaults import LEAST_QUANTUM, MOST_PREFERENCE
 from .combined import Options
 from .declared import (
     CONES,
@@ -8,7 +7,6 @@ from .declared import (
     MOST_TRIANGLES,
     PAPER,
     SHOWS,
-    WIDEST_CONE,
     ConeBounds,
     ConeNumber,
     ConeOptions,
@@ -57,8 +55,6 @@ __all__ = [
     "FindOptions",
     "Flag",
     "Kind",
-    "LEAST_QUANTUM",
-    "MOST_PREFERENCE",
     "MOST_TRIANGLES",
     "MetricOptions",
     "Number",
@@ -68,7 +64,6 @@ __all__ = [
     "SHOWS",
     "Vertices",
     "VerticesOrEdges",
-    "WIDEST_CONE",
     "Weights",
     "WordOrVertices",
     "as_number",

@@ -58,7 +58,7 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
             yield "rotations along handles are made whole for quantised cones only: give quantise, pi/2 say"
         if quantum is not None and not LEAST_QUANTUM <= quantum <= 2 * math.pi * (1 + TYPED):
             yield (
-                f"the quantum must be from {LEAST_QUANTUM:g} radians, below which it restricts nothing, to 2 pi, not "
+                f"quantise must be from {LEAST_QUANTUM:g} radians, below which it restricts nothing, to 2 pi, not "
                 f"{quantum:g}"
             )
 

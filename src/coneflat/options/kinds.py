@@ -278,8 +278,10 @@ def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dic
             twice = next(v for i, v in enumerate(listed) if v in listed[:i])
             raise OptionError(f"vertex {twice} is given as a {noun} twice")
     else:
+        is_count = noun == "cone" and type(vertices) is int
+        advice = f": for so many cones give cone_count={shown(vertices)}" if is_count else ""
         raise OptionError(
-            f"{noun}s must be vertices, or a map from vertex to curvature, not {type(vertices).__name__}"
+            f"{noun}s must be vertices, or a map from vertex to curvature, not {type(vertices).__name__}{advice}"
         )
     unknown = [v for v, k in given.items() if k is None]
     if unknown and len(unknown) < len(given) and not may_differ:

@@ -1,6 +1,5 @@
 """From the input to connected parts, each with what is asked of it."""
 
-from .input_mesh import InputMesh
-from .parts import Part, Prepared, Source
+from .parts import Part, Source
 
-__all__ = ["InputMesh", "Part", "Prepared", "Source"]
+__all__ = ["Part", "Source"]

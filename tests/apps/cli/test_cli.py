@@ -16,7 +16,7 @@ import shapes
 from command import command as run
 
 from coneflat import errors, flatten, read_mesh
-from coneflat.apps.cli.options import parse_curvature
+from coneflat.apps.cli.values import parse_curvature
 
 #: A line of progress, which comes by the clock.
 PROGRESS = re.compile(r" *\d+\.\d s +\d+%  .*")

@@ -11,14 +11,9 @@ from shapes import laid_out, lengths_of
 
 from coneflat import TriangleMesh, errors
 from coneflat.apps.peers import flatten_by
-from coneflat.apps.peers.circle_patterns import (
-    LEAST_MEETING,
-    LEAST_PART,
-    RadiiProblem,
-    circle_pattern,
-    circle_patterns,
-    coherent_angles,
-)
+from coneflat.apps.peers.circle_patterns import circle_patterns
+from coneflat.apps.peers.pattern_angles import LEAST_MEETING, LEAST_PART, coherent_angles
+from coneflat.apps.peers.pattern_radii import RadiiProblem, circle_pattern
 from coneflat.cones import greedy_cones
 from coneflat.geometry import angle_defect, corner_angles, edge_lengths
 from coneflat.geometry.delaunay import intrinsic_delaunay

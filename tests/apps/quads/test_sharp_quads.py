@@ -11,10 +11,7 @@ from test_integer_grid import check_laws
 
 from coneflat import errors, integer_grid, quads
 from coneflat.apps.quads.extract import extract_quads
-from coneflat.apps.quads.features import (
-    edge_indices,
-    sharp_edges,
-)
+from coneflat.apps.quads.features import edge_indices, sharp_edges
 from coneflat.apps.quads.quality import measure_quads
 from coneflat.layout.relax.elimination import orthogonal_solutions, sparse_solutions
 from coneflat.mesh.connectivity import TriangleMesh

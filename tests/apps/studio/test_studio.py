@@ -15,7 +15,7 @@ import coneflat
 from coneflat.apps.cli.main import cli
 from coneflat.apps.studio.choices import Choices, Cone, command_line, python_lines
 from coneflat.apps.studio.project import Project, hash_of, read_project
-from coneflat.apps.studio.session import History
+from coneflat.apps.studio.steps import History
 from coneflat.errors import OptionError, ProjectError, StudioError
 
 CONES = (3, 60, 200, 410, 500)

@@ -13,14 +13,14 @@ from click.testing import CliRunner
 import coneflat
 from coneflat.apps.cli.main import cli
 from coneflat.apps.studio.choices import Choices
-from coneflat.apps.studio.paint import Paint, Region, region_of
+from coneflat.apps.studio.paint import Paint, Region
 from coneflat.apps.studio.project import read_project
 from coneflat.apps.studio.session import Session
 from coneflat.errors import OptionError, StudioError
 
 
 def region(vertices):
-    return region_of(np.array(sorted(vertices), dtype=np.int64))
+    return Region.of_runs((vertex, vertex) for vertex in vertices)
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ import shapes
 import coneflat
 from coneflat.apps.studio.choices import Choices
 from coneflat.apps.studio.messages import CONTROLS, in_page, misplaced, within
-from coneflat.apps.studio.paint import Region, region_of
+from coneflat.apps.studio.paint import Region
 from coneflat.apps.studio.session import Session
 from coneflat.base.defaults import MAX_CONE_ANGLE
 from coneflat.errors import StudioError
@@ -39,9 +39,10 @@ def settled(session):
 
 class TestPlaces:
     def test_what_is_in_a_region(self):
-        some = np.flatnonzero(np.random.default_rng(7).random(400) < 0.4)
+        some = np.flatnonzero(np.random.default_rng(7).random(400) < 0.4).tolist()
+        region = Region.of_runs((vertex, vertex) for vertex in some)
         every = list(range(-3, 410))
-        assert within(region_of(some), every) == [v for v in every if v in set(some.tolist())]
+        assert within(region, every) == [v for v in every if v in set(some)]
         assert within(Region(), every) == []
 
     def test_one_and_several(self):

@@ -17,7 +17,7 @@ from coneflat.errors import OptionError
 pytest.importorskip("matplotlib")
 
 from coneflat.apps.cli import figure as figure_command
-from coneflat.apps.view import KINDS
+from coneflat.apps.view.figures.kinds import KINDS
 
 
 @pytest.fixture(scope="module")

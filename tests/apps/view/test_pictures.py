@@ -5,24 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
-from drawing import (
-    BLACK,
-    RED,
-    SVG,
-    axes_of,
-    count_dots,
-    enclosed,
-    groups,
-    polygons,
-    shown_at,
-)
+from drawing import BLACK, RED, SVG, axes_of, count_dots, enclosed, groups, polygons, shown_at
 
 import coneflat
 
 pytest.importorskip("matplotlib")
 
-from coneflat.apps.view import draw_cone_curve, draw_cones, draw_layout, draw_quality, quantity
+from coneflat.apps.view import draw_cones, draw_layout, quantity
 from coneflat.apps.view.figures import uv_layout as layout
+from coneflat.apps.view.figures.model import draw_cone_curve
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +58,8 @@ class TestQuality:
         from matplotlib import colormaps
 
         axes = axes_of(size=8.0)
-        shown = draw_quality(result, axes, on="layout", measure="qc", dpi=100)
+        shown = quantity.conformal_distortion(result)
+        layout.fill_layout(axes, result, shown, dpi=100)
         share = np.clip((result.distortion.qc - 1) / (shown.scale.high - 1), 0, 1)
         expected = 255 * np.asarray(colormaps["viridis_r"](share))[:, :3]
         found = shown_at(axes, result.corner_uv.mean(axis=1))

@@ -7,7 +7,8 @@ import pytest
 import shapes
 from shapes import tube
 
-from coneflat.apps.view.figures.projection import eye_direction, fit_camera, rasterise, render_mesh
+from coneflat.apps.view.figures.camera import eye_direction, fit_camera
+from coneflat.apps.view.figures.render import rasterise, render_mesh
 from coneflat.errors import OptionError
 from coneflat.io.texture import DARK_CELL, LIGHT_CELL
 

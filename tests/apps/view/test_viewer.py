@@ -14,7 +14,7 @@ from command import command
 from shapes import sphere
 
 import coneflat
-from coneflat.apps.view.figures.projection import rasterise
+from coneflat.apps.view.figures.render import rasterise
 from coneflat.apps.view.page.content import content_of, outline_halfedges
 from coneflat.apps.view.page.webpage import page_of
 from coneflat.errors import MeshError, MeshFileError, OptionError, UnknownFormatError
@@ -181,7 +181,7 @@ class TestThinning:
 class TestFiles:
     def test_without_a_path_it_is_opened(self, result, monkeypatch):
         opened = []
-        monkeypatch.setattr("coneflat.apps.view.page.webpage.open_page", opened.append)
+        monkeypatch.setattr("coneflat.apps.view.open_page", opened.append)
         path = result.view()
         assert opened == [path]
         assert path.read_text(encoding="utf-8").startswith("<!doctype html>")

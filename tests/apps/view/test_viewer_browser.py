@@ -21,7 +21,7 @@ def colour_at(visit, u, v):
 
 def inner_points(viewed, cell, count=12):
     """Middles of squares of the plane that lie well inside a triangle-covered part."""
-    from coneflat.apps.view.figures.projection import rasterise
+    from coneflat.apps.view.figures.render import rasterise
 
     flat = np.column_stack([1000 * viewed.uv, np.zeros(len(viewed.uv))])
     covered = rasterise(flat, viewed.uv_faces, 1000, 1000).covered

@@ -56,14 +56,14 @@ def cones(
     """
     from ... import cone_curve, find_cones
     from ...io import atomic_write, check_target, read_joined
-    from ..view import check_figure_target, make_figure, new_figure, save_figure
+    from ..view import check_figure, make_figure, new_figure, save_figure
     from .run import FLATTENED, READ, Console
 
     flags, options = chosen(given, ConeFlags), keywords(given, FindOptions)
     picture = None
     if flags.curve:
         new_figure(1, 1)  # says what is missing before the work
-        picture = check_figure_target(flags.picture or Path(f"{mesh.stem}_cones.png"))
+        picture = check_figure(flags.picture or Path(f"{mesh.stem}_cones.png"))
     for name in () if flags.curve else ("picture", "most"):
         if is_given(context, name):
             raise click.UsageError(f"only --curve takes --{name}: add it, or leave out --{name}", context)

@@ -14,7 +14,7 @@ from .options import chosen, eye_of, flag, flag_of, is_given, option_flags, path
 from .shared import again_option, checking, color_option, input_options, up_option, verbosity_options
 
 if TYPE_CHECKING:
-    from ..quads.quad_mesh import QuadMesh
+    from ... import QuadMesh
     from .run import Console
 
 KINDS = ("layout", "checker", "quality", "cones", "curvature", "color", "curve", "quads")
@@ -100,8 +100,7 @@ def figure(
       coneflat flatten horse.ply -o horse.npz --distortion 0.1 && coneflat figure horse.npz --kind quality
     """
     from ... import cone_curve
-    from ..view import Look, check_figure_target, make_figure, new_figure, save_figure
-    from ..view.quantity import own_quantity
+    from ..view import Look, check_figure, make_figure, new_figure, own_quantity, save_figure
     from .run import FLATTENED, READ, Console, archive_of, open_result
 
     flags = chosen(given, FigureFlags)
@@ -111,7 +110,7 @@ def figure(
     _check_combinations(context, kind)
     # What can fail at the end is looked at before the work.
     new_figure(1, 1)
-    output = check_figure_target(flags.output or Path(f"{mesh.stem}_{kind}.png"))
+    output = check_figure(flags.output or Path(f"{mesh.stem}_{kind}.png"))
     look: dict[str, Any] = {"up": up, "eyes": flags.eye or ("front-right",)}
     look |= {
         name: getattr(flags, name) for name in ("size", "dpi", "colors", "cells", "color_charts", "title")
@@ -156,9 +155,9 @@ def _quads(
     file: Path, console: Console, count: int | None, *, repair: bool, weld: bool | None
 ) -> tuple[QuadMesh, tuple[str, ...]]:
     """Return the quads that a .npz file holds, or those of a mesh; and notes on them."""
+    from ... import quads
     from ...io import read_joined
     from ..quads.files import read_quads
-    from ..quads.quads import quads
     from .run import FLATTENED, READ
 
     with console.stage("read", 0.0):

@@ -16,7 +16,7 @@ from .options import chosen, is_given, keywords, option_flags, path_flag, refuse
 from .shared import GroupedCommand, input_options, verbosity_options
 
 if TYPE_CHECKING:
-    from ..quads.integer_map import IntegerGrid
+    from ... import IntegerGrid
     from .run import Console
 
 
@@ -61,12 +61,12 @@ def quads(
       coneflat quads bunny.obj --grid bunny_grid.obj
       coneflat quads hand.obj -o hand.npz --view hand.html
     """
+    from ... import measure_quads
+    from ... import quads as find_quads
     from ...io import check_target
     from ..quads.files import check_grid_output, check_quads_output
     from ..quads.page import page_of_quads
-    from ..quads.quads import quads as find_quads
-    from ..quads.quality import measure_quads
-    from ..view.page.webpage import check_page, write_page
+    from ..view import check_page, write_page
     from .run import FLATTENED, READ, Console, require_distinct, write_report
 
     _check_combinations(context, mesh)
@@ -131,9 +131,9 @@ def _check_combinations(context: click.Context, mesh: Path) -> None:
 
 def _grid_of(mesh: Path, console: Console, options: dict[str, Any], weld: bool | None) -> IntegerGrid:
     """Return the grid of a mesh file, with notes on reading it, or the grid that a file holds."""
+    from ... import integer_grid
     from ...io import read_joined
     from ..quads.files import read_grid
-    from ..quads.integer_grid import integer_grid
     from .run import FLATTENED, READ
 
     with console.stage("read", 0.0):

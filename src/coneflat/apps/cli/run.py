@@ -22,16 +22,7 @@ from ... import Flattening, flatten, read_flattening
 from ...base import Progress as Listener
 from ...base import Stopwatch
 from ...errors import OptionError
-from ...io import (
-    PIPE,
-    Joined,
-    as_written,
-    atomic_write,
-    has_uv,
-    read_joined,
-    write_measured,
-    write_stream,
-)
+from ...io import PIPE, Joined, as_written, atomic_write, has_uv, read_joined, write_measured, write_stream
 from .shared import QUIET, VERBOSE, checking
 
 if TYPE_CHECKING:
@@ -156,7 +147,7 @@ class Console:
 
     def _result_rows(self, result: Flattening) -> list[tuple[str, str, str]]:
         """Return what an artist wants to know; if verbose, all measures and how the result was found."""
-        from ..view.from_uv import shown_rows
+        from ..view import shown_rows
 
         rows = {row[0]: row for row in shown_rows(result)}
         first = [rows.pop(name) for name in FIRST_ROWS if name in rows]
@@ -230,7 +221,7 @@ def open_result(
             return read_flattening(file)
         source = read_joined(file, weld)
     if not again and has_uv(source.mesh):
-        from ..view.from_uv import own_flattening
+        from ..view import own_flattening
 
         with console.stage("measure", READ):
             own = own_flattening(source, strict=not repair)

@@ -73,8 +73,7 @@ def view(
     from ...io import read_picture
     from ..quads.files import holds_quads, read_quads
     from ..quads.page import page_of_quads
-    from ..view.page.webpage import check_page, open_page, page_of, write_page
-    from ..view.quantity import own_quantity
+    from ..view import check_page, open_page, own_quantity, page_of, write_page
     from .run import FLATTENED, Console, archive_of, open_result
 
     # What can fail at the end is looked at before the work.

@@ -13,12 +13,4 @@ from .methods import METHODS, flatten_by
 from .paper import Reproduction, reproduce
 from .run import Comparison, Entry, compare_methods
 
-__all__ = [
-    "METHODS",
-    "Comparison",
-    "Entry",
-    "Reproduction",
-    "compare_methods",
-    "flatten_by",
-    "reproduce",
-]
+__all__ = ["METHODS", "Comparison", "Entry", "Reproduction", "compare_methods", "flatten_by", "reproduce"]

@@ -234,8 +234,9 @@ def wanted_angles(mesh: TriangleMesh, angles: FloatArray, curvature: FloatArray)
     cone for a full turn. Where one would get to half a turn, all around the vertex are made equal instead.
 
     Args:
-        angles: (m, 3) of the mesh.
-        curvature: (n,) radians.
+        mesh: the mesh.
+        angles: (m, 3) of its triangles, radians.
+        curvature: (n,) wanted, radians.
 
     Raises:
         CurvatureError: a cone has an angle of half a turn and more for each of its triangles, or none.

@@ -53,12 +53,7 @@ class PeerOptions(Options):
 
 
 def flatten_by(
-    name: str,
-    mesh: Any,
-    faces: ArrayLike | None = None,
-    *,
-    best_effort: bool = False,
-    **options: Any,
+    name: str, mesh: Any, faces: ArrayLike | None = None, *, best_effort: bool = False, **options: Any
 ) -> Flattening:
     """Flatten a triangle mesh by a method, in one chart per component by default, which all methods can make.
 

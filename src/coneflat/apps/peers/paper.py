@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ... import Flattening
-    from ..view.figures.compose import Panel, Row
-    from ..view.quantity import Quantity
+    from ..view import Panel, Quantity, Row
     from .pictures import Sight
 
 
@@ -274,11 +273,10 @@ def _place(path: Path) -> tuple[int, str, str]:
 
 def _row(panels: Sequence[Panel], quantities: Sequence[Quantity] = ()) -> Row:
     """Return panels in a row, wide enough for their labels."""
-    from ..view.figures.compose import Row
-    from .pictures import with_room
+    from ..view import Row
 
     inches = 2.2  # of height
-    return Row([with_room(panel, inches) for panel in panels], quantities[:1], tallest=inches)
+    return Row([panel.with_room(inches) for panel in panels], quantities[:1], tallest=inches)
 
 
 def _written(rows: Sequence[Sequence[object]], forms: Sequence[str]) -> list[list[str]]:

@@ -13,13 +13,7 @@ import numpy as np
 from ...geometry import signed_double_areas
 from ...io import atomic_write, check_target, make_folder
 from ...mesh import label_faces
-from ..view import draw_layout, new_figure, save_figure
-from ..view.figures.compose import Panel, Row, compose, text_width
-from ..view.figures.cone_marks import mark_handles
-from ..view.figures.model import draw_quantity
-from ..view.figures.projection import Eye, eye_direction, view_aspect
-from ..view.figures.uv_layout import fill_layout, layout_aspect
-from ..view.quantity import Quantity, conformal_distortion
+from .. import view
 from .run import Comparison, Entry
 
 if TYPE_CHECKING:
@@ -44,17 +38,17 @@ class Sight:
         OptionError: there is no such direction or axis.
     """
 
-    eye: Eye = "front-right"
+    eye: view.Eye = "front-right"
     up: str = "y"
 
     def __post_init__(self) -> None:
-        eye_direction(self.eye, self.up)
+        view.eye_direction(self.eye, self.up)
 
-    def panel(self, result: Flattening, draw: Callable[..., object], label: str, **more: Any) -> Panel:
+    def panel(self, result: Flattening, draw: Callable[..., object], label: str, **more: Any) -> view.Panel:
         """Return a panel in which a function of axes, a result and a look draws the model."""
-        aspect = view_aspect(result.vertices[np.unique(result.faces)], self.eye, self.up)
+        aspect = view.view_aspect(result.vertices[np.unique(result.faces)], self.eye, self.up)
         look = {"result": result, "eye": self.eye, "up": self.up, "dpi": DPI, **more}
-        return Panel(aspect, lambda axes: draw(axes=axes, **look), label)
+        return view.Panel(aspect, lambda axes: draw(axes=axes, **look), label)
 
 
 def draw_layouts(comparison: Comparison) -> Figure:
@@ -65,9 +59,9 @@ def draw_layouts(comparison: Comparison) -> Figure:
     shown = comparison.drawn
     quantities = same_scale(shown)
     panels = [
-        Panel(
-            layout_aspect(result, crop=True),
-            partial(fill_layout, result=result, quantity=quantity, dpi=DPI),
+        view.Panel(
+            view.layout_aspect(result, crop=True),
+            partial(view.fill_layout, result=result, quantity=quantity, dpi=DPI),
             labelled(entry.method, result),
         )
         for entry, quantity, result in zip(shown, quantities, turned_alike(shown), strict=True)
@@ -82,10 +76,12 @@ def draw_qualities(comparison: Comparison, sight: Sight) -> Figure:
     return figure_of(in_rows(panels, quantities[:1]))
 
 
-def quality_panels(entries: Sequence[Entry], quantities: Sequence[Quantity], sight: Sight) -> list[Panel]:
+def quality_panels(
+    entries: Sequence[Entry], quantities: Sequence[view.Quantity], sight: Sight
+) -> list[view.Panel]:
     """Return a panel of the model with a quantity for each method."""
     return [
-        sight.panel(result, draw_quantity, labelled(entry.method, result), quantity=quantity)
+        sight.panel(result, view.draw_quantity, labelled(entry.method, result), quantity=quantity)
         for entry, quantity in zip(entries, quantities, strict=True)
         if (result := entry.result) is not None
     ]
@@ -121,9 +117,9 @@ def labelled(method: str, result: Flattening) -> str:
     return f"{method}: {result.distortion.qc_mean:.4f}"
 
 
-def same_scale(entries: Sequence[Entry]) -> list[Quantity]:
+def same_scale(entries: Sequence[Entry]) -> list[view.Quantity]:
     """Return the quasi-conformal distortion by each method, in colours that mean the same."""
-    quantities = [conformal_distortion(entry.result) for entry in entries if entry.result is not None]
+    quantities = [view.conformal_distortion(entry.result) for entry in entries if entry.result is not None]
     if not quantities:
         return []
     # Colours end at the distortion of the method in the middle, as most are far better than the worst.
@@ -133,25 +129,26 @@ def same_scale(entries: Sequence[Entry]) -> list[Quantity]:
     return [replace(one, scale=scale, label=name) for one, name in zip(quantities, names, strict=True)]
 
 
-def layout_panel(result: Flattening, label: str) -> Panel:
+def layout_panel(result: Flattening, label: str) -> view.Panel:
     """Return a panel of the charts."""
-    return Panel(layout_aspect(result, crop=True), partial(draw_layout, result, crop=True), label)
+    return view.Panel(
+        view.layout_aspect(result, crop=True), partial(view.draw_layout, result, crop=True), label
+    )
 
 
-def figure_of(rows: Sequence[Row], *, marks_of: Flattening | None = None) -> Figure:
+def figure_of(rows: Sequence[view.Row], *, marks_of: Flattening | None = None) -> Figure:
     """Return rows of panels as wide as a page."""
-    return compose(rows, marks=[] if marks_of is None else mark_handles(marks_of), dpi=DPI, width=10.0)
+    return view.compose(
+        rows, marks=[] if marks_of is None else view.mark_handles(marks_of), dpi=DPI, width=10.0
+    )
 
 
-def in_rows(panels: Sequence[Panel], quantities: Sequence[Quantity] = ()) -> list[Row]:
+def in_rows(panels: Sequence[view.Panel], quantities: Sequence[view.Quantity] = ()) -> list[view.Row]:
     """Return panels in rows of `IN_A_ROW`."""
-    wide = [with_room(panel, TALLEST) for panel in panels]
-    return [Row(wide[k : k + IN_A_ROW], quantities, tallest=TALLEST) for k in range(0, len(wide), IN_A_ROW)]
-
-
-def with_room(panel: Panel, height: float) -> Panel:
-    """Return a panel that is wide enough for its label, if it is of a height in inches."""
-    return replace(panel, aspect=max(panel.aspect, text_width(panel.label) / height))
+    wide = [panel.with_room(TALLEST) for panel in panels]
+    return [
+        view.Row(wide[k : k + IN_A_ROW], quantities, tallest=TALLEST) for k in range(0, len(wide), IN_A_ROW)
+    ]
 
 
 def open_folder(folder: Path, names: Iterable[str]) -> None:
@@ -161,7 +158,7 @@ def open_folder(folder: Path, names: Iterable[str]) -> None:
         OptionError: matplotlib, which draws the pictures, is not installed.
         MeshFileError: the folder cannot be made, or a file not be written there.
     """
-    new_figure(1, 1)
+    view.new_figure(1, 1)
     make_folder(folder)
     for name in names:
         check_target(folder / name)
@@ -174,5 +171,5 @@ def write_folder(folder: Path, contents: Mapping[str, str | Figure]) -> list[Pat
             with atomic_write(folder / name, "w") as file:
                 file.write(content)
         else:
-            save_figure(content, folder / name)
+            view.save_figure(content, folder / name)
     return [folder / name for name in contents]

@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..view.figures.cone_marks import DOT_REACH, mark_scale
-from ..view.figures.model import DOTS_PER_INCH, show_mesh
-from ..view.figures.projection import Eye
+from ..view import DOT_REACH, DOTS_PER_INCH, Eye, mark_scale, show_mesh
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import re
 import zipfile
+from collections.abc import Callable
 from dataclasses import fields
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeAlias
 
 import numpy as np
 
@@ -38,12 +40,18 @@ from ...io import (
 from .integer_map import IntegerGrid, find_motions, grid_of_corners
 from .quad_mesh import QuadMesh
 
+Check: TypeAlias = Callable[["str | PathLike[str]"], Path]
+
 #: Endings of the files that `write_quads` writes.
 QUAD_FORMATS = (".obj", ".ply", ".glb", ".npz")
+#: Returns a path with which `write_quads` can be expected to succeed; raises what it would raise otherwise.
+check_quads_output: Check = partial(checked_target, endings=QUAD_FORMATS, what="quads are written as")
 #: Arrays from which a mesh of quads is made again.
 _NAMES = ("vertices", "quads", "faces", "barycentric", "surface_vertices", "surface_faces", "report")
 #: Endings of the files that `write_grid` writes and `read_grid` reads.
 GRID_FORMATS = (".obj", ".npz")
+#: The same for `write_grid`.
+check_grid_output: Check = partial(checked_target, endings=GRID_FORMATS, what="integer grids are written as")
 #: The arrays of an integer grid, and its numbers.
 _ARRAYS, _NUMBERS = (
     [field.name for field in fields(IntegerGrid) if str(field.type).endswith(kind)]
@@ -57,16 +65,6 @@ _HEAD = (
     "# left, R being so many quarter turns to the left. Other edges are no seams.",
     "# Lines (l) are sharp edges on grid lines.",
 )
-
-
-def check_quads_output(path: str | PathLike[str]) -> Path:
-    """Return the path if `write_quads` can be expected to succeed with it.
-
-    Raises:
-        UnknownFormatError: the ending is not one of `QUAD_FORMATS`.
-        MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
-    """
-    return checked_target(path, QUAD_FORMATS, "quads are written as")
 
 
 def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
@@ -207,16 +205,6 @@ def _write_glb(mesh: QuadMesh, stream: IO[bytes]) -> None:
     lines = primitive(mesh.vertices + 0.01 * length * normals, mesh.edges, material=1, mode=1)
     glb.tree["meshes"] = [{"name": "quads", "primitives": [faces, lines]}]
     glb.write(stream)
-
-
-def check_grid_output(path: str | PathLike[str]) -> Path:
-    """Return the path if `write_grid` can be expected to succeed with it.
-
-    Raises:
-        UnknownFormatError: the ending is not one of `GRID_FORMATS`.
-        MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
-    """
-    return checked_target(path, GRID_FORMATS, "integer grids are written as")
 
 
 def write_grid(path: str | PathLike[str], grid: IntegerGrid) -> Path:

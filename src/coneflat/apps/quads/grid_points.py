@@ -297,6 +297,7 @@ def _follow(
     Args:
         f, x, y, d: triangle, coordinates and direction at the start.
         on_left: follow the line just left of itself, so that what is on it lies right; or just right of it.
+        parts: (12,) scratch, see `orientation`.
 
     Returns:
         For the entry BOUNDARY, where the way leaves the surface; LOST, where it ends at no grid point.

@@ -11,9 +11,7 @@ from ... import Flattening
 from ...base import BoolArray, IntArray, plural
 from ...io import Mapped
 from ...mesh import label_components
-from ..view.from_uv import flattening_of
-from ..view.page.payload import Told
-from ..view.page.webpage import page_of
+from ..view import Told, flattening_of, page_of
 from .quad_mesh import QuadMesh
 from .quality import measure_quads
 from .transitions import TURNS

@@ -16,8 +16,7 @@ from ...errors import GridError
 from ...mesh import sort_pairs
 
 if TYPE_CHECKING:
-    from ..view.figures.compose import Row
-    from ..view.figures.kinds import Look
+    from ..view import Look, Row
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +127,7 @@ class QuadMesh:
 
     def figure_rows(self, look: Look) -> tuple[list[Row], list[Any]]:
         """Return the rows of a figure of the kind "quads" by `make_figure`, and what its legend names."""
-        from ..view.figures.compose import Row
+        from ..view import Row
         from .figure import draw_quads, irregular_handles
 
         return [Row(look.views(self, draw_quads, faces=self.quads))], irregular_handles(self)

@@ -22,10 +22,7 @@ from ...base import asking
 from ...errors import NonManifoldError, NonOrientableError
 from ...io import Joined, read_joined
 from ...options import MOST_TRIANGLES
-from ..view.from_uv import shown_rows
-from ..view.page.content import Model, content_of
-from ..view.page.payload import Told, head_and_block, pack
-from ..view.quantity import Quantity, own_quantity
+from ..view import Model, Quantity, Told, content_of, head_and_block, own_quantity, pack, shown_rows
 from .choices import Choices
 from .known import with_prints
 from .messages import in_page, noted, strained

@@ -13,7 +13,7 @@ from ... import TriangleMesh
 from ...base import MOST_CONES
 from ...errors import StudioError
 from ...mesh import end_corners
-from ..view.page.content import outline_halfedges
+from ..view import outline_halfedges
 
 if TYPE_CHECKING:
     from ... import Flattening
@@ -48,8 +48,7 @@ def saved(result: Flattening | None, ending: str) -> bytes:
         return layout_svg(result).encode("utf-8")
     stream = BytesIO()
     if ending == ".png":
-        from ..view import make_figure
-        from ..view.figures.compose import write_figure
+        from ..view import make_figure, write_figure
 
         write_figure(make_figure(result, "layout"), stream, ending)
     else:
@@ -72,8 +71,8 @@ def quads_of(source: Joined, choices: Choices, count: int, ending: str, told: To
         ending: one of `QUADS`.
         told: as of `coneflat.flatten`'s progress.
     """
+    from ... import quads
     from ..quads.files import write_quads_stream
-    from ..quads.quads import quads
 
     words = choices.searching().keywords()
     options = {name: words[name] for name in OF_QUADS if name in words}

@@ -6,14 +6,11 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...base import shown
 from ...errors import StudioError
 from ...options import as_number
-
-if TYPE_CHECKING:
-    from ...base import IntArray
 
 #: A region in words: numbers, and first and last of those that follow each other.
 _RUN = re.compile(r"([0-9]{1,15})(?:-([0-9]{1,15}))?")
@@ -104,17 +101,6 @@ class Region:
 
     def __bool__(self) -> bool:
         return bool(self.text)
-
-
-def region_of(vertices: IntArray) -> Region:
-    """Return the region of some vertices (k,), ascending and all different."""
-    import numpy as np
-
-    if not len(vertices):
-        return Region()
-    breaks = np.flatnonzero(np.diff(vertices) > 1)
-    first, last = np.append(vertices[0], vertices[breaks + 1]), np.append(vertices[breaks], vertices[-1])
-    return Region.of_runs(zip(first.tolist(), last.tolist(), strict=True))
 
 
 def _merged(runs: Iterable[tuple[int, int]]) -> Runs:

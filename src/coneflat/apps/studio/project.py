@@ -161,7 +161,9 @@ def file_within(name: str, folder: Path) -> Path:
     Raises:
         StudioError: it lies elsewhere, or has no proper name.
     """
-    if not name or name != Path(name).name or name.startswith(".") or "\\" in name or "\0" in name:
+    if not name:
+        raise StudioError("no file is named: give the name of a mesh or a project in the session's folder")
+    if name != Path(name).name or name.startswith(".") or "\\" in name or "\0" in name:
         raise StudioError(f"{shown(name)} is no name of a file in the session's folder")
     path = folder / name
     if not path.resolve().is_relative_to(folder):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...errors import OptionError, StudioError
-from ..view.page.webpage import open_address
+from ..view import open_address
 
 if TYPE_CHECKING:
     from .server import StudioServer

@@ -1,31 +1,61 @@
-"""Figures of meshes and flattenings; needs matplotlib (`pip install "coneflat[figures]"`)."""
+"""Figures and the interactive page of meshes and flattenings; figures need matplotlib (`coneflat[figures]`)."""
 
 from __future__ import annotations
 
-from .figures.compose import FIGURE_FORMATS, check_figure_target, new_figure, save_figure
-from .figures.kinds import KINDS, Look, demo_figure, make_figure
-from .figures.model import draw_checker, draw_cone_curve, draw_cones, draw_curvature, draw_quality
-from .figures.projection import MeshPicture, render_mesh
-from .figures.uv_layout import draw_layout
-from .quantity import ColorScale, Quantity
+from .figures.camera import Eye, eye_direction, view_aspect
+from .figures.compose import Panel, Row, check_figure, compose, new_figure, save_figure, write_figure
+from .figures.cone_marks import DOT_REACH, mark_handles, mark_scale
+from .figures.kinds import Look, demo_figure, make_figure
+from .figures.model import DOTS_PER_INCH, draw_checker, draw_cones, draw_quantity, show_mesh
+from .figures.uv_layout import draw_layout, fill_layout, layout_aspect
+from .from_uv import flattening_of, own_flattening, shown_rows
+from .page.content import Model, content_of, outline_halfedges
+from .page.payload import Told, head_and_block, pack
+from .page.webpage import check_page, notebook_html, open_address, open_page, page_around, page_of, write_page
+from .quantity import Quantity, conformal_distortion, own_quantity
 
 __all__ = [
-    "FIGURE_FORMATS",
-    "KINDS",
-    "ColorScale",
+    "DOTS_PER_INCH",
+    "DOT_REACH",
+    "Eye",
     "Look",
-    "MeshPicture",
+    "Model",
+    "Panel",
     "Quantity",
-    "check_figure_target",
+    "Row",
+    "Told",
+    "check_figure",
+    "check_page",
+    "compose",
+    "conformal_distortion",
+    "content_of",
     "demo_figure",
     "draw_checker",
-    "draw_cone_curve",
     "draw_cones",
-    "draw_curvature",
     "draw_layout",
-    "draw_quality",
+    "draw_quantity",
+    "eye_direction",
+    "fill_layout",
+    "flattening_of",
+    "head_and_block",
+    "layout_aspect",
     "make_figure",
+    "mark_handles",
+    "mark_scale",
     "new_figure",
-    "render_mesh",
+    "notebook_html",
+    "open_address",
+    "open_page",
+    "outline_halfedges",
+    "own_flattening",
+    "own_quantity",
+    "pack",
+    "page_around",
+    "page_of",
     "save_figure",
+    "show_mesh",
+    "shown_rows",
+    "view_aspect",
+    "write_figure",
+    "write_page",
 ]

@@ -16,8 +16,6 @@ from ...geometry import angle_defect, corner_angles, double_areas, edge_lengths
 from ...measure import quantile
 
 if TYPE_CHECKING:
-    from matplotlib.cm import ScalarMappable
-
     from ... import Flattening
 
 
@@ -63,14 +61,6 @@ class ColorScale:
         colors = np.asarray(colormaps[self.colors](np.nan_to_num(position)))[..., :3]
         colors[np.isnan(position)] = 0.6
         return colors
-
-    def mappable(self) -> ScalarMappable:
-        """Return what `Figure.colorbar` of matplotlib makes a colour bar of."""
-        from matplotlib.cm import ScalarMappable
-        from matplotlib.colors import LogNorm, Normalize
-
-        norm = LogNorm if self.kind == "log" else Normalize
-        return ScalarMappable(norm(self.low, self.high), self.colors)
 
 
 @dataclass(frozen=True, eq=False)

@@ -208,7 +208,7 @@ def quantise_cones(
 def open_lattice(search: ConeSearch, quantum: float) -> Lattice:
     """Return the lattice of multiples of a quantum that a search's limits allow, without cones yet."""
     if not LEAST_QUANTUM <= quantum <= FULL_TURN * (1 + TYPED):
-        raise OptionError(f"the quantum must be from {LEAST_QUANTUM:g} radians to 2 pi, not {quantum:g}")
+        raise OptionError(f"quantum must be from {LEAST_QUANTUM:g} radians to 2 pi, not {quantum:g}")
     parts = round(FULL_TURN / quantum)
     if abs(parts * quantum - FULL_TURN) <= TYPED * FULL_TURN:
         quantum = FULL_TURN / parts

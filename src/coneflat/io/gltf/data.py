@@ -1,8 +1,5 @@
 """The JSON and the arrays of glTF 2.0 files, every reference checked before anything is allocated.
 
-Also which arrays the rest of a tree names, beyond what the mesh is made of: what is written keeps all that, extensions
-included, and must not carry along what nothing names any more.
-
 An own reader, because no library keeps all of what a GLB that is written has to reproduce, nor looks at what a file
 asks for before it is given. Names and numbers are those of the specification (Khronos, glTF 2.0, Sections 3.6, 4.4).
 """
@@ -37,11 +34,6 @@ SHAPES = {
     "SCALAR": (1, 1), "VEC2": (2, 1), "VEC3": (3, 1), "VEC4": (4, 1), "MAT2": (2, 2), "MAT3": (3, 3), "MAT4": (4, 4),
 }  # fmt: skip
 COMPRESSED = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-#: What stands under these names in extensions is a number of something else than an array.
-_NO_ARRAYS = ("index", "texCoord", "source", "sampler", "material", "light", "node", "mesh", "variants")
-_LISTS = (
-    "accessors", "bufferViews", "images", "materials", "meshes", "nodes", "textures", "skins", "animations",
-)  # fmt: skip
 _HEADER = struct.Struct("<4sII")
 _CHUNK = struct.Struct("<I4s")
 
@@ -170,7 +162,7 @@ class GltfData:
             rows = self._rows(index, item, form.length, form.item_bytes, stride)
         sparse = item.get("sparse")
         if sparse is not None:
-            rows = self._with_sparse(index, self.entry(item, "sparse", dict), rows, form.kind)
+            rows = self._with_sparse(index, self.entry(item, "sparse", dict), rows)
         return rows
 
     def values(self, index: Any, columns: int) -> FloatArray:
@@ -217,7 +209,7 @@ class GltfData:
             self.fail(f"accessor {index} ends at {end:,} of the {len(data):,} bytes of its buffer view")
         return np.ndarray((count, size), np.uint8, data, start, (step, 1))
 
-    def _with_sparse(self, index: Any, sparse: Item, rows: ByteRows, kind: np.dtype[Any]) -> ByteRows:
+    def _with_sparse(self, index: Any, sparse: Item, rows: ByteRows) -> ByteRows:
         """Return an array with those elements replaced that the accessor lists."""
         count = self.count(sparse, "count")
         where, new = self.entry(sparse, "indices", dict), self.entry(sparse, "values", dict)
@@ -312,104 +304,3 @@ def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes | None]:
     if b"JSON" not in found:
         raise MeshFileError(f"{path} is not a readable GLB file: it has no JSON chunk")
     return found[b"JSON"], found.get(b"BIN\0")
-
-
-def check_references(data: GltfData) -> None:
-    """Refuse a tree that could not be written again, since something in it is not what it should be.
-
-    Raises:
-        MeshFileError, KeyError, TypeError, AttributeError: respectively.
-    """
-    for name in _LISTS:
-        for i, item in enumerate(data.items(name)):
-            data.entry(item, "extensions", dict)
-            if name == "bufferViews":
-                data.view(i)
-            elif name == "meshes":
-                data.entry(item, "primitives", list)
-            elif name == "nodes" and "mesh" in item:
-                data.item("meshes", item["mesh"])
-    for name in ("extensionsUsed", "extensionsRequired"):
-        data.entry(data.tree, name, list)
-    for name, index in _references(data):
-        data.item(name, index)
-    for accessor in accessors_of_arrays(data.tree):
-        for owner in view_owners(data.item("accessors", accessor)):
-            data.view(owner["bufferView"])
-    for view in views_of_images(data.tree):
-        data.view(view)
-
-
-def _references(data: GltfData) -> Iterator[tuple[str, Any]]:
-    """Yield the list and the number of what scenes, nodes, primitives, textures and skins name, beside arrays."""
-    tree, entry = data.tree, data.entry
-    if "scene" in tree:
-        yield "scenes", tree["scene"]
-    singles = {
-        "nodes": {"mesh": "meshes", "skin": "skins", "camera": "cameras"},
-        "textures": {"source": "images", "sampler": "samplers"},
-        "skins": {"skeleton": "nodes"},
-    }
-    for kind, names in singles.items():
-        for item in entry(tree, kind, list):
-            yield from ((to, item[name]) for name, to in names.items() if name in item)
-    for kind, name in (("scenes", "nodes"), ("nodes", "children"), ("skins", "joints")):
-        for item in entry(tree, kind, list):
-            yield from (("nodes", node) for node in entry(item, name, list))
-    for mesh in entry(tree, "meshes", list):
-        yield from (("materials", one["material"]) for one in mesh["primitives"] if "material" in one)
-
-
-def accessors_of_arrays(tree: Item) -> Iterator[int]:
-    """Yield the accessors that meshes, skins and animations name."""
-    for mesh in tree.get("meshes", []):
-        for one in mesh["primitives"]:
-            yield from one.get("attributes", {}).values()
-            if "indices" in one:
-                yield one["indices"]
-            for target in one.get("targets", []):
-                yield from target.values()
-    for skin in tree.get("skins", []):
-        if "inverseBindMatrices" in skin:
-            yield skin["inverseBindMatrices"]
-    for animation in tree.get("animations", []):
-        for sampler in animation.get("samplers", []):
-            yield from (sampler[name] for name in ("input", "output") if name in sampler)
-
-
-def views_of_images(tree: Item) -> Iterator[int]:
-    """Yield the buffer views of images."""
-    return (image["bufferView"] for image in tree.get("images", []) if "bufferView" in image)
-
-
-def view_owners(accessor: Item) -> list[Item]:
-    """Return the parts of an accessor that have a buffer view."""
-    sparse = accessor.get("sparse", {})
-    parts = (accessor, sparse.get("indices", {}), sparse.get("values", {}))
-    return [one for one in parts if "bufferView" in one]
-
-
-def numbers_in_extensions(tree: Any) -> Iterator[int]:
-    """Yield all numbers in extensions, of which some may name arrays or buffer views."""
-    stack = [(tree, False)]
-    while stack:
-        item, is_inside = stack.pop()
-        if isinstance(item, dict):
-            kept = ((key, value) for key, value in item.items() if key not in _NO_ARRAYS)
-            stack += [(value, is_inside or key == "extensions") for key, value in kept]
-        elif isinstance(item, list):
-            stack += [(value, is_inside) for value in item]
-        elif is_inside and isinstance(item, int):
-            yield item
-
-
-def keys_of(item: Any) -> Iterator[str]:
-    """Yield all keys of an object and of those within."""
-    stack = [item]
-    while stack:
-        item = stack.pop()
-        if isinstance(item, dict):
-            yield from item
-            stack += item.values()
-        elif isinstance(item, list):
-            stack += item

@@ -18,7 +18,8 @@ from ...base.arrays import FloatArray, IntArray
 from ...errors import EmptyMeshError
 from ...mesh.check import weld
 from ..mesh_file import MeshFile
-from .data import GltfData, Item, check_references, numbers
+from .data import GltfData, Item, numbers
+from .references import check_references
 
 DRACO = "KHR_draco_mesh_compression"
 #: A scene may show its meshes so often that it has as many corners in all,

@@ -25,17 +25,9 @@ from ...geometry.triangles import vertex_normals
 from ..files import moved_path, read_bytes
 from ..split import shading_normals, source_normals, split_at_seams
 from ..texture import Texture, image_kind
-from .data import (
-    COMPRESSED,
-    GltfData,
-    Item,
-    accessors_of_arrays,
-    keys_of,
-    numbers_in_extensions,
-    view_owners,
-    views_of_images,
-)
+from .data import COMPRESSED, GltfData, Item
 from .read import DRACO, GltfScene, Mode, ScenePart
+from .references import accessors_of_arrays, keys_of, numbers_in_extensions, view_owners, views_of_images
 
 if TYPE_CHECKING:
     from ...result import Flattening

@@ -1,7 +1,7 @@
 """Less distortion of a layout whose seams stay rigid copies: a general solver."""
 
 from .constraints import Lines, PointConstraints
-from .energies import Derivatives, Energy, StretchEnergy
+from .energies import StretchEnergy
 from .relax import Relaxed, relax
 
-__all__ = ["PointConstraints", "Derivatives", "StretchEnergy", "Energy", "Lines", "Relaxed", "relax"]
+__all__ = ["Lines", "PointConstraints", "Relaxed", "StretchEnergy", "relax"]

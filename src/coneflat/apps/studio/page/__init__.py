@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 
-from ...view.page.webpage import page_around
+from ....options import Options, declarations
+from ...view import page_around
+from ..choices import PLAIN
 
 #: What the page may do: draw, and talk to the server that it came from.
 POLICY = (
@@ -20,10 +23,12 @@ _SCRIPTS = ("server", "surface", "graph", "paint", "tools", "overlay", "sizes", 
 @cache
 def studio_page(formats: Sequence[str]) -> str:
     """Return the page as text; formats: the endings of meshes that can be dropped on it."""
+    defaults = {name: declarations(Options)[name].default for name in PLAIN}
+    scripts = [f"const DEFAULTS = {json.dumps(defaults)};", *(_read(f"{name}.js") for name in _SCRIPTS)]
     return page_around(
         POLICY,
         "",
-        script="\n".join(_read(f"{name}.js") for name in _SCRIPTS),
+        script="\n".join(scripts),
         style=_read("studio.css"),
         panel=_read("panel.html").replace("{{formats}}", ",".join((*formats, ".json"))),
         keys=_read("keys.html"),

@@ -80,7 +80,7 @@ class Panel {
 
   placeBy(kind) {
     const {studio} = this;
-    if (kind === "distortion") studio.act({do: "set", name: "distortion", value: studio.choices.options.distortion ?? DISTORTION});
+    if (kind === "distortion") studio.act({do: "set", name: "distortion", value: studio.choices.options.distortion ?? DEFAULTS.distortion});
     if (kind === "cone_count") studio.act({do: "set", name: "cone_count", value: studio.coneRows().length});
     if (kind === "hand") studio.act({do: "hand"});
   }
@@ -97,30 +97,30 @@ class Panel {
   // What is shown.
 
   show() {
-    const {news, choices, tools} = this.studio, {options} = choices;
+    const {news, choices, tools} = this.studio, options = {...DEFAULTS, ...choices.options};
     this.part("undo").disabled = !news?.undo;
     this.part("redo").disabled = !news?.redo;
     for (const [key, , , hint] of [...TOOLS, ...BRUSHES]) {
       this.part(`tool-${key}`).setAttribute("aria-pressed", String(tools.mode === key));
       if (tools.mode === key) this.part("hint").textContent = hint;
     }
-    const by = choices.by_hand ? "hand" : "cone_count" in options ? "cone_count" : "distortion";
+    const by = choices.by_hand ? "hand" : "cone_count" in choices.options ? "cone_count" : "distortion";
     this.part("cones-by").value = by;
     this.part("distortion").closest("label").hidden = by !== "distortion";
     this.part("cone-count").closest("label").hidden = by !== "cone_count";
-    this.value("distortion", Math.log10(options.distortion ?? DISTORTION));
-    this.part("distortion-value").textContent = (options.distortion ?? DISTORTION).toPrecision(2);
+    this.value("distortion", Math.log10(options.distortion));
+    this.part("distortion-value").textContent = options.distortion.toPrecision(2);
     this.value("cone-count", options.cone_count ?? 0);
     this.value("sharp", options.sharp_angle == null ? "" : Number(((options.sharp_angle * 180) / Math.PI).toFixed(2)));
-    this.value("hide", options.hide_seams ?? 0);
-    this.part("hide-value").textContent = options.hide_seams ?? 0;
+    this.value("hide", options.hide_seams);
+    this.part("hide-value").textContent = options.hide_seams;
     this.part("own-seams").checked = options.seams === "input";
-    this.value("boundary", options.boundary ?? "free");
+    this.value("boundary", options.boundary);
     this.part("boundary").closest("label").hidden = this.part("tool-corner").hidden = !this.studio.hasBoundary();
-    this.value("resolution", options.resolution ?? 1024);
-    this.value("padding", options.padding ?? 2);
-    this.value("stretch", options.stretch ?? 0);
-    this.value("charts", options.charts ?? "atlas");
+    this.value("resolution", options.resolution);
+    this.value("padding", options.padding);
+    this.value("stretch", options.stretch);
+    this.value("charts", options.charts);
     for (const saving of this.part("exports").children) saving.disabled = !this.studio.viewer;
     this.part("save-quads").disabled = !this.studio.viewer || this.studio.making === "quads";
     this.part("save-quads").textContent = this.studio.making === "quads" ? "Making quads…" : "Quads, OBJ";

@@ -1,6 +1,5 @@
 // The studio at work: hears from the server what is so, and shows it.
 
-const DISTORTION = 0.2; // where none is chosen, as in `coneflat.flatten`
 const FAINT = 0.45; // how strongly paint is shown while nobody paints
 const RETRY = 1500; // milliseconds before the server is asked again that did not answer
 const NOTHING = {options: {}, by_hand: false, cones: [], cuts: [], kept: []}; // and perhaps paint, corners, units

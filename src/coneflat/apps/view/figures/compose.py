@@ -6,7 +6,7 @@ Matplotlib is imported only when one is made.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -76,6 +76,10 @@ class Panel:
     draw: Callable[[Axes], object]
     label: str = ""
     is_graph: bool = False
+
+    def with_room(self, height: float) -> Panel:
+        """Return a panel that is wide enough for its label, if it is of a height in inches."""
+        return replace(self, aspect=max(self.aspect, text_width(self.label) / height))
 
 
 @dataclass(frozen=True)
@@ -265,7 +269,7 @@ def new_figure(width: float, height: float, dpi: float = 150) -> Figure:
     return figure
 
 
-def check_figure_target(path: str | PathLike[str]) -> Path:
+def check_figure(path: str | PathLike[str]) -> Path:
     """Return the path if `save_figure` can be expected to succeed with it; worth asking before long work.
 
     Raises:
@@ -289,7 +293,7 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
         ...     coneflat.save_figure(coneflat.make_figure(result, "layout"), folder + "/layout.svg").name
         'layout.svg'
     """
-    path = check_figure_target(path)
+    path = check_figure(path)
     with atomic_write(path) as stream:
         write_figure(figure, stream, path.suffix.lower())
     return path

@@ -8,7 +8,7 @@ import numpy as np
 
 from ....base import FloatArray
 from ....errors import OptionError
-from .projection import MeshPicture
+from .render import MeshPicture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,6 +48,7 @@ def draw_dots(
     """Draw cones as dots, red or black by the sign of their curvature and as large as its amount.
 
     Args:
+        axes: matplotlib axes to draw in.
         points: (k, 2) where, in the axes' coordinates.
         curvatures: (k,) radians.
         hidden: whether they are seen through the model.

@@ -16,22 +16,13 @@ from ....errors import OptionError
 from ....io import CELLS, check_cells
 from ..from_uv import is_own
 from ..quantity import Quantity, check_color_map, conformal_distortion, curvature, stretch
+from .camera import Eye, eye_direction, view_aspect
 from .compose import Panel, Row, check_pixels, compose
 from .cone_marks import mark_handles
-from .model import (
-    DOTS_PER_INCH,
-    draw_checker,
-    draw_cone_curve,
-    draw_cones,
-    draw_curvature,
-    draw_quality,
-    draw_quantity,
-)
-from .projection import Eye, eye_direction, view_aspect
+from .model import DOTS_PER_INCH, draw_checker, draw_cone_curve, draw_cones, draw_curvature, draw_quantity
 from .uv_layout import draw_layout, fill_layout, layout_aspect
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from .... import Flattening
@@ -173,14 +164,9 @@ def _coloured(result: Flattening, look: Look, quantity: Quantity) -> Row:
     """Return views of the model, and the layout, coloured by a quantity."""
     shown = quantity.recolored(look.colors)
 
-    def on_model(result: Flattening, axes: Axes, **more: Any) -> None:
-        draw_quantity(axes, result, shown, **more)
-
-    def in_layout(axes: Axes) -> None:
-        fill_layout(axes, result, shown, look.dpi)
-
+    in_layout = partial(fill_layout, result=result, quantity=shown, dpi=look.dpi)
     layout = Panel(layout_aspect(result, crop=True), in_layout)
-    return Row([*look.views(result, on_model), layout], [shown])
+    return Row([*look.views(result, draw_quantity, quantity=shown), layout], [shown])
 
 
 def _curvature(result: Flattening, look: Look) -> _Rows:
@@ -227,14 +213,15 @@ def demo_figure(result: Flattening, *, up: str = "y", dpi: float = 220.0) -> Fig
     front, back = "front-right", "back-left"
     vertices = result.vertices[np.unique(result.faces)]
     checker = partial(draw_checker, result, up=up, cones=True, dpi=dpi)
-    distortion = partial(draw_quality, result, up=up, dpi=dpi)
+    quality = conformal_distortion(result)
+    distortion = partial(draw_quantity, result, quantity=quality, up=up, dpi=dpi)
     panels = [
         Panel(view_aspect(vertices, front, up), checker, "Model, textured by its UVs"),
         Panel(layout_aspect(result, crop=True), partial(draw_layout, result, crop=True), "UV layout"),
         Panel(view_aspect(vertices, front, up), partial(distortion, eye=front), "Distortion, front and back"),
         Panel(view_aspect(vertices, back, up), partial(distortion, eye=back)),
     ]
-    rows = [Row(panels, [conformal_distortion(result)])]
+    rows = [Row(panels, [quality])]
     return compose(rows, title=title(result), marks=mark_handles(result), dpi=dpi, width=10.0)
 
 

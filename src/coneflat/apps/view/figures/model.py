@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from .... import ConeCurve
 from ....base import DISTORTION, FloatArray, IntArray
-from ....errors import OptionError
 from ....io import CELLS, cell_side
-from ..quantity import Quantity, conformal_distortion, curvature, stretch
+from ..quantity import Quantity, curvature
+from .camera import Eye
 from .cone_marks import draw_cones_on_model, draw_seams_on_model, pixels_of
-from .projection import Eye, MeshPicture, render_mesh
-from .uv_layout import fill_layout
+from .render import MeshPicture, render_mesh
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,40 +70,6 @@ def draw_cones(
     draw_cones_on_model(axes, picture, result, through=True)
 
 
-def draw_quality(
-    result: Flattening,
-    axes: Axes,
-    *,
-    measure: str = "qc",
-    on: str = "model",
-    eye: Eye = "front-right",
-    up: str = "y",
-    colors: str | None = None,
-    dpi: float = DOTS_PER_INCH,
-) -> Quantity:
-    """Draw how much the triangles are distorted, by colours, and return what is shown.
-
-    Args:
-        measure: "qc" for quasi-conformal distortion, 1 where angles are kept; "scale" for lengths in the layout over
-            those on the model, over the mean of this.
-        on: where to draw it, on the "model" or in the "layout".
-        colors: a colour map of matplotlib; by default viridis, or purple to orange.
-
-    The other arguments and errors are those of `draw_checker`. The colour bar of what is returned is
-    `figure.colorbar(quantity.scale.mappable(), ax=axes)`.
-    """
-    if measure not in ("qc", "scale"):
-        raise OptionError(f"unknown measure {measure!r}: choose from qc, scale")
-    quantity = (conformal_distortion if measure == "qc" else stretch)(result).recolored(colors)
-    if on == "layout":
-        fill_layout(axes, result, quantity, dpi)
-    elif on == "model":
-        draw_quantity(axes, result, quantity, eye, up, dpi)
-    else:
-        raise OptionError(f"nothing can be drawn on {on!r}: choose from model, layout")
-    return quantity
-
-
 def draw_curvature(
     result: Flattening,
     axes: Axes,
@@ -114,24 +79,25 @@ def draw_curvature(
     up: str = "y",
     colors: str | None = None,
     dpi: float = DOTS_PER_INCH,
-) -> Quantity:
-    """Draw the curvature of every vertex, the angles missing around it, by colours, and return what is shown.
+) -> None:
+    """Draw the curvature of every vertex, the angles missing around it, by colours.
 
     Args:
+        result, axes, eye, up, dpi: as of `draw_checker`.
         flat: of the flat metric, where only cones should have curvature; else of the model.
         colors: a colour map of matplotlib.
 
-    The other arguments and errors are those of `draw_checker`.
+    Raises:
+        OptionError: an option makes no sense.
     """
     quantity = curvature(result, flat).recolored(colors)
-    picture = draw_quantity(axes, result, quantity, eye, up, dpi)
+    picture = draw_quantity(result, axes, quantity, eye, up, dpi)
     if flat:
         draw_cones_on_model(axes, picture, result)
-    return quantity
 
 
 def draw_quantity(
-    axes: Axes, result: Flattening, quantity: Quantity, eye: Eye, up: str, dpi: float
+    result: Flattening, axes: Axes, quantity: Quantity, eye: Eye, up: str, dpi: float
 ) -> MeshPicture:
     """Draw the model coloured by a quantity, in half the light and shade: a shadow must not read as a number."""
     paint = {"colors": quantity.colors(), "contrast": 0.5}

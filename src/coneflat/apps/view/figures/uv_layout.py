@@ -11,7 +11,7 @@ from ....base import FloatArray, IntArray
 from ....mesh import end_corners, label_components, label_faces
 from ..quantity import Quantity
 from .cone_marks import BOUNDARY_COLOR, SEAM_COLOR, draw_dots, mark_scale, pixels_of
-from .projection import render_mesh
+from .render import render_mesh
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ....geometry import CREASE_COSINE, double_areas, edge_lengths
 from ....io import CELLS, Texture
 from ....mesh import end_corners
+from ..figures.camera import fit_camera
 from ..figures.kinds import title
-from ..figures.projection import fit_camera
 from ..figures.uv_layout import CHART_COLORS
 from ..from_uv import shown_rows
 from ..quantity import ColorScale

@@ -1,0 +1,137 @@
+"""The angles of a circle pattern: the nearest to given ones that it can have, a quadratic program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csc_matrix, csr_matrix, identity
+
+from ...base import BoolArray, FloatArray, IntArray
+from ...geometry import IntrinsicTriangulation
+from ...linalg import Limits, Point, factorize, minimise
+
+# Angles may shrink to this part of what they were, or to 0.02 radians where that is less; but never below the last,
+# radians.
+LEAST_PART, LEAST_ANGLE = 0.5, 1e-5
+# Circles meet at this angle at least, radians, also those around the two halves of a planar quad that is inscribed in a
+# circle, which are one: the equations are as steep as this is small.
+LEAST_MEETING = 1e-4
+# The largest sum of angles opposite an edge.
+WIDEST_PAIR = np.pi - LEAST_MEETING
+# When to stop: largest error of a sum of angles, radians, which sums to that of curvature; Newton steps at most;
+# rounding of a sum of some angles, radians; halvings after which a step is taken for rounding; and part of the gradient
+# that a step must change, as where there is no solution the function falls without an end.
+ANGLE_LIMITS = Limits(1e-10, 40, goal=1e-12, halvings=40, halvings_below=40, least_change=1e-6)
+
+
+@dataclass(frozen=True, eq=False)
+class CoherentAngles:
+    """Angles of a circle pattern.
+
+    Attributes:
+        angles: (3m,) opposite each half-edge, radians.
+        residual: the largest error of a sum of angles, radians.
+        steps: Newton steps.
+    """
+
+    angles: FloatArray
+    residual: float
+    steps: int
+
+    @property
+    def converged(self) -> bool:
+        """Whether the angles sum to what they should."""
+        return self.residual <= ANGLE_LIMITS.tolerance
+
+
+def coherent_angles(
+    triangulation: IntrinsicTriangulation, angles: FloatArray, sums: FloatArray, is_summed: BoolArray
+) -> CoherentAngles:
+    """Return the angles nearest to given ones, in the sum of squares, that belong to a flat circle pattern.
+
+    They are positive, sum to pi in triangles and to what is wanted at vertices, and the two opposite an edge sum
+    to less than pi: the paper's quadratic program. Angles at a boundary are free.
+
+    Args:
+        triangulation: connected.
+        angles: (3m,) opposite each half-edge, radians.
+        sums: (n,) what the angles at a vertex are to sum to.
+        is_summed: (n,) the vertices where that is asked.
+
+    Notes:
+        Without the sums, each edge has a problem of its own, to project two angles to a triangle. The sums
+        are equations, whose multipliers minimise a convex function that has what they are off by for its gradient;
+        its second derivative is discontinuous where bounds become active or inactive; Newton's method still converges.
+        Where none holds, the first step is the least squares solution.
+    """
+    count = len(angles)
+    rows = triangulation.face_count
+    summed = np.flatnonzero(is_summed)
+    number = np.full(triangulation.vertex_count, -1, dtype=np.int64)
+    number[summed] = rows + np.arange(len(summed))
+    row = np.concatenate([np.arange(count) // 3, number[triangulation.faces.ravel()]])
+    column = np.tile(np.arange(count), 2)
+    wanted = row >= 0
+    equations = csr_matrix(
+        (np.ones(int(wanted.sum())), (row[wanted], column[wanted])), shape=(rows + len(summed), count)
+    )
+    right = np.concatenate([np.full(rows, np.pi), sums[summed]])
+
+    least = np.clip(LEAST_PART * angles, LEAST_ANGLE, 0.02)
+    problem = _Dual(angles, least, triangulation.twin, equations, right, bool(is_summed.all()))
+    found, steps = minimise(problem, problem.evaluate(np.zeros(len(right))), ANGLE_LIMITS)
+    return CoherentAngles(problem.project(found.place)[0], found.largest, steps)
+
+
+@dataclass(eq=False)
+class _Dual:
+    """A convex function of the multipliers of equations A x = b, for x nearest to c within bounds."""
+
+    angles: FloatArray
+    least: FloatArray
+    twin: IntArray
+    equations: csr_matrix
+    right: FloatArray
+    is_closed: bool  # then the last of the equations follows from the others
+
+    def project(self, place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the angles for multipliers, and their derivatives by those before bounds: own and across."""
+        free = self.angles + self.equations.T @ place
+        is_inner = self.twin >= 0
+        other = np.where(is_inner, self.twin, 0)
+        bounded = np.maximum(free, self.least)
+        too_wide = is_inner & (bounded + bounded[other] > WIDEST_PAIR)
+        half = (free - free[other]) / 2
+        low, high = self.least - WIDEST_PAIR / 2, WIDEST_PAIR / 2 - self.least[other]
+        slides = too_wide & (low < half) & (half < high)
+        angles = np.where(too_wide, WIDEST_PAIR / 2 + np.clip(half, low, high), bounded)
+        own = np.where(too_wide, 0.5 * slides, free > self.least)
+        return angles, own, np.where(slides, -0.5, 0.0)
+
+    def evaluate(self, place: FloatArray) -> Point:
+        """Return the residual of each equation, which is minus the gradient."""
+        return Point(place, self.right - self.equations @ self.project(place)[0])
+
+    def direction(self, here: Point, exactly: bool) -> tuple[FloatArray, bool]:
+        """Return the step, damped as much as the residual is large; there is none more exact."""
+        residual = here.residual
+        _, own, across = self.project(here.place)
+        slots = np.flatnonzero(across)
+        every = np.arange(len(own))
+        derivative = csr_matrix(
+            (
+                np.concatenate([own, across[slots]]),
+                (np.concatenate([every, slots]), np.concatenate([every, self.twin[slots]])),
+            ),
+            shape=(len(own), len(own)),
+        )
+        used = len(residual) - self.is_closed
+        # Relative to the residual, where rank is wanting.
+        damping = np.clip(1e-5 * np.abs(residual[:used]).max(), 1e-13, 1e-6)
+        equations = self.equations[:used]
+        matrix = csc_matrix(equations @ derivative @ equations.T + damping * identity(used, format="csr"))
+        matrix.sort_indices()
+        step = np.zeros_like(residual)
+        step[:used] = factorize(matrix).solve(residual[:used])
+        return step, True

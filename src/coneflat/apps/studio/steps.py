@@ -1,0 +1,91 @@
+"""Steps of the user of the studio: what each does to the choices, and which can be undone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from ...options import as_number, as_whole
+from .choices import Choices
+from .paint import Region
+
+
+def _step(change: Callable[..., Choices]) -> Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]:
+    """Return a step that makes the cones that were found the user's before it changes them."""
+    return lambda chosen, action, found: change(chosen.placed(found), action)
+
+
+def _angle(action: Mapping[str, Any]) -> float | None:
+    degrees = action.get("degrees")
+    return None if degrees is None else math.radians(as_number("an angle", degrees))
+
+
+def _vertex(action: Mapping[str, Any], name: str = "vertex") -> int:
+    return as_whole("a vertex", action[name])
+
+
+#: By what is to be done: the choices after it, from those before, the action, and the cones that were found.
+STEPS: dict[str, Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]] = {
+    "set": lambda chosen, action, found: chosen.with_option(action["name"], action["value"]),
+    "hand": _step(lambda chosen, action: chosen),
+    "add": _step(lambda chosen, action: chosen.added(_vertex(action), _angle(action))),
+    "move": _step(lambda chosen, action: chosen.moved(_vertex(action), _vertex(action, "to"))),
+    "remove": _step(lambda chosen, action: chosen.removed(_vertex(action))),
+    "angle": _step(lambda chosen, action: chosen.angled(_vertex(action), _angle(action))),
+    "lock": lambda chosen, action, found: chosen.locked(_vertex(action), action["locked"] is True),
+    "cut": lambda chosen, action, found: chosen.cut(tuple(action["path"])),
+    "keep": lambda chosen, action, found: chosen.keep_whole(tuple(action["path"])),
+    "erase": lambda chosen, action, found: chosen.erased(*(as_whole("a vertex", v) for v in action["edge"])),
+    "paint": lambda chosen, action, found: chosen.painted(
+        action["layer"], Region.of_text(action["where"]), action.get("weight")
+    ),
+    "corner": lambda chosen, action, found: chosen.cornered(_vertex(action)),
+    "units": lambda chosen, action, found: chosen.measured_in(action["of_file"], action["shown"]),
+}
+
+
+class History:
+    """What was chosen before, what is chosen now, and what was undone.
+
+    Attributes:
+        now: what is chosen.
+    """
+
+    def __init__(self, now: Choices) -> None:
+        self.now = now
+        self._past: list[Choices] = []
+        self._undone: list[Choices] = []
+        self._stroke: object = None
+
+    def change(self, to: Choices, stroke: object = None) -> bool:
+        """Take a step, and return whether it changes anything; steps of one stroke, as of a drag, are one."""
+        if to == self.now:
+            return False
+        if stroke is None or stroke != self._stroke:
+            self._past.append(self.now)
+        self._stroke = stroke
+        self.now = to
+        self._undone.clear()
+        return True
+
+    def undo(self) -> bool:
+        """Go a step back, and return whether there was one."""
+        return self._go(self._past, self._undone)
+
+    def redo(self) -> bool:
+        """Take the step that was undone last, and return whether there was one."""
+        return self._go(self._undone, self._past)
+
+    def _go(self, source: list[Choices], target: list[Choices]) -> bool:
+        self._stroke = None
+        if not source:
+            return False
+        target.append(self.now)
+        self.now = source.pop()
+        return True
+
+    @property
+    def depth(self) -> tuple[int, int]:
+        """How many steps there are to undo, and to redo."""
+        return len(self._past), len(self._undone)
