@@ -41,7 +41,7 @@ CEILINGS = {
     "atlas": 1489,
     "base": 354,
     "cone_curve": 108,
-    "cones": 2094,
+    "cones": 2101,
     "evaluate": 194,
     "flatten": 176,
     "flattener": 35,
@@ -61,8 +61,8 @@ CEILINGS = {
     "stages": 226,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_962, 233, 25_773
-CONSTANTS, KERNELS, NAMES, LEVELS = 294, 111, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_969, 233, 25_780
+CONSTANTS, KERNELS, NAMES, LEVELS = 295, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

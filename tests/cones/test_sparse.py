@@ -288,6 +288,19 @@ def test_coarse_model_of_odd_connectivity_stays_small(shape):
     assert basis.functions.nnz < 30 * len(inside)
 
 
+def test_hubs_leave_vertices_to_choose_from():
+    """Two vertices that all others meet: their aggregates must not swallow the rest."""
+    count = 20_000
+    turn = np.arange(count) * 2 * np.pi / count
+    ring = np.stack([np.cos(turn), np.sin(turn), 0.05 * np.sin(7 * turn)], axis=1)
+    after = (np.arange(count) + 1) % count
+    top, bottom = np.full((2, count), [[count], [count + 1]])
+    faces = np.concatenate(
+        [np.stack([top, np.arange(count), after], 1), np.stack([bottom, after, np.arange(count)], 1)]
+    )
+    assert len(sparse(np.concatenate([ring, [[0, 0, 0.3], [0, 0, -0.3]]]), faces).solution.cones) >= 3
+
+
 def test_more_cones_than_are_searched_for_is_an_error():
     with pytest.raises(CurvatureError, match="400 cones or more"):
         sparse(*SHAPES["sphere"], min_cone_angle=1.99 * np.pi)

@@ -17,6 +17,9 @@ from ..solution import TIE
 
 # Largest factor by which one level shrinks the model: an aggregate is a vertex and its neighbours.
 LARGEST_AGGREGATE = 7.0
+# Couplings below this share of the geometric mean of the diagonals do not join vertices: across slivers, and to hubs,
+# whose aggregates would swallow all around them.
+WEAK = 0.02
 # Damping of the Jacobi step that smooths the aggregates: 4/3 over the largest eigenvalue of D^-1 L, about 2.
 DAMPING = 2 / 3
 # Entries below this share of what is large in their row are rounding.
@@ -59,8 +62,11 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
         ratio = level.shape[0] / size
         steps = max(1, round(np.log(ratio) / np.log(LARGEST_AGGREGATE)))
         most = size if steps == 1 else None
-        part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most)
-        if part.shape[1] > STUCK * level.shape[0]:
+        for weak in (WEAK, 0.0):
+            part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most, weak)
+            if part.shape[1] <= STUCK * level.shape[0]:
+                break
+        else:
             # Hardly anything is coupled, as on a strip between two boundaries: whatever is next in order.
             part = _pieces(np.argsort(order, kind="stable") * size // len(order), size)
         transposed = csr_matrix(part.T)
@@ -83,18 +89,20 @@ def _pieces(labels: IntArray, number: int) -> csr_matrix:
     return csr_matrix((np.ones(count), (np.arange(count), labels)), shape=(count, number))
 
 
-def _smoothed_aggregates(level: csr_matrix, order: IntArray, size: float, most: int | None) -> csr_matrix:
+def _smoothed_aggregates(
+    level: csr_matrix, order: IntArray, size: float, most: int | None, weak: float
+) -> csr_matrix:
     """Return basis functions made of about `size` vertices each, `most` of them if that can be had."""
     count = level.shape[0]
     diagonal = np.maximum(level.diagonal(), 1e-300)
     rows = level.indptr.astype(np.int64), level.indices.astype(np.int64), level.data, diagonal, order
-    labels, number = aggregate(*rows, size)
+    labels, number = aggregate(*rows, size, weak)
     before = count + 1
     while most is not None and most * CLOSE < number < before:
         # Vertices left over make aggregates smaller than wished, and another level for that little makes all dense.
         size *= number / most
         before = number
-        labels, number = aggregate(*rows, size)
+        labels, number = aggregate(*rows, size, weak)
     pieces = _pieces(labels, number)
     image = csr_matrix(level @ pieces)
     damping = np.where(np.diff(image.indptr) > MEETING, 0.0, DAMPING / diagonal)
@@ -122,6 +130,7 @@ def aggregate(
     diagonal: FloatArray,
     order: IntArray,
     size: float,
+    weak: float,
 ) -> tuple[IntArray, int]:
     """Return (n,) the aggregate of each vertex, and their number.
 
@@ -138,7 +147,7 @@ def aggregate(
         taken = 0
         for e in range(indptr[vertex], indptr[vertex + 1]):
             other = indices[e]
-            if other != vertex and weights[e] < 0.0:
+            if other != vertex and -weights[e] > weak * np.sqrt(diagonal[vertex] * diagonal[other]):
                 if labels[other] < 0:
                     free += 1
                 else:
@@ -150,7 +159,7 @@ def aggregate(
         # A fractional size is met on average: the remainder decides for every so many aggregates.
         room = np.floor((number + 1) * room) - np.floor(number * room) if room != free else free
         while room >= 1:
-            strongest, best = -1, 0.0
+            strongest, best = -1, weak
             for e in range(indptr[vertex], indptr[vertex + 1]):
                 other = indices[e]
                 if other != vertex and labels[other] < 0:
