@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -188,6 +187,7 @@ class Surface:
         widest: (n,) the widest corner at each vertex as a share of all there.
         is_reused: other cones will be searched on it.
         memo: what stages store to use again; only who stored a value reads it.
+        known_delaunay: the intrinsic Delaunay triangulation, once it is known.
     """
 
     mesh: TriangleMesh
@@ -198,6 +198,7 @@ class Surface:
     widest: FloatArray
     is_reused: bool = False
     memo: dict[str, Any] = field(default_factory=dict)
+    known_delaunay: tuple[IntrinsicTriangulation, IntArray] | None = None
 
     @classmethod
     def of(cls, mesh: TriangleMesh, lengths: FloatArray, flips: bool = True) -> Surface:
@@ -223,25 +224,20 @@ class Surface:
         np.maximum.at(widest, mesh.faces.ravel(), angles.ravel())
         widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
         laplacian, areas = cotangent_laplacian(faces, cots, n), vertex_areas(faces, sides, n)
-        surface = cls(mesh, lengths, laplacian, curvature, areas, widest)
-        if delaunay is not None and len(faces) <= HUGE:
-            surface.__dict__["delaunay"] = delaunay
-        return surface
+        known = delaunay if len(faces) <= HUGE else None
+        return cls(mesh, lengths, laplacian, curvature, areas, widest, known_delaunay=known)
 
-    @cached_property
+    @property
     def delaunay(self) -> tuple[IntrinsicTriangulation, IntArray]:
         """The intrinsic Delaunay triangulation, and the half-edges flipped for it."""
-        return intrinsic_delaunay(self.mesh, self.lengths)
+        if self.known_delaunay is None:
+            self.known_delaunay = intrinsic_delaunay(self.mesh, self.lengths)
+        return self.known_delaunay
 
     def prepare(self, method: str) -> None:
         """Find what a metric by a method will need, but on huge surfaces, where memory is what matters."""
         if method == "exact" and len(self.mesh.faces) <= HUGE:
             _ = self.delaunay
-
-    @property
-    def known_delaunay(self) -> tuple[IntrinsicTriangulation, IntArray] | None:
-        """The same, if it is known or will be used again; else None."""
-        return self.delaunay if self.is_reused or "delaunay" in self.__dict__ else None
 
 
 @dataclass(frozen=True, eq=False)

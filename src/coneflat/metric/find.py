@@ -61,7 +61,8 @@ def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> F
                 pass
         if mesh.genus():
             return corrected_flat_metric(lengths, solution, choices, open_turning(mesh), quantum)
-    return exact_flat_metric(mesh, lengths, solution, choices, surface.known_delaunay)
+    delaunay = surface.delaunay if surface.is_reused else surface.known_delaunay
+    return exact_flat_metric(mesh, lengths, solution, choices, delaunay)
 
 
 def loop_rotations(surface: Surface, spec: MetricSpec) -> Callable[[ConeSolution], FloatArray] | None:
