@@ -78,7 +78,7 @@ def test_flags_that_do_not_exist_are_found():
 
 def test_every_option_is_described():
     text = {
-        name: (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+        name: (ROOT / "docs" / "reference" / f"{name}.md").read_text(encoding="utf-8")
         for name in ("command-line", "figures")
     }
     pages = {"flatten": text["command-line"], "figure": text["figures"]}

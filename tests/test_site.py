@@ -71,7 +71,7 @@ def test_nothing_is_loaded_from_elsewhere(site):
 
 
 def test_all_public_names_are_described(site):
-    parts = Loads(site / "api.html").parts
+    parts = Loads(site / "reference" / "api.html").parts
     missing = [
         f"coneflat.{name}"
         for name in coneflat.__all__

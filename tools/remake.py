@@ -23,8 +23,8 @@ def remake_options(_: argparse.Namespace | None = None) -> Iterator[tuple[Path, 
     from option_table import flag_tables, keyword_tables, quad_flag_table, quad_keyword_table
 
     tables = {
-        "command-line.md": {"options": flag_tables, "quad options": quad_flag_table},
-        "python.md": {"keywords": keyword_tables, "quad keywords": quad_keyword_table},
+        "reference/command-line.md": {"options": flag_tables, "quad options": quad_flag_table},
+        "reference/python.md": {"keywords": keyword_tables, "quad keywords": quad_keyword_table},
     }
     for page, by_name in tables.items():
         text = (DOCS / page).read_text(encoding="utf-8")
