@@ -50,14 +50,14 @@ def variants() -> dict[str, list[Patch]]:
     search, dense, exact = cone_search, dense_model, exact_model
     found: dict[str, list[Patch]] = {"as it is": []}
     for module, name, values in (
-        (search, "COARSE_DOUBT", (1.15, 1.2, 1.6)),
-        (exact, "ROUNDS", (4, 100)),
-        (exact, "WORTHWHILE", (1e-2, 1e-4)),
+        (search, "COARSE_MODEL_ERROR", (1.15, 1.2, 1.6)),
+        (exact, "MAX_ROUNDS", (4, 100)),
+        (exact, "MIN_PROMISED_GAIN", (1e-2, 1e-4)),
         (linear_model, "VERTICES_PER_UNKNOWN", (8, 15, 30)),
         (linear_model, "LEAST_SIZE", (200, 400, 800)),
         (linear_model, "MOST_SIZE", (600, 2000)),
         (aggregation, "LARGEST_AGGREGATE", (4.0, 12.0)),
-        (aggregation, "CLOSE", (1.0, 2.0)),
+        (aggregation, "MAX_SIZE_RATIO", (1.0, 2.0)),
     ):
         found |= {f"{name} {value}": [(module, name, value)] for value in values}
     model = dense.DenseModel
@@ -97,7 +97,7 @@ def patched(patches: list[Patch]) -> Iterator[None]:
             setattr(owner, name, value)
 
 
-OPENING = ("VERTICES", "LEAST_SIZE", "MOST_SIZE", "WEAK", "LARGEST_AGGREGATE", "TRIES")
+OPENING = ("VERTICES", "LEAST_SIZE", "MOST_SIZE", "MIN_COUPLING", "LARGEST_AGGREGATE", "TRIES")
 
 
 def main() -> None:

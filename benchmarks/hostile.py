@@ -8,7 +8,7 @@ A case is a kind and a seed: `--case mesh:17` runs one alone in this process and
 - command: odd command lines.
 
 Each runs in a worker with limits of time and memory. Of every result all promises are measured anew, by plain code of
-this benchmark's own (`trials/promises.py`): finite points in the texture, nothing upside down, no overlaps in an atlas,
+this benchmark's own (`trials/promises.py`): finite points in the texture, no flipped triangle, no overlaps in an atlas,
 angles around inner vertices and cones, equal sides of seams, prescribed boundaries, rotations by quanta, and a report
 that says what was measured. What is not kept and not named by a note is a breach; so are errors that are not the
 package's own, messages of several lines, crashes, hangs, and too much memory. The exit code is 1 if there is any.

@@ -1,7 +1,7 @@
 """Layouts before and after they are relaxed: `python benchmarks/relaxation.py` prints Markdown tables.
 
 The models of `../shared/meshes`, as they are and decimated to so many triangles (by fast_simplification, where it is
-installed; a decimated mesh that is no manifold is left out), each flattened three times: `relax="off"`, the default
+installed; a decimated mesh that is not manifold is left out), each flattened three times: `relax="off"`, the default
 and `relax="whole"`. QC is the ratio of singular values, by area; std that of the log of the scale. With `--dial` the
 models named are flattened at several values of `stretch` instead, and with the number of cones that has the same
 area distortion without it.

@@ -1,7 +1,7 @@
 """What stretching does: `python benchmarks/stretched.py` prints a Markdown table.
 
 Models of `../shared/meshes`, where they are, stretched along each axis by each factor and flattened as by default:
-triangles upside down or without area in the plane, mean and worst QC, seconds relative to those of the model as it is,
+flipped triangles or without area in the plane, mean and worst QC, seconds relative to those of the model as it is,
 cones, the worst relative difference of two sides of a seam, and how far the angles around a vertex are off. Rows are
 the worst of the three axes.
 """
@@ -25,7 +25,9 @@ def main() -> None:
     parser.add_argument("--models", default=MODELS)
     parser.add_argument("--factors", default="3,10,30,100")
     arguments = parser.parse_args()
-    columns = "model|triangles|stretched|upside down|without area|QC|worst|time|cones|E|seams differ|angles off, rad"
+    columns = (
+        "model|triangles|stretched|flipped|degenerate|QC|worst|time|cones|E|seams differ|angles off, rad"
+    )
     print(f"| {' | '.join(columns.split('|'))} |\n{'| --- ' * (columns.count('|') + 1)}|")
     for name in arguments.models.split(","):
         vertices, faces = model(name, 0)

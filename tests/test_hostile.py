@@ -41,7 +41,7 @@ def test_hostile_cases_break_no_promise():
         f"{one.kind}:{one.seed} {cause}: {details}" for one in outcomes for cause, details in one.breaches
     ]
     assert not broken, "\n".join(broken)
-    # Refusing everything is no way to keep promises.
+    # Refusing everything is not a way to keep promises.
     assert sum(one.status in ("ok", "noted") for one in outcomes) > SLICE / 2
 
 
@@ -87,7 +87,7 @@ def planted(result, fault):
         uv[inner] = np.nan
     elif fault == "outside":
         uv[inner] += 2.0
-    elif fault == "upside down":
+    elif fault == "flipped":
         face = result.uv_faces[np.flatnonzero((result.uv_faces == inner).any(axis=1))[0]]
         uv[inner] += 2 * (uv[face[face != inner]].mean(axis=0) - uv[inner])
     elif fault == "moved a little":
@@ -112,8 +112,8 @@ def planted(result, fault):
     [
         ("not finite", "arrays: uv not finite"),
         ("outside", "place: outside the texture"),
-        ("upside down", "flipped: report differs"),
-        ("upside down", "overlap: report differs"),
+        ("flipped", "flipped: report differs"),
+        ("flipped", "overlap: report differs"),
         ("moved a little", "curvature error understated"),
         ("other cone", "angle off by less than a full turn, exact"),
         ("other cone", "cones: sum of curvatures"),
@@ -129,12 +129,12 @@ def test_a_planted_fault_is_found(ball, fault, cause):
 
 def test_a_fault_that_its_own_note_names_is_no_breach(ball):
     result, options, mesh = ball
-    turned, cause = planted(result, "upside down"), "triangles upside down, exact"
+    turned, cause = planted(result, "flipped"), "flipped triangles, exact"
     for notes, is_breach in (
         ((), True),
         (("2 cones too wide for the triangles around: that at vertex 3 has an angle of 3 pi.",), True),
         (("5 pairs of triangles overlap in the atlas, 0.1 of the area that it covers.",), True),
-        (("There is 1 triangle upside down in the plane: refine the mesh there.",), False),
+        (("There is 1 flipped triangle in the plane: refine the mesh there.",), False),
     ):
         assert (cause in breaches_of(replace(turned, notes=notes), options, *mesh)) == is_breach
     other = replace(planted(result, "other cone"), notes=("The sum of curvatures is off at 1 cone.",))
@@ -183,7 +183,7 @@ def test_grids_that_break_promises_are_found(gridded):
     assert "do not fit exactly" in causes(check_grid, replace(grid, corner_grid=moved), {})
     assert "cones beyond bounds" in causes(check_grid, grid, {"min_cone_angle": 2 * np.pi})
     turned = grid.corner_grid[:, ::-1]
-    assert "turned over" in causes(check_grid, replace(grid, corner_grid=turned), {})
+    assert "flipped" in causes(check_grid, replace(grid, corner_grid=turned), {})
     assert "angles" in causes(check_grid, replace(grid, quarters=grid.quarters + 1), {})
 
 

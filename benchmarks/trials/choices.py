@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from coneflat.options.combined import ASKING
+from coneflat.options.combined import SEARCH_OPTIONS
 
 from .topology import Topology
 
@@ -15,7 +15,7 @@ Random = np.random.Generator
 
 #: What the exact method alone has, and what a search for cones alone has.
 OF_EXACT = ("boundary", "correct_handles")
-OF_SEARCH = (*ASKING, "correct_handles")
+OF_SEARCH = (*SEARCH_OPTIONS, "correct_handles")
 INVALID = (None, -1, 0, 1e308, 1e-300, math.nan, math.inf, "abc", "", [], (), {}, [1], [[0, 1]], True, 2**70)
 
 

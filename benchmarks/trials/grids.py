@@ -127,7 +127,7 @@ def check_grid(outcome: Outcome, grid: Any, options: dict[str, Any]) -> None:
             outcome.breach("grid: seams do not fit exactly", f"by up to {off.max():.2g}")
     doubled = (np.conj(z[:, 1] - z[:, 0]) * (z[:, 2] - z[:, 0])).imag
     if not (doubled > 0).all():
-        outcome.breach("grid: triangles turned over", int((doubled <= 0).sum()))
+        outcome.breach("grid: triangles flipped", int((doubled <= 0).sum()))
     sides = z[:, [2, 0, 1]] - z[:, [1, 2, 0]]
     angles = np.angle(-sides[:, [1, 2, 0]] * np.conj(sides[:, [2, 0, 1]]))
     sums = np.bincount(faces.ravel(), angles.ravel(), len(grid.vertices)) / (np.pi / 2)

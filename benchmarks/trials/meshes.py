@@ -91,7 +91,7 @@ def handles(rng: Random) -> Mesh:
 
 
 def polycube(rng: Random) -> Mesh:
-    """Unit cubes on a plane, at random; where they touch along edges only the surface is no manifold."""
+    """Unit cubes on a plane, at random; where they touch along edges only the surface is not manifold."""
     pattern = ["".join(rng.choice(["#", "#", "."], 3)) for _ in range(int(rng.integers(1, 4)))]
     vertices, faces = shapes.blocks([*pattern, "#.."], int(rng.integers(1, 3)))
     return np.round(vertices) if rng.random() < 0.5 else vertices, faces

@@ -24,8 +24,8 @@ ALL_PAIRS = 700
 EPS = np.finfo(np.float64).eps
 #: The sentence that must be among the notes where a promise is not kept; no other one will do.
 SENTENCES = {
-    "upside down": r"There (is|are) [\d,]+ triangles? upside down .*in the plane",
-    "collapsed": r"There (is|are) ([\d,]+ triangles? upside down and )?[\d,]+ triangles? without area in the plane",
+    "flipped": r"There (is|are) [\d,]+ flipped triangles? .*in the plane",
+    "collapsed": r"There (is|are) ([\d,]+ flipped triangles? and )?[\d,]+ degenerate triangles? in the plane",
     "overlap": r"[\d,]+ pairs? of triangles overlaps? in the atlas",
     "angles": r"Around [\d,]+ (vertex|vertices) the angles do not sum to what they are to be",
     "sides": r"The two sides of seams differ in length",
@@ -106,7 +106,7 @@ def _check_origin(trial: Trial) -> None:
     if len(np.unique(result.face_origin)) < len(result.faces):
         trial.outcome.breach("origin: a face of the input twice", "")
     if (trial.topology.count > 2).any():
-        trial.outcome.breach("origin: the result is no manifold", "")
+        trial.outcome.breach("origin: the result is not manifold", "")
 
 
 def _check_place(trial: Trial) -> None:
@@ -119,14 +119,14 @@ def _check_place(trial: Trial) -> None:
 
 
 def _check_orientation(trial: Trial) -> None:
-    """No triangle is upside down or collapsed, and the report counts those that are."""
+    """No triangle is flipped or collapsed, and the report counts those that are."""
     chart = plane.charts_of(trial.result.uv_faces)
     against = int(plane.flipped(trial.corners, chart).sum())
     told = trial.result.distortion
     if against != told.flipped:
         trial.outcome.breach("flipped: report differs", f"{told.flipped} reported, {against} measured")
     if against:
-        trial.broken("upside down", f"triangles upside down, {_method(trial)}", f"{against} triangles")
+        trial.broken("flipped", f"flipped triangles, {_method(trial)}", f"{against} triangles")
     if told.degenerate:
         trial.broken("collapsed", f"triangles collapsed, {_method(trial)}", f"{told.degenerate} triangles")
 
@@ -211,7 +211,7 @@ def _check_boundary(trial: Trial) -> None:
 
 def _check_boundary_lengths(trial: Trial) -> None:
     at = trial.result.vertices[trial.result.faces]
-    # By a power of two, lest squares of tiny or huge lengths are no numbers.
+    # By a power of two, lest squares of tiny or huge lengths are not numbers.
     exponent = int(np.frexp(np.abs(at).max())[1])
     at = np.ldexp(at, -exponent)
     space, flat = plane.side_lengths(at).ravel(), trial.sides.ravel()

@@ -58,7 +58,7 @@ class NonOrientableError(MeshError):
 
 
 class LengthError(MeshError):
-    """Side lengths are no metric: they make no triangles, or differ between the two sides of an edge."""
+    """Side lengths are not a metric: they make no triangles, or differ between the two sides of an edge."""
 
 
 class MissingUVError(MeshError):

@@ -32,7 +32,7 @@ class Flattener:
         mesh, faces: as of `coneflat.flatten`; arrays must not change afterwards.
 
     Raises:
-        MeshError: it is no mesh.
+        MeshError: it is not a mesh.
         MeshFileError: its file cannot be read.
 
     Examples:

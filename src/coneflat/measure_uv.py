@@ -14,7 +14,7 @@ from .base.arrays import FloatArray, IntArray, unit_exponent
 from .base.text import plural
 from .errors import MissingUVError
 from .geometry.coverage import layers_of_raster
-from .geometry.layers import MOST_CELLS
+from .geometry.layers import MAX_CELLS
 from .geometry.overlap import find_overlaps
 from .geometry.planar import signed_double_areas
 from .io.mapped import Mapped, as_mapped
@@ -114,7 +114,7 @@ def measure_uv(
 ) -> UVMeasures:
     """Measure the UVs that a mesh has, of any tool.
 
-    Polygons are measured as the fans of triangles that other programs see. A mesh that is no manifold is measured
+    Polygons are measured as the fans of triangles that other programs see. A mesh that is not manifold is measured
     with the repair of `flatten`, but overlaps are those of all triangles; corners without UVs are counted.
 
     Args:
@@ -124,11 +124,11 @@ def measure_uv(
         corner_uv: (m, 3, 2) the UV of every triangle corner, v upwards; NaN where there is none.
         weld: of a path: True merges all vertices at the same position, False none; None merges them in formats that
             cannot share vertices, and joins coinciding borders in the others.
-        strict: refuse a mesh that is no manifold.
+        strict: refuse a mesh that is not manifold.
 
     Raises:
         MissingUVError: there are no UVs, or none that are finite.
-        MeshError, MeshFileError: it is no mesh, or cannot be read.
+        MeshError, MeshFileError: it is not a mesh, or cannot be read.
 
     Examples:
         >>> vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -155,7 +155,7 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
     every = mapped.corner_uv[known]
     cover = _cover(np.ldexp(every, -exponent))
     tiles = len(_tiles(checked.mesh, unit, exponent))
-    with np.errstate(over="ignore"):  # What is no number is not known.
+    with np.errstate(over="ignore"):  # What is not a number is not known.
         covered = float(np.ldexp(cover.once, min(2 * exponent, MOST_EXPONENT)))
     counts = {
         "vertices": len(np.unique(mapped.faces)),
@@ -185,7 +185,7 @@ def surface_of(mapped: Mapped, *, strict: bool = False) -> tuple[CheckedMesh, Fl
 
     Raises:
         MissingUVError: there are none.
-        MeshError: they are no mesh.
+        MeshError: they are not a mesh.
     """
     known = np.flatnonzero(mapped.has_uv)
     if not len(known):
@@ -209,7 +209,7 @@ def uv_points(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[FloatArray, In
 def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
     """Return the most by which the angles around a point inside a chart miss 2 pi, radians; 0 if there is none inside.
 
-    A triangle that is turned over, or folds that wind around a point twice, make it large.
+    A triangle that is flipped, or folds that wind around a point twice, make it large.
     """
     from .measure.distortion import sum_angles
 
@@ -263,7 +263,7 @@ def _cover(corner_uv: FloatArray) -> _Cover:
         if found.complete
         else f"More than {limit:,} pairs of triangles overlap, which were not counted further. "
     )
-    note = f"{more}The overlap was counted in {MOST_CELLS:,} x {MOST_CELLS:,} pixels."
+    note = f"{more}The overlap was counted in {MAX_CELLS:,} x {MAX_CELLS:,} pixels."
     return _Cover(len(found.pairs), twice / once if once > 0 else 0.0, once, box_efficiency, (note,))
 
 

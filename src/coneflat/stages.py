@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from .base.arrays import BoolArray, FloatArray, IntArray
-from .base.threads import HUGE
+from .base.threads import MEMORY_BOUND_TRIANGLES
 from .geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, double_areas
 from .geometry.delaunay import intrinsic_delaunay
 from .geometry.intrinsic import IntrinsicTriangulation
@@ -224,7 +224,7 @@ class Surface:
         np.maximum.at(widest, mesh.faces.ravel(), angles.ravel())
         widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
         laplacian, areas = cotangent_laplacian(faces, cots, n), vertex_areas(faces, sides, n)
-        known = delaunay if len(faces) <= HUGE else None
+        known = delaunay if len(faces) <= MEMORY_BOUND_TRIANGLES else None
         return cls(mesh, lengths, laplacian, curvature, areas, widest, known_delaunay=known)
 
     @property
@@ -236,7 +236,7 @@ class Surface:
 
     def prepare(self, method: str) -> None:
         """Find what a metric by a method will need, but on huge surfaces, where memory is what matters."""
-        if method == "exact" and len(self.mesh.faces) <= HUGE:
+        if method == "exact" and len(self.mesh.faces) <= MEMORY_BOUND_TRIANGLES:
             _ = self.delaunay
 
 
@@ -268,7 +268,7 @@ class ConeSolution:
             curvature was not prescribed.
         inverse: what solved for the log scale, if it is still there: zero on the boundary, mean-free without one.
         is_searched: the sparse search chose them, so that others may be tried.
-        notes: unmet wishes, one sentence each.
+        notes: unmet requests, one sentence each.
     """
 
     cones: IntArray
@@ -307,7 +307,7 @@ class SolveStatistics:
         ptolemy_flips: edges flipped during the solve.
         residual: largest curvature error of the metric where curvature was prescribed, radians.
         broken: triangles of the metric that break the triangle inequality.
-        untangled_triangles: triangles that were inverted on their straight sides, and were turned over.
+        untangled_triangles: triangles that were inverted on their straight sides, and were flipped.
         untangled_vertices: vertices that were moved for this.
         untangled_move: how far one was moved at most, relative to the mean edge around them.
         relaxed_vertices: vertices that were free to move so that triangles are less distorted.
@@ -356,7 +356,7 @@ class Embedding:
     Attributes:
         points: (c, 2) of the vertices of the cut mesh, at any scale, positively oriented.
         statistics: how it was found.
-        notes: unmet wishes, one sentence each.
+        notes: unmet requests, one sentence each.
     """
 
     points: FloatArray
@@ -377,7 +377,7 @@ class FlatMetric:
         is_open: (n,) vertices whose curvature is not prescribed.
         is_held: (n,) boundary vertices that a layout must leave where the metric has them.
         statistics: how it was found.
-        notes: unmet wishes, one sentence each.
+        notes: unmet requests, one sentence each.
         scale: factor of the triangles' size, contained in phi.
         triangles: straight triangles that fit each other, which are unfolded; or None.
         flat_lengths: (m, 3) lengths that fit nearly, for a least squares layout; or None.
@@ -422,7 +422,7 @@ class Layout:
         is_open: (n,) vertices whose curvature is not prescribed.
         is_held: (n,) boundary vertices that must stay.
         statistics: how it was found.
-        notes: unmet wishes, one sentence each.
+        notes: unmet requests, one sentence each.
         disk: the mesh cut open, whose faces are the corners, with a vertex for each point; None if there is none.
     """
 

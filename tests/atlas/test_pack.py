@@ -298,7 +298,7 @@ def test_bad_input():
         with pytest.raises(error, match=said):
             pack_charts(uv, chart if len(uv) else [])
     for labels, error, said in (
-        (chart[1:], ArrayShapeError, "not one whole number"),
+        (chart[1:], ArrayShapeError, "not one integer"),
         (chart * 1.0, ArrayShapeError, "float64"),
         (chart * 2, OptionError, "7 different numbers from 0 to 12"),
         (chart - 1, OptionError, "from -1 to 5"),

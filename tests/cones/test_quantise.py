@@ -86,7 +86,7 @@ def test_quanta_that_make_no_sense(quantum):
 
 
 def test_sums_that_are_missed():
-    with pytest.raises(CurvatureError, match="no multiple"):
+    with pytest.raises(CurvatureError, match="not a multiple"):
         quantise_cones(search(*shapes.sphere(2)), 1.0)
     with pytest.raises(CurvatureError):
         quantise_cones(search(*shapes.sphere(2)), np.pi / 2, count=2)

@@ -201,9 +201,9 @@ def test_options_that_make_no_sense(options, error):
         sparse(*shapes.sphere(2), **options)
 
 
-@pytest.mark.parametrize("at_once", [fit_curvatures.AT_ONCE, 0], ids=["at once", "one by one"])
+@pytest.mark.parametrize("at_once", [fit_curvatures.MAX_STEPS_AT_ONCE, 0], ids=["at once", "one by one"])
 def test_fit_agrees_with_the_optimality_conditions(at_once, monkeypatch):
-    monkeypatch.setattr(fit_curvatures, "AT_ONCE", at_once)
+    monkeypatch.setattr(fit_curvatures, "MAX_STEPS_AT_ONCE", at_once)
     fit = fit_curvatures.fit_curvatures
     rng = np.random.default_rng(3)
     for trial in range(105):

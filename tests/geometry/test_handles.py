@@ -98,7 +98,7 @@ def test_measured_rotations_of_a_cut_square():
     ("options", "kind", "message"),
     [
         ({"quantise": 0}, errors.OptionError, "quantise must be from 0.0001 radians"),
-        ({"quantise": 1.0}, errors.CurvatureError, "no multiple"),
+        ({"quantise": 1.0}, errors.CurvatureError, "not a multiple"),
         ({"quantise": QUARTER, "cones": "greedy"}, errors.OptionError, "sparse"),
         ({"correct_handles": True}, errors.OptionError, "give quantise"),
         (

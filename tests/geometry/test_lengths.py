@@ -104,7 +104,7 @@ class TestChecks:
 
 
 def broken_mesh():
-    """Faces turned over, given twice, with a vertex twice; vertices without a face; an edge of three faces."""
+    """Faces flipped, given twice, with a vertex twice; vertices without a face; an edge of three faces."""
     vertices, faces = shapes.join(shapes.sphere(1), shapes.hill(4, 3))
     vertices = np.concatenate([[[7.0, 7, 7]], 5 * vertices])
     faces = faces + 1

@@ -92,7 +92,7 @@ OVERLAPS = {
     "contained, on the sides": [[0.5, 0], [0.5, 0.5], [0, 0.5]],
     "on the same side of a line": [[0, 0], [1, 0], [1, 1]],
     "crosswise, no corner inside": [[-1, 0.2], [2, 0.2], [2, 0.3]],
-    "a side, turned over": [[1, 0], [0, 1], [0.1, 0.1]],
+    "a side, flipped": [[1, 0], [0, 1], [0.1, 0.1]],
     "an ulp of a corner": [[0.5 - ULP, 0.5], [1, 1], [0.5, 1]],
     "a sliver through": [[-1e9, 0.25], [1e9, 0.25], [1e9, np.nextafter(0.25, 1)]],
 }
@@ -149,7 +149,7 @@ def test_a_triangulation_has_no_overlaps_at_any_scale():
 
 @pytest.mark.parametrize("seed", range(2))
 def test_fans_leave_the_pairs_as_they_are(seed, monkeypatch):
-    monkeypatch.setattr("coneflat.geometry.fans.MANY", 2)
+    monkeypatch.setattr("coneflat.geometry.fans.MIN_CORNERS", 2)
     rng = np.random.default_rng(seed)
     corners = np.concatenate(
         [

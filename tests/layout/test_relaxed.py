@@ -137,7 +137,7 @@ def test_options_that_make_no_sense_are_refused(options, words):
 
 def test_a_metric_that_did_not_converge_is_left_alone(monkeypatch):
     def refuse(*arguments, **options):
-        raise errors.SeamError("the sides of 3 of 4 seam edges are no copies of each other")
+        raise errors.SeamError("the sides of 3 of 4 seam edges are not copies of each other")
 
     monkeypatch.setattr(STAGE, "relax", refuse)
     result = flatten(*shapes.sphere(2), stretch=0.5)
@@ -195,7 +195,7 @@ def test_a_small_component_that_cannot_be_relaxed_leaves_the_others_to_themselve
     def refuse(mesh, *arguments, **options):
         components.append(mesh.components[0])
         if mesh.components[0] > 1:
-            raise errors.SeamError("the sides of 3 of 4 seam edges are no copies of each other")
+            raise errors.SeamError("the sides of 3 of 4 seam edges are not copies of each other")
         return relax(mesh, *arguments, **options)
 
     wanted = flatten(vertices, faces)

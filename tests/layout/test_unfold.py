@@ -11,7 +11,7 @@ from coneflat.geometry import edge_lengths, flat_triangles
 from coneflat.geometry.intrinsic import halfedge_twins
 from coneflat.geometry.planar import heights
 from coneflat.geometry.straight import FlatTriangles, straight_triangles
-from coneflat.layout.patches import DEGENERATE
+from coneflat.layout.patches import DEGENERATE_HEIGHT
 from coneflat.layout.relax.relax import rest_sides
 from coneflat.layout.unfold import unfold
 from coneflat.layout.untangle import untangle
@@ -159,7 +159,7 @@ class TestUntangle:
         assert len(result.moved) < 20
         assert 0 < result.largest_move < 3
         uv = unfold(result.flat, faces)
-        assert (heights(side_vectors(uv, faces)) > DEGENERATE).all()
+        assert (heights(side_vectors(uv, faces)) > DEGENERATE_HEIGHT).all()
         still = np.setdiff1d(np.arange(len(points)), result.moved)
         offset = uv[still] - points[still, :2]
         np.testing.assert_allclose(offset, offset[:1].repeat(len(still), 0), atol=1e-13)
@@ -201,7 +201,7 @@ class TestUntangle:
         cut = halfedge_twins(cut_mesh.mesh) < 0
         corners = cut_mesh.mesh.faces
         uv = unfold(result.flat, corners)
-        assert (heights(side_vectors(uv, corners)) > DEGENERATE).all()
+        assert (heights(side_vectors(uv, corners)) > DEGENERATE_HEIGHT).all()
         assert seam_mismatch(result.flat, cut, uv, corners) < 1e-12
 
     def test_vertices_beside_a_seam_are_moved_first(self):

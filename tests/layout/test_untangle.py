@@ -15,7 +15,7 @@ from coneflat.geometry import edge_lengths
 from coneflat.geometry.planar import heights, signed_double_areas
 from coneflat.geometry.straight import FlatTriangles
 from coneflat.layout.free_seams import embedded_disk
-from coneflat.layout.patches import DEGENERATE, Patches
+from coneflat.layout.patches import DEGENERATE_HEIGHT, Patches
 from coneflat.layout.relax.relax import rest_sides
 from coneflat.layout.untangle import untangle
 
@@ -48,7 +48,7 @@ def stretched(mesh, factor):
 
 
 def laid_out_angles(result):
-    """The angles at each corner of the layout, negative where it is upside down."""
+    """The angles at each corner of the layout, negative where it is flipped."""
     at = result.corner_uv @ [1, 1j]
     return np.angle((at[:, [2, 0, 1]] - at) / (at[:, [1, 2, 0]] - at))
 
@@ -58,7 +58,7 @@ def angle_sums(result):
 
 
 def is_upright(result):
-    """Vertices with no triangle around that is upside down, and on no seam where sides of seams have changed."""
+    """Vertices with no triangle around that is flipped, and on no seam where sides of seams have changed."""
     upright = np.ones(len(result.vertices), dtype=bool)
     upright[result.faces[laid_out_angles(result).min(axis=1) <= 0]] = False
     if any("at the expense of" in note for note in result.notes):
@@ -98,7 +98,7 @@ class TestWinding:
                 np.unique(faces[touched(before, result.flat)]), np.flatnonzero(on_boundary)
             ):
                 sides = result.flat.sides.reshape(-1, 3)[(faces == vertex).any(axis=1)]
-                if heights(sides).min() > DEGENERATE:
+                if heights(sides).min() > DEGENERATE_HEIGHT:
                     assert total_angle(result.flat, faces, vertex) == pytest.approx(angles[vertex], abs=1e-6)
 
     @pytest.mark.parametrize("name", WILD)
@@ -143,7 +143,7 @@ class TestFreeSeams:
         sums = angle_sums(result)[inside(result)]
         exact = abs(sums - 2 * np.pi).max() < 1e-6 and result.distortion.seam_mismatch_max < 1e-6
         said = " ".join(result.notes)
-        assert exact != ("they are upright, but" in said)
+        assert exact != ("they are positively oriented, but" in said)
         assert exact or "of seams differ in length" in said or "do not sum to what" in said
 
     def test_seams_of_quarter_turns_stay(self):

@@ -11,7 +11,7 @@ from coneflat import errors, flatten
 from coneflat.base.threads import using_threads
 from coneflat.geometry import cotangent_laplacian, cotangents, edge_lengths
 from coneflat.linalg import SuperLUFactor, factorize, pardiso
-from coneflat.linalg.factors import LARGE, CholespyFactor, has_pardiso
+from coneflat.linalg.factors import MIN_PARDISO_UNKNOWNS, CholespyFactor, has_pardiso
 from coneflat.linalg.pardiso import PardisoFactor
 
 needs_pardiso = pytest.mark.skipif(not has_pardiso(), reason="pypardiso is not installed")
@@ -23,7 +23,7 @@ def kind(request, monkeypatch):
     """A kind of factor; `factorize` takes it for all but indefinite matrices."""
     name = "coneflat.linalg.factors"
     monkeypatch.setattr(f"{name}.has_pardiso", lambda: request.param is PardisoFactor)
-    monkeypatch.setattr(f"{name}.LARGE", 1)
+    monkeypatch.setattr(f"{name}.MIN_PARDISO_UNKNOWNS", 1)
     if request.param is SuperLUFactor:
         monkeypatch.setattr(f"{name}.CholespyFactor", SuperLUFactor)
     return request.param
@@ -103,7 +103,7 @@ def test_large_systems_are_solved_by_pardiso_where_it_is_installed(matrix, monke
     expected = np.linalg.solve(matrix.toarray(), right)
     for is_installed, large in ((True, PardisoFactor), (False, CholespyFactor)):
         monkeypatch.setattr("coneflat.linalg.factors.has_pardiso", lambda: is_installed)  # noqa: B023
-        for whole, kind in ((0, CholespyFactor), (LARGE, large)):
+        for whole, kind in ((0, CholespyFactor), (MIN_PARDISO_UNKNOWNS, large)):
             factor = factorize(matrix, whole=whole)
             assert type(factor) is kind
             assert factor.solve(right) == pytest.approx(expected, abs=1e-9)
@@ -147,7 +147,7 @@ def test_mkl_is_found_where_no_package_tells_of_it(monkeypatch, found):
 
 @needs_pardiso
 def test_the_number_of_threads_changes_nothing_but_rounding(monkeypatch):
-    monkeypatch.setattr("coneflat.linalg.factors.LARGE", 1)
+    monkeypatch.setattr("coneflat.linalg.factors.MIN_PARDISO_UNKNOWNS", 1)
     vertices, faces = shapes.sphere(4)
     one, two, again = (flatten(vertices, faces, threads=n, max_cones=4) for n in (1, 3, 3))
     assert one.cones.tolist() == two.cones.tolist()

@@ -79,7 +79,7 @@ class TestAgainstAnIndependentTool:
             assert found[measure] == pytest.approx(getattr(result.distortion, measure), rel=1e-9)
 
     def test_polygons_as_fans(self, independent, tmp_path):
-        """A quad and a pentagon that are not convex in the plane: one half of each fan is upside down."""
+        """A quad and a pentagon that are not convex in the plane: one half of each fan is flipped."""
         text = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 4 0 0\nv 5 1 0\nv 4 2 0\n"
         text += "vt 0 0\nvt .5 0\nvt .1 .1\nvt 0 .5\nvt 1 0\nvt .6 .1\nvt 1 .5\nvt .5 .5\n"
         text += "f 1/1 2/2 3/3 4/4\nf 2/2 5/5 6/6 7/7 3/8\n"

@@ -18,7 +18,7 @@ V, F = shapes.hill(4, 3)
         (V, F[:, :2], errors.ArrayShapeError, r"\(24, 2\)"),
         (V.astype(str), F, errors.ArrayShapeError, "numbers"),
         (V, F.astype(complex), errors.ArrayShapeError, "vertex indices"),
-        (V, F + 0.5, errors.ArrayShapeError, "whole numbers"),
+        (V, F + 0.5, errors.ArrayShapeError, "integers"),
         ([[0, 0, 0], [1]], F, errors.ArrayShapeError, "numbers"),
         (V, F + 1, errors.FaceIndexError, r"2 faces with a vertex index outside 0\.\.19: 11, 23"),
         (V, F - 1, errors.FaceIndexError, "2 faces"),

@@ -31,7 +31,7 @@ class TestConvergence:
         assert np.abs(exact_metric(ring, lengths_of(ring), 0.0).curvature).max() < 1e-11
 
     def test_its_own_triangles_have_its_curvature(self):
-        """Sums of their angles, up to full turns: some may be turned over."""
+        """Sums of their angles, up to full turns: some may be flipped."""
         mesh = TriangleMesh(*shapes.hill(16, 12))
         target = np.zeros(len(mesh.vertices))
         border = np.flatnonzero(mesh.is_boundary_vertex)

@@ -185,7 +185,7 @@ class TestCosts:
             weights = {"vertex_weights": np.where(cheap, 0.1, 1.0)}
         else:
             weights = {"edge_weights": np.where(cheap[mesh.edges].all(axis=1), 0.1, 1.0)}
-        # Far from the boundary, where leaving the grid is no way.
+        # Far from the boundary, where leaving the grid is not a way.
         costs = edge_costs(mesh, lengths_of(mesh), **weights)
         boundary = mesh.is_boundary_vertex[mesh.edges].any(axis=1)
         costs[boundary] *= 100

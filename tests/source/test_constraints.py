@@ -114,7 +114,7 @@ def test_cones_that_triangles_cannot_hold_are_avoided():
         ({"forbidden_cones": range(162)}, errors.CurvatureError, "allowed at 0"),
         ({"forbidden_cones": range(2, 162)}, errors.CurvatureError, "allowed at 2"),
         ({"cone_count": 2}, errors.CurvatureError, "3 or more"),
-        ({"cone_count": 2.5}, errors.OptionError, "whole number"),
+        ({"cone_count": 2.5}, errors.OptionError, "integer"),
         ({"distortion": 0}, errors.OptionError, "a number above 0"),
         ({"min_cone_angle": -1}, errors.OptionError, "positive"),
         ({"min_cone_angle": 7, "max_cone_angle": 6}, errors.OptionError, "exceed"),
@@ -144,7 +144,7 @@ def files(tmp_path, ball):
         (["--quantise", "pi/2", "--distortion", "0.3"], None),
         (["--quantize", "pi/2", "--hide-seams", "2"], None),
         (["--weights", "nothing"], "it has red, green, blue, quality"),
-        (["--forbidden-cones", "a,b"], "'a' is no vertex"),
+        (["--forbidden-cones", "a,b"], "'a' is not a vertex"),
         (["--min-cone-angle", "wide"], "is no angle"),
         (["--cone-count", "5", "--distortion", "0.1"], "leave out --distortion"),
         (["--cones", "greedy", "--quantise", "pi/2"], "leave out --quantise"),
@@ -246,7 +246,7 @@ class TestRegions:
         top = int(np.argmax(vertices[:, 2]))
         with pytest.raises(errors.SeamError, match="forbidden as seams"):
             flatten(vertices, faces, cones=[top, 3, 40], no_seams=np.flatnonzero(region))
-        with pytest.raises(errors.OptionError, match="no_seams: 100000 is no vertex"):
+        with pytest.raises(errors.OptionError, match="no_seams: 100000 is not a vertex"):
             flatten(vertices, faces, no_seams=[100000])
 
     def test_what_must_be_cut_all_the_same_is_noted(self):
@@ -265,7 +265,7 @@ class TestRegions:
         some = dict.fromkeys(np.flatnonzero(important).tolist(), 100.0)
         whole = flatten(vertices, faces, cone_count=5, weights=np.where(important, 100.0, 1.0))
         np.testing.assert_array_equal(flatten(vertices, faces, cone_count=5, weights=some).uv, whole.uv)
-        with pytest.raises(errors.OptionError, match="weights: 100000 is no vertex"):
+        with pytest.raises(errors.OptionError, match="weights: 100000 is not a vertex"):
             flatten(vertices, faces, weights={100000: 2.0})
         with pytest.raises(errors.OptionError, match="that of vertex 3 must be a number"):
             flatten(vertices, faces, weights={3: "x"})

@@ -25,7 +25,7 @@ def compile_kernels() -> None:
         flatten(*mesh)
         flatten(*mesh, cones="greedy")
     points, faces = _tube(closed=True)
-    flatten(points * [10, 1, 1], faces)  # has triangles to be turned over
+    flatten(points * [10, 1, 1], faces)  # has triangles to be flipped
     # has triangles to be cut: six of them have no room for 7 pi
     flatten(points, faces, cones={0: -5 * np.pi, **dict.fromkeys(range(100, 600, 100), np.pi)})
     # large enough for what fine meshes alone take

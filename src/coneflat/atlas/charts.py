@@ -97,7 +97,7 @@ def read_charts(corner_uv: ArrayLike, chart_of_triangle: ArrayLike | None) -> Ch
         chart = np.asarray(chart_of_triangle)
     if chart.shape != (len(uv),) or chart.dtype.kind not in "iu":
         raise ArrayShapeError(
-            f"chart_of_triangle has shape {chart.shape} and type {chart.dtype}, not one whole number for each "
+            f"chart_of_triangle has shape {chart.shape} and type {chart.dtype}, not one integer for each "
             f"of {len(uv):,} triangles"
         )
     triangles = np.bincount(chart) if chart.min() >= 0 and chart.max() < len(chart) else np.zeros(1)
@@ -151,12 +151,12 @@ def find_outlines(
     """Return the outlines of charts; how often one winds around a point is how many triangles cover it.
 
     Sides that run there and back between the same points cancel; what is left of interior ones, where the two
-    copies of a point differ by rounding, does no harm. Triangles upside down are turned over, so that what they
+    copies of a point differ by rounding, does no harm. Flipped triangles are turned back, so that what they
     cover counts, too.
 
     Args:
         corners: (m, 3) of the triangles.
-        flipped: (m,) True for triangles upside down.
+        flipped: (m,) True for flipped triangles.
         chart: (m,) chart of each triangle, below `count`. Every chart has a triangle.
         count: number of charts.
         is_open: (m, 3) the sides, from each corner on, that are not known to cancel in pairs; None for all.

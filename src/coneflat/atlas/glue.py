@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..base.compiled import compiled
-from ..base.progress import go_on
+from ..base.progress import check_cancelled
 from ..geometry.overlap import find_overlaps
 from ..geometry.planar import bounds, fill_bounds, signed_double_areas
 from ..mesh.connectivity import TriangleMesh
 from .charts import ChartLayout, Seams, same_points
 
 # Relative to the length of a seam edge: how far its two sides may be apart, moved together, to be glued.
-CONGRUENT = 1e-7
+CONGRUENCE_TOLERANCE = 1e-7
 
 
 def glue_charts(mesh: TriangleMesh, layout: ChartLayout, lengths: FloatArray) -> ChartLayout:
@@ -34,7 +34,7 @@ def glue_charts(mesh: TriangleMesh, layout: ChartLayout, lengths: FloatArray) ->
     seams = Seams(mesh, layout)
     layout = replace(layout, seams=seams.edges)
     inner = np.flatnonzero(seams.charts[:, 0] == seams.charts[:, 1])
-    layout = layout.joined(seams.coinciding(layout.places, inner, CONGRUENT))
+    layout = layout.joined(seams.coinciding(layout.places, inner, CONGRUENCE_TOLERANCE))
     if len(inner) == len(seams.edges):  # one chart
         return layout
     refused: set[tuple[int, ...]] = set()
@@ -77,7 +77,7 @@ class _Gluing:
         glued = False
         total = np.array([lengths[self.seams.edges[members]].sum() for members in self.stretches])
         for best in np.argsort(-total, kind="stable"):
-            go_on()
+            check_cancelled()
             members = self.stretches[best]
             one, other = self.seams.charts[members[0]]
             key = (
@@ -104,12 +104,12 @@ class _Gluing:
             kept, moved, here, there = moved, kept, there, here
         across = there[1] - there[0]
         turn = (here[1] - here[0]) / across if across else 0.0
-        if not abs(abs(turn) - 1) <= CONGRUENT:
+        if not abs(abs(turn) - 1) <= CONGRUENCE_TOLERANCE:
             return False
         points = np.unique(self.corners[self.faces[moved]])
         before, self.places = self.places, self.places.copy()
         self.places[points] = (before[points] - there.mean()) * (turn / abs(turn)) + here.mean()
-        pairs = seams.coinciding(self.places, seams.within(kept, moved), CONGRUENT)
+        pairs = seams.coinciding(self.places, seams.within(kept, moved), CONGRUENCE_TOLERANCE)
         # To the last digit: both of a pair are to be one point.
         pairs = np.where(np.isin(pairs[:, :1], points), pairs[:, ::-1], pairs)
         self.places[pairs[:, 1]] = self.places[pairs[:, 0]]
@@ -133,7 +133,7 @@ class _Gluing:
         return _pairs(self.places[self.corners[faces]])
 
     def _fits(self, kept: int, moved: int) -> bool:
-        """Whether the triangles of a chart are upright in their new places, and overlap none of the other's."""
+        """Whether a chart's triangles are positively oriented in their new places, and overlap none of the other's."""
         corners = self._corners(self.faces[moved])
         if not (signed_double_areas(corners) > 0).all():
             return False

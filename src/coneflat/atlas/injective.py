@@ -16,15 +16,15 @@ from .charts import ChartLayout, Seams
 from .glue import glue_charts
 from .split import as_disk, split_overlaps, unpinched
 
-# Parts of the area that charts should have at least. Where the cheapest cuts leave several charts, dearer ones that
+# Parts of the area that charts should have at least. Where the cheapest cuts leave several charts, costlier ones that
 # leave larger pieces may leave fewer.
 LEAST_PARTS = (0.0, 0.002, 0.01)
 # On larger meshes, triangles, only where there are slivers.
-LARGE = 50_000
+LARGE_TRIANGLES = 50_000
 # Where so many charts are split off, larger pieces are tried first: most would only have to be glued on again.
-MANY = 64
+LARGEST_FIRST_CHARTS = 64
 # Below this part of the area a chart is a sliver.
-SLIVER = 0.001
+SLIVER_AREA = 0.001
 
 
 def injective_charts(
@@ -58,7 +58,7 @@ def injective_charts(
     found: list[tuple[tuple[int, int, float], int, ChartLayout]] = []
     for part in LEAST_PARTS:
         least = part * float(np.abs(areas).sum())
-        most = MANY if part < LEAST_PARTS[-1] else np.inf
+        most = LARGEST_FIRST_CHARTS if part < LEAST_PARTS[-1] else np.inf
         chart = split_overlaps(
             points, corners, lengths[mesh.halfedge_edges], np.abs(areas), pairs, least, most, disk
         )
@@ -67,7 +67,7 @@ def injective_charts(
         layout = glue_charts(mesh, whole.split(chart), lengths).numbered_anew()
         rank = _rank(mesh, layout, np.abs(areas), lengths)
         found.append((rank, len(found), layout))
-        if rank[1] == 1 or (not rank[0] and len(corners) > LARGE):
+        if rank[1] == 1 or (not rank[0] and len(corners) > LARGE_TRIANGLES):
             break
     return min(found, key=lambda one: one[:2])[2]
 
@@ -77,7 +77,7 @@ def _rank(
 ) -> tuple[int, int, float]:
     """Return the number of slivers, that of charts, and the length of seams."""
     sizes = np.bincount(layout.chart, weights=areas)
-    slivers = int((sizes < SLIVER * sizes.sum()).sum())
+    slivers = int((sizes < SLIVER_AREA * sizes.sum()).sum())
     return slivers, len(sizes), float(lengths[Seams(mesh, layout).edges].sum())
 
 

@@ -12,7 +12,7 @@ from ..base.arrays import FloatArray, IntArray
 from ..base.compiled import compiled
 from ..errors import OptionError
 from .charts import Charts, Outlines, read_charts
-from .straight import QUARTER, SAME, straight_directions
+from .straight import HALF_PI, RELATIVE_TOLERANCE, straight_directions
 
 if TYPE_CHECKING:
     ComplexArray = NDArray[np.complex128]
@@ -40,14 +40,14 @@ def orient_charts(
 
     Raises:
         ArrayShapeError, NonFiniteError: arrays do not fit, or are not finite.
-        OptionError: a chart is mirrored, or `up` is no direction, or is given without `corners`.
+        OptionError: a chart is mirrored, or `up` is not a direction, or is given without `corners`.
     """
     charts = read_charts(corner_uv, chart_of_triangle)
     outlines = charts.outlines()
     angles = straight_angles(charts, outlines, border_directions(outlines))
     if up is not None:
         rise = mean_rise(charts, corners, up) * np.exp(1j * angles)
-        angles += QUARTER * np.round((QUARTER - np.angle(rise)) / QUARTER)
+        angles += HALF_PI * np.round((HALF_PI - np.angle(rise)) / HALF_PI)
     return charts.moved(np.exp(1j * angles))
 
 
@@ -84,8 +84,8 @@ def straight_angle(points: ComplexArray, directions: FloatArray) -> float:
     width, height = _extents(hull, directions)
     area, longer = width * height, np.maximum(width, height)
     # Of rectangles of equal area, as around many quadrilaterals, the longest.
-    best = int(np.where(area <= area.min() * (1 + SAME), longer, 0.0).argmax())
-    return float(-directions[best] + (QUARTER if height[best] > width[best] else 0.0))
+    best = int(np.where(area <= area.min() * (1 + RELATIVE_TOLERANCE), longer, 0.0).argmax())
+    return float(-directions[best] + (HALF_PI if height[best] > width[best] else 0.0))
 
 
 def square_angle(points: ComplexArray, directions: FloatArray) -> float:
@@ -98,9 +98,9 @@ def square_angle(points: ComplexArray, directions: FloatArray) -> float:
     if len(directions):
         width, height = _extents(hull, directions)
         return float(-directions[np.maximum(width, height).argmin()])
-    ends = np.unique(np.mod(np.angle(np.roll(hull, -1) - hull), QUARTER))
-    middle = (ends + np.append(ends[1:], ends[0] + QUARTER)) / 2
-    across, along = _spans(hull, middle), _spans(hull, middle + QUARTER)
+    ends = np.unique(np.mod(np.angle(np.roll(hull, -1) - hull), HALF_PI))
+    middle = (ends + np.append(ends[1:], ends[0] + HALF_PI)) / 2
+    across, along = _spans(hull, middle), _spans(hull, middle + HALF_PI)
     # (across . (cos, sin) = along . (-sin, cos))
     equal = np.arctan2(along.imag - across.real, across.imag + along.real)
     angles = np.concatenate([ends, equal])
@@ -126,7 +126,7 @@ def _spans(hull: ComplexArray, angles: FloatArray) -> ComplexArray:
     directions[0] = 0.0
 
     def farthest(angle: FloatArray) -> ComplexArray:
-        after = np.searchsorted(directions, np.mod(angle + QUARTER - start, 2 * np.pi), side="right")
+        after = np.searchsorted(directions, np.mod(angle + HALF_PI - start, 2 * np.pi), side="right")
         return hull[after % len(hull)]
 
     return farthest(angles) - farthest(angles + np.pi)
@@ -136,7 +136,7 @@ def _extents(hull: ComplexArray, angles: FloatArray) -> tuple[FloatArray, FloatA
     """Return the hull's extents along directions and across them."""
     axis = np.exp(1j * angles)
     width = (np.conj(axis) * _spans(hull, angles)).real
-    height = (np.conj(1j * axis) * _spans(hull, angles + QUARTER)).real
+    height = (np.conj(1j * axis) * _spans(hull, angles + HALF_PI)).real
     return width, height
 
 

@@ -16,12 +16,12 @@ from ..geometry.planar import signed_double_areas
 from .charts import Charts, Outlines, read_charts
 from .orient import border_directions, mean_rise, orient_charts, square_angle, straight_angles
 from .place import Packing, pack
-from .straight import QUARTER, SAME, along_axes
+from .straight import HALF_PI, RELATIVE_TOLERANCE, along_axes
 
 ROTATIONS = ("any", "quarter", "none")
 # Angles that charts are tried at, times their number; many fill each other's gaps in quarter turns. And into how many
 # equal parts a turn may be divided.
-TURNS, QUARTERS, MOST_TURNS = 480, 4, 16
+MAX_PLACEMENTS, QUARTER_TURNS, MAX_TURNS = 480, 4, 16
 TILES_IN_A_ROW = 10
 
 
@@ -72,7 +72,7 @@ def pack_charts(
         margin: texels between charts and the border of the texture, at least; None for as many as `padding`.
         rotate: "any" turns charts so that they fill the texture best, but those straight whose border is, see
             `orient_charts`; "quarter" so that each lies straight, its long side along u or v; "none" leaves them as
-            they are. A whole number turns each by a multiple of that part of a full turn: 4 by quarter turns from how
+            they are. A integer turns each by a multiple of that part of a full turn: 4 by quarter turns from how
             it lies; those whose border is straight only so that it is along the axes, or as near to them as it can be.
             One chart alone is turned by "any" by at most an eighth of a turn, and by a number not at all.
         tiles: number of textures to distribute charts over. A chart is not cut, so the largest limits the scale.
@@ -115,8 +115,12 @@ def pack_known(
         packing = _alone(outlines, directions[0], rotate)
     else:
         area = float(np.abs(charts.sums(charts.areas) * density**2).sum())
-        finest = QUARTERS * min(max(TURNS // (QUARTERS * charts.count), 1), 6)
-        turns = rotate if isinstance(rotate, int) else {"any": finest, "quarter": QUARTERS, "none": 1}[rotate]
+        finest = QUARTER_TURNS * min(max(MAX_PLACEMENTS // (QUARTER_TURNS * charts.count), 1), 6)
+        turns = (
+            rotate
+            if isinstance(rotate, int)
+            else {"any": finest, "quarter": QUARTER_TURNS, "none": 1}[rotate]
+        )
         angles = np.tile(np.arange(turns) * (2 * np.pi / turns), (charts.count, 1))
         allowed = along_axes(directions, straight, angles)
         gap = padding / resolution / room
@@ -166,7 +170,7 @@ def _densities(charts: Charts, areas: ArrayLike) -> FloatArray:
 def _alone(outlines: Outlines, directions: FloatArray, rotate: str | int) -> Packing:
     """Return one chart in the middle of the smallest square around it, turned no more than it must be for that."""
     angle = square_angle(outlines.points(0), directions) if rotate == "any" else 0.0
-    angle -= QUARTER * round(angle / QUARTER)
+    angle -= HALF_PI * round(angle / HALF_PI)
     points = outlines.points(0) * np.exp(1j * angle)
     low, high = (complex(pick(points.real), pick(points.imag)) for pick in (np.min, np.max))
     side = max((high - low).real, (high - low).imag)
@@ -177,14 +181,14 @@ def _alone(outlines: Outlines, directions: FloatArray, rotate: str | int) -> Pac
 def _check(resolution: int, padding: float, margin: float, rotate: str | int, tiles: int) -> None:
     for name, count in (("resolution", resolution), ("tiles", tiles)):
         if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or count < 1:
-            raise OptionError(f"{name} must be a whole number from 1, not {shown(count)}")
+            raise OptionError(f"{name} must be an integer from 1, not {shown(count)}")
     for name, texels in (("padding", padding), ("margin", margin)):
         is_number = isinstance(texels, (int, float, np.number)) and not isinstance(texels, bool)
         if not is_number or not 0 <= texels < math.inf:
             raise OptionError(f"{name} must be a number of texels, 0 or more, not {shown(texels)}")
     if isinstance(rotate, int) and not isinstance(rotate, bool):
-        if not 1 <= rotate <= MOST_TURNS:
-            raise OptionError(f"rotate must be from 1 to {MOST_TURNS} turns, not {rotate}")
+        if not 1 <= rotate <= MAX_TURNS:
+            raise OptionError(f"rotate must be from 1 to {MAX_TURNS} turns, not {rotate}")
     elif not isinstance(rotate, str) or rotate not in ROTATIONS:
         raise OptionError(
             f"unknown rotate {shown(rotate)}: choose from {', '.join(ROTATIONS)}, or a number of turns"
@@ -237,9 +241,9 @@ def arrange_charts(
 def whole_turns(quantum: float) -> int:
     """Return into how many equal parts a full turn can be divided, few enough to be tried, by multiples of an angle."""
     parts = 2 * np.pi / quantum
-    if abs(parts - round(parts)) > SAME * parts:
+    if abs(parts - round(parts)) > RELATIVE_TOLERANCE * parts:
         return 1
-    return max(turns for turns in range(1, MOST_TURNS + 1) if round(parts) % turns == 0)
+    return max(turns for turns in range(1, MAX_TURNS + 1) if round(parts) % turns == 0)
 
 
 def _turned_together(
@@ -263,7 +267,7 @@ def _turned_together(
     largest = order[first][np.unique(component, return_inverse=True)[1]]
     if up is not None:
         rise = mean_rise(charts, space, up)
-        angles += _best_turn(rise * np.exp(1j * angles), np.ones((charts.count, QUARTERS), dtype=bool))
+        angles += _best_turn(rise * np.exp(1j * angles), np.ones((charts.count, QUARTER_TURNS), dtype=bool))
         angles = angles[largest]
         choices = np.tile(2 * np.pi / turns * np.arange(turns), (charts.count, 1))
         angles = angles + _best_turn(rise * np.exp(1j * angles), along_axes(directions, angles, choices))
@@ -280,7 +284,7 @@ def _best_turn(rise: NDArray[np.complex128], allowed: BoolArray) -> FloatArray:
 
 
 def _upright(flat: FloatArray, chart: IntArray) -> FloatArray:
-    """Return (m, 3, 2) charts, those turned over of which more area is upside down than not."""
+    """Return (m, 3, 2) charts, those flipped of which more area is flipped than not."""
     is_mirrored = np.bincount(chart, weights=signed_double_areas(flat)) < 0
     if not is_mirrored.any():
         return flat

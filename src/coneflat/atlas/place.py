@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..base.compiled import compiled
-from ..base.progress import go_on
+from ..base.progress import check_cancelled
 from ..errors import OptionError
 from .charts import Outlines
 
 # Columns of the grid at least, those that so many charts need, and cells of all tiles at most.
-COLUMNS, COLUMNS_PER_CHART, MOST_CELLS = 400, 24.0, 4_000_000
+MIN_COLUMNS, COLUMNS_PER_CHART, MAX_CELLS = 400, 24.0, 4_000_000
 # Changes that are tried, and work that ends them earlier, in comparisons of runs of cells: about a second.
-TRIES, WORK = 150, 40_000_000
+MAX_TRIES, MAX_WORK = 150, 40_000_000
 # So few charts may keep to the right, too, and one does in this part of the tries. Of more, that does harm.
-FEW, SET_ASIDE = 5, 0.3
-# Of more charts than MANY, those whose boxes differ by less than this factor count as alike.
-MANY, ALIKE = 1000, 1.02
+ASIDE_CHARTS, ASIDE_SHARE = 5, 0.3
+# Of more charts than GROUPED_CHARTS, those whose boxes differ by less than this factor count as alike.
+GROUPED_CHARTS, GROUP_RATIO = 1000, 1.02
 # The grid is so much wider than charts without gaps would need, and than the longest of them; no round number, so that
 # simple charts do not end where cells do and leave it to rounding which cell is the last.
-ROOMY = 1.2347
+GRID_MARGIN = 1.2347
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,18 +203,18 @@ def pack(
         OptionError: the gap is too wide for so many charts.
     """
     rng = np.random.default_rng(0)
-    columns = int(max(COLUMNS, COLUMNS_PER_CHART * (len(outlines) / tiles) ** 0.5))
-    columns = min(columns, int((MOST_CELLS / tiles) ** 0.5))
+    columns = int(max(MIN_COLUMNS, COLUMNS_PER_CHART * (len(outlines) / tiles) ** 0.5))
+    columns = min(columns, int((MAX_CELLS / tiles) ** 0.5))
     _, extent = turned_boxes(outlines, angles)
     extent = np.where(allowed, extent, complex(np.inf, np.inf))
     longest = float(np.maximum(extent.real, extent.imag).min(axis=1).max())
-    side = ROOMY * max((area / tiles) ** 0.5, longest) or 1.0
+    side = GRID_MARGIN * max((area / tiles) ** 0.5, longest) or 1.0
     masks = cover_charts(outlines, angles, side / columns)
     box = (extent.real + extent.imag).min(axis=1)
     order = np.argsort(-box, kind="stable")
     group = np.arange(len(order))
-    if len(order) > MANY:
-        group = np.unique(np.log(box + side / columns) // np.log(ALIKE), return_inverse=True)[1].ravel()
+    if len(order) > GROUPED_CHARTS:
+        group = np.unique(np.log(box + side / columns) // np.log(GROUP_RATIO), return_inverse=True)[1].ravel()
     start, width = Way(order, allowed.ravel(), np.zeros(len(order))), columns
 
     def fill(way: Way, width: int, limit: int) -> _Placed:
@@ -222,17 +222,17 @@ def pack(
 
     while (best := fill(start, width, width)).height > width:
         width += width // 12 + 1
-        if tiles * width**2 > 4 * MOST_CELLS:
+        if tiles * width**2 > 4 * MAX_CELLS:
             raise OptionError(
                 f"a gap of {100 * gap:.3g} % of the texture's width between {len(order):,} charts leaves no room for "
                 "them: use less padding, a higher resolution or more tiles"
             )
     last, least, step, work = best, int(longest / masks.cell) + 1, width // 16, 0
-    for _ in range(TRIES):
+    for _ in range(MAX_TRIES):
         goal = max(width - step, least)
-        if goal >= width or work > WORK:
+        if goal >= width or work > MAX_WORK:
             break
-        go_on()
+        check_cancelled()
         limit = goal + goal // 4
         if last is best:
             found = fill(best.way, goal, limit)
@@ -268,7 +268,7 @@ def _changed(way: Way, may: BoolArray, rng: np.random.Generator) -> Way:
     for chart in (rng.random(1 + int(2 * rng.random())) * count).astype(np.int64):
         shapes = slice(chart * turns, (chart + 1) * turns)
         allowed[shapes] = may[shapes] & (rng.random(turns) < rng.choice([0.3, 0.6, 1.0]))
-    if count <= FEW and rng.random() < SET_ASIDE:
+    if count <= ASIDE_CHARTS and rng.random() < ASIDE_SHARE:
         aside[int(rng.random() * count)] = rng.choice([0.0, rng.random(), 1.0])
     return Way(order, allowed, aside)
 

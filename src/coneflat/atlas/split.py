@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
-from ..base.progress import go_on
+from ..base.progress import check_cancelled
 from ..mesh.connectivity import (
     NEXT,
     TriangleMesh,
@@ -49,7 +49,7 @@ def split_overlaps(
     # Pieces of sheets, and the pairs in each.
     waiting = [(sheets[0], 0, pairs)]
     while waiting and count < most:
-        go_on()
+        check_cancelled()
         sheet, own, pairs = waiting.pop()
         if len(sheet.chart) > 1 and sheet.is_pinched(own):
             sheet, own, pairs = sheet.opened(own, pairs)

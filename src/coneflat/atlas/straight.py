@@ -9,20 +9,20 @@ import numpy as np
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..base.compiled import compiled
 
-QUARTER = np.pi / 2
+HALF_PI = np.pi / 2
 # A run is straight if it strays from the line between its ends by less than this part of its length: an arc of less
 # than 5 degrees is; so is a side of a box whose points are off by a thousandth of it.
-STRAY = 0.01
+MAX_STRAY = 0.01
 # Of a run, the part at each end that is not asked for the direction: there it may turn into a rounded corner.
-ENDS = 1 / 8
+END_SHARE = 1 / 8
 # Directions that differ by less, in radians, are the same. Of a smooth border at most a tenth or so lies in one.
-ALIKE = np.radians(1.5)
+SAME_DIRECTION = np.radians(1.5)
 # The part of a border that must lie in one direction, but for quarter turns: of an equilateral triangle and a hexagon
 # a third does, of a rim of 24 sides a sixth, of free forms up to 28 % and mostly 10 %.
-SHARE = 0.4
+MIN_STRAIGHT_SHARE = 0.4
 # Lengths, areas and parts of a turn that differ by less, relatively, and angles that do, in radians, are the same but
 # for rounding.
-SAME = 1e-6
+RELATIVE_TOLERANCE = 1e-6
 
 
 def straight_directions(sides: ComplexArray) -> FloatArray:
@@ -35,18 +35,18 @@ def straight_directions(sides: ComplexArray) -> FloatArray:
         sides: (s, 2) start and end of each side of an outline, in any order.
     """
     runs = straight_runs(sides)
-    lengths, angles = np.abs(runs), np.mod(np.angle(runs), QUARTER)
+    lengths, angles = np.abs(runs), np.mod(np.angle(runs), HALF_PI)
     order = np.argsort(angles, kind="stable")
     lengths, angles = lengths[order], angles[order]
-    around = np.concatenate([angles - QUARTER, angles, angles + QUARTER])
+    around = np.concatenate([angles - HALF_PI, angles, angles + HALF_PI])
     total = np.concatenate([[0.0], np.cumsum(np.tile(lengths, 3))])
-    begin = np.searchsorted(around, angles - ALIKE)
-    end = np.searchsorted(around, angles + ALIKE, side="right")
+    begin = np.searchsorted(around, angles - SAME_DIRECTION)
+    end = np.searchsorted(around, angles + SAME_DIRECTION, side="right")
     alike = total[end] - total[begin]
     border = np.abs(sides[:, 1] - sides[:, 0]).sum()
-    if not len(runs) or alike.max() <= SHARE * border:
+    if not len(runs) or alike.max() <= MIN_STRAIGHT_SHARE * border:
         return np.empty(0)
-    best = alike >= alike.max() * (1 - SAME)
+    best = alike >= alike.max() * (1 - RELATIVE_TOLERANCE)
     return _separate([_middle_angle(runs[order], angle) for angle in angles[best]])
 
 
@@ -56,20 +56,20 @@ def _middle_angle(runs: ComplexArray, near: float) -> float:
     So what is exactly straight is not turned by the little that some runs are off.
     """
     turned = runs * np.exp(-1j * near)
-    off = np.angle(turned * 1j ** -np.round(np.angle(turned) / QUARTER))
+    off = np.angle(turned * 1j ** -np.round(np.angle(turned) / HALF_PI))
     order = np.argsort(off, kind="stable")
-    order = order[np.abs(off[order]) <= ALIKE]
+    order = order[np.abs(off[order]) <= SAME_DIRECTION]
     until = np.cumsum(np.abs(runs[order]))
-    both = np.searchsorted(until, until[-1] / 2 * np.array([1 - SAME, 1 + SAME]))
-    return float(np.mod(near + off[order][both].mean(), QUARTER))
+    both = np.searchsorted(until, until[-1] / 2 * np.array([1 - RELATIVE_TOLERANCE, 1 + RELATIVE_TOLERANCE]))
+    return float(np.mod(near + off[order][both].mean(), HALF_PI))
 
 
 def _separate(angles: list[float]) -> FloatArray:
     """Return angles modulo a quarter turn without those that are nearly the same as one before."""
     kept: list[float] = []
     for angle in angles:
-        off = [abs((angle - other + QUARTER / 2) % QUARTER - QUARTER / 2) for other in kept]
-        if all(apart > ALIKE for apart in off):
+        off = [abs((angle - other + HALF_PI / 2) % HALF_PI - HALF_PI / 2) for other in kept]
+        if all(apart > SAME_DIRECTION for apart in off):
             kept.append(angle)
     return np.array(kept)
 
@@ -86,8 +86,8 @@ def along_axes(directions: list[FloatArray], turned: FloatArray, angles: FloatAr
     for c, of_border in enumerate(directions):
         if len(of_border):
             lying = of_border + turned[c] + angles[c][:, None]
-            off = np.abs(lying - QUARTER * np.round(lying / QUARTER)).min(axis=1)
-            allowed[c] = off <= off.min() + SAME
+            off = np.abs(lying - HALF_PI * np.round(lying / HALF_PI)).min(axis=1)
+            allowed[c] = off <= off.min() + RELATIVE_TOLERANCE
     return allowed
 
 
@@ -112,15 +112,15 @@ def _runs_of_curve(sides: ComplexArray) -> ComplexArray:
         curve = np.roll(curve, -begin)
     curve = np.append(curve, curve[0] if sides[-1, 1] == sides[0, 0] else sides[-1, 1])
     is_end = np.zeros(len(curve), dtype=np.bool_)
-    split_curve(curve.view(np.float64).reshape(-1, 2), STRAY, is_end)
+    split_curve(curve.view(np.float64).reshape(-1, 2), MAX_STRAY, is_end)
     ends = np.flatnonzero(is_end)
     along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(curve)))])
     start, length = along[ends[:-1]], np.diff(along[ends])
     low, high = (
         np.interp(at, along, curve.real) + 1j * np.interp(at, along, curve.imag)
-        for at in (start + ENDS * length, start + (1 - ENDS) * length)
+        for at in (start + END_SHARE * length, start + (1 - END_SHARE) * length)
     )
-    return np.asarray((high - low) / (1 - 2 * ENDS))
+    return np.asarray((high - low) / (1 - 2 * END_SHARE))
 
 
 @compiled

@@ -17,12 +17,12 @@ from ..geometry.planar import signed_double_areas
 from ..mesh.connectivity import NEXT
 
 # Of the extent of the layout: what overlaps by less touches, and is then moved by so much more than it overlaps.
-TOUCHING, APART = 1e-11, 2.0**-49
+TOUCHING_OVERLAP, SEPARATING_GAP = 1e-11, 2.0**-49
 # Of 32-bit numbers below 1: how far apart they are. Of points that are stored as such, what overlaps by less than
 # sixteen times that touches, and is moved by twice that more than it overlaps.
-SPACING = 2.0**-24
+SINGLE_SPACING = 2.0**-24
 # What is moved may touch something else then, and triangles that are turned back may turn others over.
-ROUNDS = 10
+MAX_ROUNDS = 10
 
 
 def part_touching(
@@ -37,12 +37,14 @@ def part_touching(
     """
     low, high = points.min(axis=0), points.max(axis=0)
     extent = float((high - low).max())
-    touching, apart = (TOUCHING, APART) if stored is None else (16 * SPACING, 2 * SPACING)
+    touching, apart = (
+        (TOUCHING_OVERLAP, SEPARATING_GAP) if stored is None else (16 * SINGLE_SPACING, 2 * SINGLE_SPACING)
+    )
     if stored is not None:
         points = stored(points)
     best, found = points, find_overlaps(points, corners)
     overlaps = found
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         moves = _moves(points @ np.array([1, 1j]), corners, overlaps.pairs, touching * extent, apart * extent)
         if not moves.any():
             break
@@ -101,15 +103,15 @@ def _least_depth(corners: NDArray[np.complex128]) -> tuple[NDArray[np.complex128
 
 
 # Places that are tried for a point: so many spacings away at most, along each axis.
-REACH = 3
-# Triangles that are upside down: more are too many to be turned back one by one.
+MAX_GRID_STEPS = 3
+# Triangles that are flipped: more are too many to be turned back one by one.
 MAX_TURNED_BACK = 5000
 
 
 def snap_apart(
     points: FloatArray, corners: IntArray, stored: Callable[[FloatArray], FloatArray]
 ) -> tuple[FloatArray, Overlaps]:
-    """Return points as they are stored, triangles upright and apart where they were and rounding admits it.
+    """Return points as stored, with triangles positively oriented and disjoint where they were and rounding permits.
 
     And what overlaps nevertheless.
 
@@ -121,30 +123,35 @@ def snap_apart(
     rounded = stored(points)
     if np.array_equal(rounded, points):
         return points, find_overlaps(points, corners)
-    upright = signed_double_areas(points[corners]) > 0
-    rounded = _turned_back(rounded, corners, upright, stored)
+    is_positive = signed_double_areas(points[corners]) > 0
+    rounded = _turned_back(rounded, corners, is_positive, stored)
     parted, overlaps = part_touching(rounded, corners, stored)
-    if (upright & (signed_double_areas(parted[corners]) <= 0)).any():
-        parted = _turned_back(parted, corners, upright, stored)
+    if (is_positive & (signed_double_areas(parted[corners]) <= 0)).any():
+        parted = _turned_back(parted, corners, is_positive, stored)
         overlaps = find_overlaps(parted, corners)
     return parted, overlaps
 
 
 def _turned_back(
-    points: FloatArray, corners: IntArray, upright: BoolArray, stored: Callable[[FloatArray], FloatArray]
+    points: FloatArray, corners: IntArray, is_positive: BoolArray, stored: Callable[[FloatArray], FloatArray]
 ) -> FloatArray:
-    """Return points, some a few spacings away, at which triangles that rounding turned over are upright again.
+    """Return points, some a few spacings away, at which triangles that rounding flipped are positively oriented again.
 
-    upright: (m,) True for triangles that are to be.
+    is_positive: (m,) True for triangles that are to be.
     """
     points = points.copy()
-    steps = SPACING * np.mgrid[-REACH : REACH + 1, -REACH : REACH + 1].reshape(2, -1).T
+    steps = (
+        SINGLE_SPACING
+        * np.mgrid[-MAX_GRID_STEPS : MAX_GRID_STEPS + 1, -MAX_GRID_STEPS : MAX_GRID_STEPS + 1]
+        .reshape(2, -1)
+        .T
+    )
     steps = steps[np.argsort((steps**2).sum(axis=1), kind="stable")]
-    for _ in range(ROUNDS):
-        bad = np.flatnonzero((signed_double_areas(points[corners]) <= 0) & upright)
+    for _ in range(MAX_ROUNDS):
+        bad = np.flatnonzero((signed_double_areas(points[corners]) <= 0) & is_positive)
         if not 0 < len(bad) <= MAX_TURNED_BACK:
             break
-        near = np.flatnonzero(np.isin(corners, corners[bad]).any(axis=1) & upright)
+        near = np.flatnonzero(np.isin(corners, corners[bad]).any(axis=1) & is_positive)
         for point in np.unique(corners[bad]).tolist():
             star = corners[near[(corners[near] == point).any(axis=1)]]
             places = stored(points[point] + steps * max(1.0, np.abs(points[point]).max()))

@@ -41,7 +41,7 @@ def has_any(mask: BoolArray, sets: IntArray) -> BoolArray:
 def unit_exponent(values: FloatArray) -> int:
     """Return the exponent of the least power of two that no value reaches: to divide by it rounds nothing.
 
-    So scaled, squares and products of lengths are no extremes, whatever the unit.
+    So scaled, squares and products of lengths are not extremes, whatever the unit.
     """
     return int(np.frexp(max(values.max(), -values.min()))[1])
 
@@ -61,7 +61,7 @@ def as_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
     if triangles.ndim != 2 or triangles.shape[1] != 3:
         raise ArrayShapeError(f"faces must have the shape (m, 3), not {triangles.shape}")
     if array.dtype.kind == "f" and (triangles != array).any():
-        raise ArrayShapeError("faces must hold whole numbers, vertex indices from 0")
+        raise ArrayShapeError("faces must hold integers, vertex indices from 0")
     if triangles.min() < 0 or triangles.max() >= vertex_count:
         bad = np.flatnonzero(((triangles < 0) | (triangles >= vertex_count)).any(axis=1))
         row = triangles[bad[0]]

@@ -18,6 +18,6 @@ PADDING = 2.0
 # lengths of seams are beneath the rounding of their costs.
 MOST_PREFERENCE = 10.0
 # Radians, or shares, by which a number typed with seven digits is off.
-TYPED = 1e-6
+TYPED_TOLERANCE = 1e-6
 # Radians: finer quanta than this restrict nothing that could be told from none, as multiples are known to 1e-6.
 LEAST_QUANTUM = 1e-4

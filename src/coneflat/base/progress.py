@@ -25,7 +25,7 @@ def asking(ask: Callable[[], None]) -> Iterator[None]:
         _ask.reset(token)
 
 
-def go_on() -> None:
+def check_cancelled() -> None:
     """Ask whether to go on, within `asking`."""
     ask = _ask.get()
     if ask is not None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 
 # Triangles from which on memory is what matters.
-HUGE = 3_000_000
+MEMORY_BOUND_TRIANGLES = 3_000_000
 # How many are used unless told otherwise, on any machine: the last digits depend on it.
 THREADS = 2
 
@@ -32,7 +32,7 @@ def concurrently(call: Callable[[], Result], triangles: int) -> Iterator[Future[
     """
     with ThreadPoolExecutor(1, thread_name_prefix="coneflat") as executor:
         future = executor.submit(copy_context().run, call)
-        if triangles > HUGE or threads() == 1:
+        if triangles > MEMORY_BOUND_TRIANGLES or threads() == 1:
             wait([future])
         yield future
 

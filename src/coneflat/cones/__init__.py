@@ -1,6 +1,6 @@
 """Where the curvature goes: cone placement and target curvatures, a file per strategy."""
 
-from .find import ROOM, close_search, find_cones, only_choice, open_search
+from .find import CONE_ANGLE_PER_TRIANGLE, close_search, find_cones, only_choice, open_search
 from .given import cones_at, cones_with_curvature
 from .greedy import greedy_cones
 from .integer.search import quantise_cones
@@ -11,7 +11,7 @@ from .sparse.search import ConeSearch
 __all__ = [
     "ConeSearch",
     "GroundedLaplacian",
-    "ROOM",
+    "CONE_ANGLE_PER_TRIANGLE",
     "SparseCones",
     "close_search",
     "cones_at",

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from ..base.arrays import FloatArray
-from ..base.defaults import TYPED
+from ..base.defaults import TYPED_TOLERANCE
 from ..base.progress import Stopwatch
 from ..base.text import plural
-from ..base.threads import HUGE
+from ..base.threads import MEMORY_BOUND_TRIANGLES
 from ..geometry.operators import weighted_areas
 from ..mesh.ties import mesh_tie_key
 from ..stages import ConeSolution, ConeSpec, Surface
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 # The angle of a cone for which each triangle around it has room on its straight sides: less than half a turn, as not
 # all of them can be spread alike.
-ROOM = 0.6 * np.pi
+CONE_ANGLE_PER_TRIANGLE = 0.6 * np.pi
 # On meshes of so many vertices, a neighbour is as good a place: corners of cones there, all widened alike, must not
 # exceed this, or the straight sides of a triangle may have no room for one, and the search has to be repeated: 14% of
 # the time of a horse of 97,000 triangles.
@@ -109,7 +109,7 @@ def polyhedron_corners(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
     if spec.strategy != "auto" or spec.has_wishes or spec.searches_corners:
         return None
     mesh, curvature = surface.mesh, surface.curvature
-    corners = np.flatnonzero((np.abs(curvature) > TYPED) & ~mesh.is_boundary_vertex)
+    corners = np.flatnonzero((np.abs(curvature) > TYPED_TOLERANCE) & ~mesh.is_boundary_vertex)
     angles = 2 * np.pi - curvature[corners]
     most = min(MAX_POLYHEDRON_CORNERS, MAX_POLYHEDRON_CORNERS if spec.max_count is None else spec.max_count)
     if not 0 < len(corners) <= most or not spec.is_allowed[corners].all():
@@ -139,7 +139,8 @@ def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearc
         search.restrict(~search.is_boundary & spec.is_allowed)
         return search
     room = (
-        ROOM * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices)) + np.pi * mesh.is_boundary_vertex
+        CONE_ANGLE_PER_TRIANGLE * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
+        + np.pi * mesh.is_boundary_vertex
     )
     if len(room) >= FINE_VERTICES:
         room = np.minimum(room, WIDEST_CORNER / surface.widest)
@@ -160,7 +161,7 @@ def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearc
         linear=linear_model(surface, spec),
     )
     search.tell = watch.tell
-    if len(mesh.faces) <= HUGE:  # else it holds too much memory
+    if len(mesh.faces) <= MEMORY_BOUND_TRIANGLES:  # else it holds too much memory
         surface.memo["search"] = search
     return search
 
@@ -184,7 +185,7 @@ def linear_model(surface: Surface, spec: ConeSpec) -> LinearModel:
     else:
         key = mesh_tie_key(surface.mesh)
         linear = LinearModel.of(surface.laplacian, surface.curvature, share, absorbs, key)
-    if surface.is_reused or len(surface.mesh.faces) <= HUGE:
+    if surface.is_reused or len(surface.mesh.faces) <= MEMORY_BOUND_TRIANGLES:
         surface.memo["linear"] = linear
     return linear
 

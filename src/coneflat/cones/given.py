@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
-from ..base.defaults import TYPED
+from ..base.defaults import TYPED_TOLERANCE
 from ..errors import CurvatureError
 from ..stages import ConeSolution
 from .solution import GroundedLaplacian, target_from_log_scale
@@ -33,7 +33,7 @@ def cones_at(
     elsewhere; then the target is K + L phi.
 
     Raises:
-        CurvatureError: a closed surface that is no torus has no cone to carry its curvature.
+        CurvatureError: a closed surface that is not a torus has no cone to carry its curvature.
     """
     is_singular = is_boundary.copy()
     is_singular[cones] = True
@@ -88,7 +88,7 @@ def checked_sum(curvatures: FloatArray, euler_characteristic: int | None) -> Flo
         return curvatures
     needed = 2 * np.pi * euler_characteristic
     found = float(np.sum(curvatures))
-    if abs(found - needed) > TYPED:
+    if abs(found - needed) > TYPED_TOLERANCE:
         raise CurvatureError(
             f"cone curvatures must sum to 2 pi chi = {needed:.7g} ({2 * euler_characteristic} pi) on this "
             f"closed surface, but sum to {found:.7g} ({found / np.pi:.6g} pi): off by {found - needed:.3g}"

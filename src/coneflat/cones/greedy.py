@@ -46,7 +46,7 @@ def greedy_cones(
 
     Raises:
         OptionError: epsilon is not positive, or max_cones is negative.
-        CurvatureError: a closed surface that is no torus is allowed no cone.
+        CurvatureError: a closed surface that is not a torus is allowed no cone.
     """
     if not epsilon > 0:
         raise OptionError(f"epsilon must be positive, not {epsilon:g}")

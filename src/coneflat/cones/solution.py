@@ -14,7 +14,7 @@ from ..mesh.connectivity import TriangleMesh
 FULL_TURN = 2 * np.pi
 # Values that differ by this share or less, and radians, are equal: symmetric surfaces have many that differ by rounding
 # only, and the first in the order of vertices is taken.
-TIE = 1e-9
+TIE_TOLERANCE = 1e-9
 
 
 class GroundedLaplacian:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..mesh.connectivity import NEXT
-from .layers import MOST_CELLS, trace_sides
+from .layers import MAX_CELLS, trace_sides
 from .orientation import counterclockwise
 
 # Crossings of horizontal lines with sides, about a minute: with more the areas are not computed. A hundredth of them is
@@ -58,12 +58,12 @@ def layers_of_raster(corners: FloatArray) -> tuple[float, float]:
     if not size.min() > 0:
         return 0.0, 0.0
     # Half a pixel less, so that the last of the points is in the last pixel.
-    pixels = counterclockwise((corners - low) * ((MOST_CELLS - 0.5) / size))[0]
-    marks, steps = np.zeros((2, MOST_CELLS + 1, MOST_CELLS + 1), dtype=np.int32)
+    pixels = counterclockwise((corners - low) * ((MAX_CELLS - 0.5) / size))[0]
+    marks, steps = np.zeros((2, MAX_CELLS + 1, MAX_CELLS + 1), dtype=np.int32)
     sides = np.stack([pixels, pixels[:, NEXT]], axis=2)
     trace_sides(sides.reshape(-1, 4), 0.0, 0.0, 1.0, marks, steps)
     layers = np.cumsum(steps, axis=1)
-    pixel = float(np.prod(size / (MOST_CELLS - 0.5)))
+    pixel = float(np.prod(size / (MAX_CELLS - 0.5)))
     return int(np.count_nonzero(layers > 1)) * pixel, int(np.count_nonzero(layers)) * pixel
 
 

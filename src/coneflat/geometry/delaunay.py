@@ -73,7 +73,7 @@ def intrinsic_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> tuple[Intrins
 
 # Rounding of a slack relative to the perimeter: a few ulps of lengths that are products of three factors,
 # with a wide margin, since an edge flipped for the sake of rounding could be flipped back and forth forever.
-NOISE = 1e-14
+SLACK_ROUNDING = 1e-14
 
 
 @compiled
@@ -94,7 +94,7 @@ def incircle_terms(
     slack_b = min(c, a) - (b - max(c, a))
     slack_c = min(a, b) - (c - max(a, b))
     perimeter = a + b + c
-    error = NOISE * perimeter
+    error = SLACK_ROUNDING * perimeter
     return (
         slack_b * slack_c,
         perimeter * slack_a,

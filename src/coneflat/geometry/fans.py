@@ -15,9 +15,9 @@ from ..base.compiled import compiled
 from ..mesh.connectivity import NEXT, PREVIOUS
 
 # Corners at one point from which on it is worth it; fewer triangles meet in few enough pairs.
-MANY = 500
+MIN_CORNERS = 500
 # By how much angles (radians) and turned coordinates may be off, computed of coordinates up to 1, and more.
-ROUNDED = 2.0**-46
+ANGLE_ROUNDING = 2.0**-46
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class Fans:
 
 def find_fans(corners: FloatArray) -> Fans | None:
     """Return the fans of many triangles (m, 3, 2), counterclockwise, coordinates up to 1; None if there is none."""
-    if len(corners) < MANY:
+    if len(corners) < MIN_CORNERS:
         return None
     places = corners.reshape(-1, 2) + 0.0  # a zero has one sign
     # Points are counted by numbers that depend on all of their bits: they are the same for the same points, and seldom
@@ -73,12 +73,12 @@ def find_fans(corners: FloatArray) -> Fans | None:
     mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
     hashed = (mixed >> np.uint64(64 - len(places).bit_length())).astype(np.int64)
     counts = np.bincount(hashed)
-    if counts.max() < MANY:
+    if counts.max() < MIN_CORNERS:
         return None
     points = places.view(np.complex128)[:, 0]
-    suspected = np.flatnonzero((counts >= MANY)[hashed])
+    suspected = np.flatnonzero((counts >= MIN_CORNERS)[hashed])
     _, number, count = np.unique(points[suspected], return_inverse=True, return_counts=True)
-    is_many = count[number.ravel()] >= MANY
+    is_many = count[number.ravel()] >= MIN_CORNERS
     suspected, number = suspected[is_many], number.ravel()[is_many]
     if not len(suspected):
         return None
@@ -101,6 +101,6 @@ def lie_apart(numbers: IntArray, angles: FloatArray, i: int, j: int) -> bool:
         return False
     for turn in range(-1, 2):
         begin, end = angles[j, 0] + turn * math.tau, angles[j, 1] + turn * math.tau
-        if begin < angles[i, 1] + ROUNDED and end > angles[i, 0] - ROUNDED:
+        if begin < angles[i, 1] + ANGLE_ROUNDING and end > angles[i, 0] - ANGLE_ROUNDING:
             return False
     return True

@@ -20,9 +20,9 @@ from .triangles import double_areas, slacks
 
 # Relative: by how much the two sides of an edge may differ, and a side be longer than the two others together. Rounding
 # makes less of lengths that were computed from either side, and what is wrong is off by more.
-ROUNDING = 1e-9
-# The area of a triangle goes through the product of four lengths, which is no number beyond this or below its inverse.
-LARGEST = 1e75
+LENGTH_ROUNDING = 1e-9
+# The area of a triangle takes a product of four lengths: beyond this it overflows, below its inverse it underflows.
+MAX_LENGTH = 1e75
 
 
 def check_lengths(
@@ -42,7 +42,7 @@ def check_lengths(
         face_names, vertex_names: (m,), (n,) what the user calls each; None if he has no other numbers.
 
     Raises:
-        ArrayShapeError: they are no numbers, or not (m, 3), or the mesh is none.
+        ArrayShapeError: they are not numbers, or not (m, 3), or the mesh is none.
         NonFiniteError: some are NaN or infinite.
         LengthError: some are not positive, too large or small for numbers, differ between the sides of an edge, or
             break the triangle inequality.
@@ -60,7 +60,7 @@ def check_lengths(
         return values
     faces = np.arange(len(values)) if face_names is None else face_names
     _refuse_numbers(values, faces, flat)
-    differ = np.flatnonzero(np.abs(one - two) > ROUNDING * np.maximum(one, two))
+    differ = np.flatnonzero(np.abs(one - two) > LENGTH_ROUNDING * np.maximum(one, two))
     if len(differ):
         edges = mesh.edges[~mesh.is_boundary_edge][differ]
         names = edges if vertex_names is None else vertex_names[edges]
@@ -76,7 +76,7 @@ def check_lengths(
         values.ravel()[pairs[:, 1]] = one
     unit = np.ldexp(values, -np.frexp(values.max())[1])
     spare = slacks(unit).min(axis=1)
-    is_broken = np.asarray(spare < -ROUNDING * unit.max(axis=1))
+    is_broken = np.asarray(spare < -LENGTH_ROUNDING * unit.max(axis=1))
     _refuse_faces(is_broken, "that break the triangle inequality", values, faces)
     if not flat:
         is_flat = double_areas(unit) <= 0
@@ -104,7 +104,7 @@ def _refuse_numbers(values: FloatArray, faces: IntArray, flat: bool) -> None:
     _refuse_faces(values.min(axis=1) <= 0, "with lengths that are not positive", values, faces)
     least, largest = values.min(), values.max()
     # What may be flat is solved for later, at a size of its own.
-    if least / largest < 1 / LARGEST or not (flat or 1 / LARGEST <= least <= largest <= LARGEST):
+    if least / largest < 1 / MAX_LENGTH or not (flat or 1 / MAX_LENGTH <= least <= largest <= MAX_LENGTH):
         raise LengthError(
             f"lengths from {least:.3g} to {largest:.3g} are beyond numbers once they are multiplied: scale them"
         )

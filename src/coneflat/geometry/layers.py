@@ -15,9 +15,9 @@ from ..base.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..base.compiled import compiled
 
 # Cells along a side of the grid for the root of the number of triangles, and at most.
-FINENESS, MOST_CELLS = 1.5, 2048
+CELLS_PER_ROOT, MAX_CELLS = 1.5, 2048
 # Fewer triangles are compared as they are; and so they are where sides cross more rows of cells, in the mean.
-FEW, MOST_ROWS = 2000, 20
+MIN_TRIANGLES, MAX_ROWS_PER_SIDE = 2000, 20
 
 
 def open_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray) -> BoolArray:
@@ -42,7 +42,7 @@ def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> Int
         is_open: (3m,) half-edges, all but those that cancel in pairs; see `open_sides`.
     """
     every = np.flatnonzero(signs)
-    if len(every) < FEW:
+    if len(every) < MIN_TRIANGLES:
         return every
     sides = np.flatnonzero(is_open & np.repeat(signs != 0, 3))
     face, corner = sides // 3, sides % 3
@@ -50,11 +50,11 @@ def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> Int
     ends = np.where((signs[face] < 0)[:, None, None], ends[:, ::-1], ends)
     flat = np.ascontiguousarray(corners).reshape(-1, 6)
     low, high = find_extent(flat)
-    count = min(int(FINENESS * math.sqrt(len(corners))), MOST_CELLS)
+    count = min(int(CELLS_PER_ROOT * math.sqrt(len(corners))), MAX_CELLS)
     extent = float((high - low).max())
     # Half a cell wider than needed, so that the last of the points is in the last cell.
     scale = (count - 0.5) / extent if extent > 0 else 0.0
-    if not 0 < scale < np.inf or np.abs(np.diff(ends[..., 1])).sum() * scale > MOST_ROWS * len(every):
+    if not 0 < scale < np.inf or np.abs(np.diff(ends[..., 1])).sum() * scale > MAX_ROWS_PER_SIDE * len(every):
         return every
     grid = Grid(float(low[0]), float(low[1]), scale)
     marks, steps = np.zeros((2, count + 1, count + 1), dtype=np.int32)

@@ -13,7 +13,7 @@ from .triangles import double_areas
 # Of the largest: weights below count as this. Without any, the norm would not tell apart what only lies there.
 LEAST_WEIGHT = 1e-6
 # Numbers up to this, and down to its inverse, can be multiplied and summed up without a thought.
-LARGE = 1e100
+MAX_SAFE_NUMBER = 1e100
 
 
 def vertex_areas(faces: IntArray, lengths: FloatArray, vertex_count: int) -> FloatArray:
@@ -48,7 +48,9 @@ def at_unit_scale(values: FloatArray) -> FloatArray:
 
 def at_safe_scale(values: FloatArray) -> FloatArray:
     """Return values as they are where sums of their products with lengths are finite, else at unit scale."""
-    return values if 1 / LARGE < values.max(initial=1.0) < LARGE else at_unit_scale(values)
+    return (
+        values if 1 / MAX_SAFE_NUMBER < values.max(initial=1.0) < MAX_SAFE_NUMBER else at_unit_scale(values)
+    )
 
 
 def angle_defect(faces: IntArray, angles: FloatArray, is_boundary_vertex: BoolArray) -> FloatArray:

@@ -73,7 +73,7 @@ def fill_orientations(corners: FloatArray, parts: FloatArray, signs: IntArray) -
 
 
 def counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return triangles (m, 3, 2), turned over where they are clockwise, and their orientations 1, -1 and 0."""
+    """Return triangles (m, 3, 2), flipped where they are clockwise, and their orientations 1, -1 and 0."""
     signs = np.empty(len(corners), dtype=np.int64)
     fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
     return np.where((signs < 0)[:, None, None], corners[:, ::-1], corners), signs

@@ -17,7 +17,7 @@ from .layers import may_overlap, open_sides
 from .orientation import fill_orientations, orientation
 
 # Of the largest coordinate: what is smaller counts as 0, lest products underflow.
-TINY = 2.0**-420
+MIN_COORDINATE = 2.0**-420
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,12 +127,12 @@ def _at_unit_size(corners: FloatArray) -> tuple[FloatArray, int]:
     else:
         factor = 2.0**-exponent
     scaled = np.empty(corners.shape)
-    scale_numbers(np.ascontiguousarray(corners).reshape(-1), factor, TINY, scaled.reshape(-1))
+    scale_numbers(np.ascontiguousarray(corners).reshape(-1), factor, MIN_COORDINATE, scaled.reshape(-1))
     return scaled, exponent
 
 
 def _counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return the triangles, turned over where they are clockwise, and their orientations 1, -1 and 0."""
+    """Return the triangles, flipped where they are clockwise, and their orientations 1, -1 and 0."""
     signs = np.empty(len(corners), dtype=np.int64)
     fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
     clockwise = np.flatnonzero(signs < 0)
@@ -176,9 +176,9 @@ def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tup
 
 
 # By how much coordinates of up to 1 may be off once they are turned.
-ROUNDED = 2.0**-48
+COORDINATE_ROUNDING = 2.0**-48
 # Boxes are turned if that leaves less than this part of their areas.
-SNUG = 0.5
+MAX_BOX_SHARE = 0.5
 
 
 def snug_boxes(corners: FloatArray) -> FloatArray:
@@ -191,8 +191,8 @@ def snug_boxes(corners: FloatArray) -> FloatArray:
     flat = np.ascontiguousarray(corners).reshape(-1, 6)
     area, x, y = fill_boxes(flat, 1.0, 0.0, 0.0, straight)
     turn = -math.atan2(y, x) / 2
-    turned_area, _, _ = fill_boxes(flat, math.cos(turn), math.sin(turn), ROUNDED, askew)
-    return askew if turned_area < SNUG * area else straight
+    turned_area, _, _ = fill_boxes(flat, math.cos(turn), math.sin(turn), COORDINATE_ROUNDING, askew)
+    return askew if turned_area < MAX_BOX_SHARE * area else straight
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Points and triangles of the plane, which may be upside down: column i of sides is the side opposite corner i."""
+"""Points and triangles of the plane, which may be flipped: column i of sides is the side opposite corner i."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ..base.compiled import compiled
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
 
-# Height over longest side below which a triangle counts as flat, neither upright nor upside down: coordinates are
-# good to about 1e-12 of an edge.
+# Height over longest side below which a triangle counts as flat, neither positively oriented nor flipped:
+# coordinates are good to about 1e-12 of an edge.
 FLAT_HEIGHT = 1e-10
 # Areas below so much of the mean are taken as so much, where a logarithm is wanted.
 LEAST_AREA = 1e-12
@@ -44,7 +44,7 @@ def bounds(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def signed_angles(sides: ComplexArray) -> FloatArray:
-    """Return (m, 3) the corner angles, radians, of triangles with sides (m, 3); negative where they are upside down."""
+    """Return (m, 3) the corner angles, radians, of triangles with sides (m, 3); negative where they are flipped."""
     angles = np.empty(sides.shape)
     for i in range(3):  # column by column: NumPy is slow at picking columns
         angles[:, i] = np.angle(-sides[:, NEXT[i]] * np.conj(sides[:, PREVIOUS[i]]))
@@ -52,7 +52,7 @@ def signed_angles(sides: ComplexArray) -> FloatArray:
 
 
 def heights(sides: ComplexArray) -> FloatArray:
-    """Return (m,) height over longest side of triangles with sides (m, 3); negative for those upside down."""
+    """Return (m,) height over longest side of triangles with sides (m, 3); negative for flipped ones."""
     doubled = (np.conj(sides[:, 0]) * sides[:, 1]).imag
     squares = sides.real**2 + sides.imag**2
     longest = np.maximum(np.maximum(squares[:, 0], squares[:, 1]), squares[:, 2])
@@ -87,7 +87,7 @@ def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
 def laid_out_curvature(mesh: TriangleMesh, corners: FloatArray, at: BoolArray | None = None) -> FloatArray:
     """Return (n,) the curvature of triangles with given corners (m, 3, 2): a full or half turn less their angles.
 
-    Those of triangles that are upside down count as negative. Where triangles wind around a vertex twice, the
+    Those of triangles that are flipped count as negative. Where triangles wind around a vertex twice, the
     curvature is a full turn less than it seems.
 
     at: (n,) the vertices of interest, as it takes less time at few; None for all. Elsewhere it is undefined.

@@ -32,7 +32,7 @@ class FlatTriangles:
 
     @cached_property
     def is_inverted(self) -> BoolArray:
-        """(m,) True for triangles that are turned over or have no area."""
+        """(m,) True for triangles that are flipped or have no area."""
         sides = self.sides.reshape(-1, 3)
         inverted: BoolArray = (np.conj(sides[:, 0]) * sides[:, 1]).imag <= 0
         return inverted

@@ -21,7 +21,7 @@ from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, corner_fans
 # real scans have 1e-3.
 ZERO_AREA = 1e-7
 # What the triangle inequality is given to spare, in mean side lengths: enough for angles good to 1e-11.
-SLACK = 1e-5
+MIN_SLACK = 1e-5
 #: Cosine of the angle, about 53 degrees, by which faces bend at an edge that is drawn sharp: between the 42 degrees
 #: of an icosahedron, which stands for a ball, and the 60 of a hexagonal prism, which is meant to have edges.
 CREASE_COSINE = 0.6
@@ -141,7 +141,7 @@ def mollify(
             "leave out --strict (strict=False) to open them by a tiny perturbation"
         )
     mean = float(lengths.mean())
-    growth = SLACK * mean - min(float(slacks(lengths[bad]).min()), 0.0)
+    growth = MIN_SLACK * mean - min(float(slacks(lengths[bad]).min()), 0.0)
     note = (
         f"Opened {plural(len(bad), 'triangle')} without area ({where}) by lengthening every edge "
         f"by {growth / mean:.1e} of the mean edge."
@@ -187,7 +187,7 @@ def fill_double_areas(lengths: FloatArray, areas: FloatArray) -> None:
         product = 1.0
         for i in range(3):
             slack = slack_beside(lengths, t, i)
-            product *= 0.0 if slack < 0.0 else slack  # what is no number stays so
+            product *= 0.0 if slack < 0.0 else slack  # what is not a number stays so
         areas[t] = math.sqrt((lengths[t, 0] + lengths[t, 1] + lengths[t, 2]) * product) / 2
 
 

@@ -27,7 +27,7 @@ def visible_share(vertices: FloatArray, faces: IntArray, up: FloatArray | None =
         up: (3,) where up is, if the model is mostly seen standing: what is seen from straight below counts nothing.
 
     Raises:
-        OptionError: `up` is no direction.
+        OptionError: `up` is not a direction.
     """
     axes = own_axes(vertices)
     if up is not None:

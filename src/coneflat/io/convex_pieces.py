@@ -16,7 +16,7 @@ from ..mesh.polygons import Polygons, fan_corners
 
 # Height over longest side of the triangle at a corner from which on the corner is convex: above rounding, with which
 # areas are off by some 1e-16.
-CONVEX = 1e-12
+CONVEX_HEIGHT = 1e-12
 
 Node: TypeAlias = tuple[int, int]
 Loop: TypeAlias = list[Node]
@@ -60,8 +60,8 @@ def find_pieces(uv: FloatArray, uv_faces: IntArray, offsets: IntArray, face_corn
     triples, at = polygons.corner_triples(points)
     whole = polygons.are_whole(points)
     height = heights(sides_between(uv[triples]))
-    # What is upside down as a whole is so in fans, too, and no better in pieces.
-    split = np.intersect1d(at[~(height > CONVEX)], at[~(height < -CONVEX)])
+    # What is flipped as a whole is so in fans, too, and no better in pieces.
+    split = np.intersect1d(at[~(height > CONVEX_HEIGHT)], at[~(height < -CONVEX_HEIGHT)])
     whole[split] = False
     if whole.all():
         return Pieces(loops, points[loops], sizes, np.arange(len(sizes)), split)
@@ -127,4 +127,4 @@ def _sides(loop: Loop) -> list[tuple[Node, Node]]:
 def _is_convex(uv: FloatArray, loop: Loop) -> bool:
     points = np.array([point for _, point in loop])
     triples = np.stack([np.roll(points, 1), points, np.roll(points, -1)], axis=1)
-    return bool((heights(sides_between(uv[triples])) > CONVEX).all())
+    return bool((heights(sides_between(uv[triples])) > CONVEX_HEIGHT).all())

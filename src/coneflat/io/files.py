@@ -109,7 +109,7 @@ def known_ending(path: Path, endings: Collection[str], what: str) -> str:
     """
     ending = path.suffix.lower()
     if ending not in endings:
-        wrong = f"ends with {path.suffix!r}, which is no known format" if path.suffix else "has no ending"
+        wrong = f"ends with {path.suffix!r}, which is not a known format" if path.suffix else "has no ending"
         raise UnknownFormatError(f"{path} {wrong}; {what} {', '.join(endings)}")
     return ending
 

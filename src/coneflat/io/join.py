@@ -116,7 +116,7 @@ def join_borders(mesh: MeshFile) -> Joined:
     face one vertex twice, stay open, and so do those of components that are oriented inconsistently to begin with.
     """
     faces, _ = triangulate(mesh.vertices, mesh.corners, mesh.offsets)
-    # Those with one vertex twice are no part of the surface.
+    # Those with one vertex twice are not part of the surface.
     faces = faces[(faces != faces[:, [1, 2, 0]]).all(axis=1)]
     tails, heads = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
     every = np.arange(len(mesh.vertices))

@@ -102,12 +102,14 @@ def _flattening(reading: CheckedArrays) -> Flattening:
     m = len(faces)
     uv_faces, cones = indices("uv_faces", (m, 3), u), indices("cones", (None,), n)
     if not m:
-        raise MeshFileError(f"{path} is no result of coneflat: it has no faces")
+        raise MeshFileError(f"{path} is not a result of coneflat: it has no faces")
     if not (np.isfinite(vertices).all() and np.isfinite(uv).all()):
-        raise MeshFileError(f"{path} is no result of coneflat: it has positions or UVs that are not finite")
+        raise MeshFileError(
+            f"{path} is not a result of coneflat: it has positions or UVs that are not finite"
+        )
     uv_scale = float(floats("uv_scale", ()))
     if not (np.isfinite(uv_scale) and uv_scale > 0):
-        raise MeshFileError(f"{path} is no result of coneflat: its UV scale is {uv_scale:g}")
+        raise MeshFileError(f"{path} is not a result of coneflat: its UV scale is {uv_scale:g}")
     measures: dict[str, Any] = {name: number(report.get(name)) for name in MEASURES}
     settings, rotations = report["settings"], None
     if report["rotation_deviation"] is not None:
@@ -197,7 +199,7 @@ class CheckedArrays:
     def indices(
         self, name: str, shape: tuple[int | None, ...], bound: int | None, least: int = 0
     ) -> IntArray:
-        """Return an array of whole numbers from `least` up to a bound, or to what an index can be.
+        """Return an array of integers from `least` up to a bound, or to what an index can be.
 
         Raises:
             MeshFileError: it has another shape, or numbers beyond.
@@ -213,11 +215,11 @@ class CheckedArrays:
         """Return the notes of a report.
 
         Raises:
-            ValueError: they are no list of texts.
+            ValueError: they are not a list of texts.
         """
         notes = report["notes"]
         if not isinstance(notes, list) or not all(isinstance(note, str) for note in notes):
-            raise ValueError("its report has notes that are no text")
+            raise ValueError("its report has notes that are not text")
         return tuple(notes)
 
     def report(self) -> dict[str, Any]:
@@ -270,7 +272,7 @@ def _arrays(path: Path, content: bytes, names: Iterable[str]) -> dict[str, NDArr
             left -= member.file_size
             if left < 0:
                 raise MeshFileError(
-                    f"{path} unpacks to more than {_MOST_UNPACKED} times its size: it is no result"
+                    f"{path} unpacks to more than {_MOST_UNPACKED} times its size: it is not a result"
                 )
             with archive.open(member) as stream:
                 arrays[name] = _array(stream.read())

@@ -93,7 +93,7 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
         if texture is not None:
             beyond = len(uv) + np.cumsum(kinds == _TEXTURE)[rows]
             counted = np.repeat(beyond, counts) + texture
-            # A number that counts back beyond the first is no sign that there is none, as -1 is.
+            # A number that counts back beyond the first is not a sign that there is none, as -1 is.
             texture = np.where(texture < 0, np.where(counted < 0, -2, counted), texture - 1)
         uv.add(_uv_points(block, np.flatnonzero(kinds == _TEXTURE)))
         shade = normal

@@ -60,7 +60,7 @@ def parse_off(path: Path, content: bytes) -> MeshFile:
 def _polygons(block: TextBlock, rows: IntArray) -> tuple[IntArray, IntArray]:
     """Return the sizes and the corners of the polygons in some lines."""
     sizes = block.words(rows, stop=1).integers("a number of corners")
-    # What follows the corners is a colour, which need not be of whole numbers.
+    # What follows the corners is a colour, which need not be of integers.
     words = block.words(rows, first=1, stop=1 + np.maximum(sizes, 0))
     corners = words.integers()
     short = (words.counts != sizes) | (sizes < 3)

@@ -36,8 +36,10 @@ def as_input(mesh: Any, faces: ArrayLike | None = None) -> InputMesh:
         ArrayShapeError: it is none of these, or a file with faces beside it.
     """
     if faces is not None:
-        if isinstance(mesh, (str, PathLike, MeshFile)):
-            raise ArrayShapeError("a file has faces of its own: leave out faces, or give vertices (n, 3)")
+        if isinstance(mesh, (str, PathLike)) or hasattr(mesh, "faces"):
+            raise ArrayShapeError(
+                "a mesh or file has faces of its own: leave out faces, or give vertices (n, 3)"
+            )
         return InputMesh(mesh, faces)
     if isinstance(mesh, (str, PathLike)):
         mesh = read_mesh(mesh)

@@ -105,10 +105,10 @@ def read_mesh_from(
     ending = format_of(content) if ending is None else ending.lower()
     if ending not in _READERS:
         raise UnknownFormatError(
-            f"{ending!r} is no format that meshes are read from: {', '.join(INPUT_FORMATS)}"
+            f"{ending!r} is not a format that meshes are read from: {', '.join(INPUT_FORMATS)}"
         )
     with readable(path, f"{ending[1:].upper()} file"):
-        with np.errstate(invalid="ignore"):  # coordinates that are no numbers are passed on
+        with np.errstate(invalid="ignore"):  # coordinates that are not numbers are passed on
             mesh = _READERS[ending](path, content)
         check_corners(path, mesh)
     normal = None

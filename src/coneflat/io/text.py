@@ -54,7 +54,7 @@ def text_blocks(
         content: the whole file.
         begin: where the first line begins.
         comments: a # begins a comment, to the end of the line.
-        continued: a backslash at the end of a line that is no comment joins the next to it.
+        continued: a backslash at the end of a line that is not a comment joins the next to it.
     """
     while begin < len(content):
         cut = _BLOCK_END.search(content, begin + BLOCK_BYTES)
@@ -149,7 +149,7 @@ class Words:
         """Return (r, 3) the first three numbers of each line, with those behind where all lines have as many.
 
         Raises:
-            MeshFileError: a line has fewer, or a word that is no number.
+            MeshFileError: a line has fewer, or a word that is not a number.
         """
         counts = self.counts
         if not len(counts):
@@ -172,7 +172,7 @@ class Words:
         return self._blame(_FLOAT) if numbers is None else numbers
 
     def integers(self, what: str = "a number") -> IntArray:
-        """Return all words as whole numbers.
+        """Return all words as integers.
 
         Raises:
             MeshFileError: a word is none; the message says that it is not `what`.
@@ -223,7 +223,7 @@ class Words:
 
 
 def _plain_lines(text: bytes, comments: bool, continued: bool) -> bytes:
-    """Return lines with blanks for all that is no word, at the same places; each ends with one newline."""
+    """Return lines with blanks for all that is not a word, at the same places; each ends with one newline."""
     if text.startswith(_BOM):
         text = text.replace(_BOM, b"   ", 1)
     if continued and b"\\" in text:

@@ -50,7 +50,7 @@ def cell_side(uv: FloatArray, uv_faces: IntArray, cells: float = CELLS) -> float
         cells: how many are as long as the root of the area.
 
     Raises:
-        OptionError: `cells` is no positive number.
+        OptionError: `cells` is not a positive number.
     """
     check_cells(cells)
     area = np.abs(signed_double_areas(uv[uv_faces])).sum() / 2
@@ -74,7 +74,7 @@ def find_texture(texture: PathName, result: Flattening | None = None) -> Texture
 
     Raises:
         OptionError: Pillow is not installed.
-        MeshFileError: there is no such file, or it is no image.
+        MeshFileError: there is no such file, or it is not an image.
     """
     try:
         from PIL import Image
@@ -108,7 +108,7 @@ def read_picture(path: PathName) -> Texture:
     content = read_bytes(path)
     kind = image_kind(content)
     if kind is None or kind == "image/ktx2":
-        raise MeshFileError(f"{path} is no PNG, JPEG, GIF or WebP picture")
+        raise MeshFileError(f"{path} is not a PNG, JPEG, GIF or WebP picture")
     if len(content) > MOST_BYTES:
         size = f"{len(content) / 2**20:.0f} MiB; a page takes up to {MOST_BYTES / 2**20:.0f}"
         raise MeshFileError(f"the picture {path} has {size}")

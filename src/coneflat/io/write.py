@@ -112,11 +112,11 @@ def write_stream(
     ending, folder = ending.lower(), Path() if folder is None else folder
     if ending not in OUTPUT_FORMATS:
         raise UnknownFormatError(
-            f"{ending!r} is no format that results are written as: {', '.join(OUTPUT_FORMATS)}"
+            f"{ending!r} is not a format that results are written as: {', '.join(OUTPUT_FORMATS)}"
         )
     _check_texture(f"a {ending}", ending, texture)
     image = None if texture is None else find_texture(texture, result)
-    # A .glb holds fewer digits, at which triangles are to be upright and apart, too.
+    # A .glb holds fewer digits, at which triangles are to be positively oriented and apart, too.
     stored = as_written(result, ending) if ending == ".glb" else result
     writers: dict[str, Callable[[], None]] = {
         ".obj": lambda: write_obj(stored, stream, folder),
@@ -210,7 +210,7 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
     if len(pieces.split):
         names = plural(len(pieces.split), "polygon is", "polygons are")
         notes = (
-            f"{names} written in convex pieces, as others would read triangles upside down: they are not convex in "
+            f"{names} written in convex pieces, as others would read flipped triangles: they are not convex in "
             f"the plane (the first is {pieces.split[0]}).",
         )
     fans = replace(

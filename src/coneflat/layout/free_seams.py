@@ -15,7 +15,7 @@ from ..geometry.straight import FlatTriangles
 from ..linalg.factors import SuperLUFactor
 from ..mesh.connectivity import TriangleMesh
 from ..stages import Layout
-from .patches import DEGENERATE
+from .patches import DEGENERATE_HEIGHT
 from .relax import StretchEnergy, relax
 from .relax.relax import rest_sides
 from .relax_layouts import LayoutGroup
@@ -26,7 +26,7 @@ from .untangle import MAX_RINGS, are_low, untangle
 def free_seams(
     layout: Layout, weights: FloatArray | None, names: IntArray, stretch: float, quantum: float | None
 ) -> Layout:
-    """Return a layout whose inverted triangles are turned over at the expense of the seams near them.
+    """Return a layout whose inverted triangles are flipped at the expense of the seams near them.
 
     Points move in the plane, those on the two sides of a seam independently, and are relaxed there. The lengths of the
     sides and the angles around their vertices, cones among them, are what comes out. Where triangles stay inverted, the
@@ -45,7 +45,7 @@ def free_seams(
         metric.
     """
     flat = _in_the_plane(layout.points, layout.corners)
-    if quantum is not None or not are_low(flat.sides, DEGENERATE):
+    if quantum is not None or not are_low(flat.sides, DEGENERATE_HEIGHT):
         return layout
     disk = TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
     vertex = np.empty(len(layout.points), dtype=np.int64)
@@ -72,7 +72,7 @@ def free_seams(
     but = "the sides of seams near them are unequal"
     if len(untangled.left) and not held.any() and disk.boundary_loops[0] == 1:
         embedded = embedded_disk(disk, float(np.abs(signed_double_areas(points[disk.faces])).sum()))
-        if not are_low(_in_the_plane(embedded, disk.faces).sides, DEGENERATE):
+        if not are_low(_in_the_plane(embedded, disk.faces).sides, DEGENERATE_HEIGHT):
             points, is_free, but = embedded, ~held, "no seam or cone is exact"
     if not is_free.any():
         return layout
@@ -90,7 +90,7 @@ def free_seams(
     was_free[vertex[is_free]] = True
     found = group.described(points, was_free)[0]
     before, after = (
-        heights(sides_between(each[disk.faces])) > DEGENERATE for each in (layout.points, points)
+        heights(sides_between(each[disk.faces])) > DEGENERATE_HEIGHT for each in (layout.points, points)
     )
     turned = np.flatnonzero(after & ~before)
     if not len(turned):
@@ -101,7 +101,7 @@ def free_seams(
         notes=(
             *found.notes,
             f"{plural(len(turned), 'triangle')} had no room between seams with equal sides, as at vertex "
-            f"{name}: they are upright, but {but}.",
+            f"{name}: they are positively oriented, but {but}.",
         ),
     )
 

@@ -22,7 +22,7 @@ from .untangle import untangle
 def lay_out(metric: FlatMetric, cut: Cut) -> Layout:
     """Return the layout of a flat metric on a mesh that is cut open (Section 4.3 of the paper).
 
-    Straight triangles that fit each other are unfolded, after inverted ones are turned over. Lengths that fit only
+    Straight triangles that fit each other are unfolded, after inverted ones are flipped. Lengths that fit only
     nearly are laid out by least squares. Other methods map the cut mesh themselves.
 
     Raises:

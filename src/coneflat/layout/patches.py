@@ -1,4 +1,4 @@
-"""Patches of a flat surface whose vertices move until their triangles are upright."""
+"""Patches of a flat surface whose vertices move until their triangles are positively oriented."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from ..geometry.straight import FlatTriangles
 from ..linalg import SuperLUFactor
 from ..linalg.newton import ARMIJO, HALVINGS
 from ..mesh.connectivity import label_components
-from .relax.elements import RIDGE
+from .relax.elements import RELATIVE_RIDGE
 
 # Height over longest side up to which a triangle counts as degenerate: coordinates in the plane are good to
-# about 1e-12 of an edge, and a triangle must stay upright when they are rounded.
-DEGENERATE = 1e-8
+# about 1e-12 of an edge, and a triangle must stay positively oriented when they are rounded.
+DEGENERATE_HEIGHT = 1e-8
 # A patch counts as done when every triangle has this part of the area it is asked to get.
-ENOUGH = 0.1
+TARGET_AREA_SHARE = 0.1
 # Regularisation of the determinant: its floor, and its size relative to the worst determinant of the patch
 # (Garanzha et al. 2021, Section 4).
-FLOOR, RELATIVE = 1e-3, 0.2
+MIN_REGULARISATION, RELATIVE_REGULARISATION = 1e-3, 0.2
 # A patch is given up, to be tried again with more of its surroundings, after so many rounds of so many Newton steps, or
 # where the gap to what is enough has not shrunk to this part of itself in one. Those that succeed take 4 steps at the
 # median.
-ROUNDS, STEPS, SHRUNK = 15, 4, 0.9
+MAX_ROUNDS, STEPS_PER_ROUND, MIN_SHRINKING = 15, 4, 0.9
 
 
 class Patches:
@@ -67,7 +67,7 @@ class Patches:
         self.shift = np.where(is_loose, frames * size[self.corners], 0)
         rest = rest[self.faces]
         scale = np.sqrt((np.abs(self.sides) ** 2).sum(axis=1) / (np.abs(rest) ** 2).sum(axis=1))
-        self._find_maps(rest * np.maximum(scale, scale.mean() * DEGENERATE)[:, None])
+        self._find_maps(rest * np.maximum(scale, scale.mean() * DEGENERATE_HEIGHT)[:, None])
         ends = self.corners[:, [1, 2, 0]].ravel(), self.corners[:, [2, 0, 1]].ravel()
         joined = (ends[0] >= 0) & (ends[1] >= 0)
         self.count, self.patch = label_components(len(self.vertices), ends[0][joined], ends[1][joined])
@@ -90,16 +90,16 @@ class Patches:
         stuck: `linalg.newton` has one of each.
         """
         shifts = np.zeros(len(self.vertices), dtype=np.complex128)
-        gap = ENOUGH - self.worst(shifts)
+        gap = TARGET_AREA_SHARE - self.worst(shifts)
         active = gap > 0
-        for _ in range(ROUNDS):
+        for _ in range(MAX_ROUNDS):
             if not active.any():
                 break
             equations = _Equations(self, active)
-            for _ in range(STEPS):
+            for _ in range(STEPS_PER_ROUND):
                 active &= self._step(equations, shifts, active)
-            before, gap = gap, ENOUGH - self.worst(shifts)
-            active &= gap <= SHRUNK * before
+            before, gap = gap, TARGET_AREA_SHARE - self.worst(shifts)
+            active &= gap <= MIN_SHRINKING * before
         return shifts
 
     def _step(self, e: _Equations, shifts: ComplexArray, active: BoolArray) -> BoolArray:
@@ -107,7 +107,7 @@ class Patches:
         worst = self.worst(shifts)
         a, b = self._maps_at(shifts)
         a, b = a[e.rows], b[e.rows]
-        epsilon = np.hypot(FLOOR, RELATIVE * np.minimum(worst, 0.0))[e.face_patch]
+        epsilon = np.hypot(MIN_REGULARISATION, RELATIVE_REGULARISATION * np.minimum(worst, 0.0))[e.face_patch]
         step, slope = e.newton_step(a, b, epsilon)
         slopes = np.bincount(self.patch, slope, self.count)
         a_step, b_step = self._changes(step)
@@ -124,7 +124,7 @@ class Patches:
             if gained.all():
                 break
             length[~gained] /= 2
-        gained &= active & (worst < ENOUGH)
+        gained &= active & (worst < TARGET_AREA_SHARE)
         shifts += np.where(gained, length, 0.0)[self.patch] * step
         return gained
 
@@ -185,7 +185,7 @@ class _Equations:
         add_derivatives(a, b, epsilon, self.a_of, self.b_of, self.corners, self.slots, gradient, values)
         blocks = values.reshape(-1, 2, 2)
         matrix = bsr_matrix((blocks, self.columns, self.starts), shape=(2 * k, 2 * k)).tocsc()
-        matrix.setdiag(matrix.diagonal() * (1 + RIDGE) + RIDGE * matrix.diagonal().max())
+        matrix.setdiag(matrix.diagonal() * (1 + RELATIVE_RIDGE) + RELATIVE_RIDGE * matrix.diagonal().max())
         try:
             found = SuperLUFactor(matrix).solve(-gradient)
         except MetricError:

@@ -22,17 +22,17 @@ from .relax import StretchEnergy, relax
 # Triangles with more quasi-conformal distortion than this are relaxed, with so many rings around them. Measured:
 # freeing a twentieth of the vertices of a fine mesh and three quarters of a coarse one, the mean comes within 0.0025 of
 # what it is with all free.
-BENT, RINGS = 1.35, 3
+RELAXED_QC, RELAXED_RINGS = 1.35, 3
 # Part of the energy above the least that a further Newton step must promise to gain. Most take 6 to 10 steps, those
 # with triangles that are bent a thousandfold 20 to 30.
 TOLERANCE = 1e-2
 # Part of the mean area that every triangle counts more than its own: with none, slivers are bent without end, 60 to 1
 # on a decimated face instead of 11; means rise by 0.0005.
-BESIDES = 0.1
+MEAN_AREA_SHARE = 0.1
 # Where a patch's mean or the worst triangle of all would be worse, the same is tried with this sharpness.
-SHARP = 2.0
+RETRY_SHARPNESS = 2.0
 # What is worse by less than this part is not: nothing may have moved, or what has as a whole.
-SAME = 1e-9
+RELATIVE_TOLERANCE = 1e-9
 
 
 def relax_layouts(
@@ -71,7 +71,7 @@ def _relaxed(group: LayoutGroup, spec: RelaxSpec, tell: Callable[[str], None]) -
     before = group.ratios(points)
     is_free = group.is_free
     if not spec.is_whole:
-        is_free = is_free & _around(mesh, before > BENT) & ~mesh.is_boundary_vertex
+        is_free = is_free & _around(mesh, before > RELAXED_QC) & ~mesh.is_boundary_vertex
 
     def relaxed_by(start: FloatArray, sharpness: float, is_free: BoolArray) -> FloatArray:
         if not is_free.any():
@@ -93,7 +93,9 @@ def _relaxed(group: LayoutGroup, spec: RelaxSpec, tell: Callable[[str], None]) -
     else:
         points, is_lost = group.without_losses(points, relaxed_by(points, 1.0, is_free), before, is_free)
         if is_lost.any():
-            points, _ = group.without_losses(points, relaxed_by(points, SHARP, is_lost), before, is_lost)
+            points, _ = group.without_losses(
+                points, relaxed_by(points, RETRY_SHARPNESS, is_lost), before, is_lost
+            )
     found = group.described(points, is_free)
     freed = np.bincount(group.of_vertex[is_free], minlength=len(found)).tolist()
     means, largest = group.means(before).tolist(), group.largest(before).tolist()
@@ -160,7 +162,7 @@ class LayoutGroup:
         """(m,) what triangles count for their area."""
         least = np.finfo(np.float64).tiny
         means = self._sums(self.areas) / np.diff(self._faces)
-        weights: FloatArray = 1 + BESIDES * means[self._of_face] / np.maximum(self.areas, least)
+        weights: FloatArray = 1 + MEAN_AREA_SHARE * means[self._of_face] / np.maximum(self.areas, least)
         for one, own, start in zip(self.layouts, self._given_weights, self._faces, strict=False):
             if own is not None:
                 at_vertices = np.maximum(at_unit_scale(own), LEAST_WEIGHT)
@@ -169,7 +171,7 @@ class LayoutGroup:
         return weights
 
     def ratios(self, points: FloatArray, chosen: IntArray | None = None) -> FloatArray:
-        """Return (m,) ratios of singular values, infinite for triangles that are turned over or have no area.
+        """Return (m,) ratios of singular values, infinite for triangles that are flipped or have no area.
 
         chosen: the triangles of interest, the others are infinite; None for all.
         """
@@ -179,10 +181,10 @@ class LayoutGroup:
         return ratios
 
     def means(self, ratios: FloatArray) -> FloatArray:
-        """Return the mean ratio of each component by area, over upright triangles; infinite if there are none."""
-        upright = np.isfinite(ratios)
-        areas = self._sums(self.areas, upright)
-        sums = self._sums(np.where(upright, ratios, 0.0) * self.areas)
+        """Return each component's mean ratio by area over positively oriented triangles; infinite without any."""
+        is_positive = np.isfinite(ratios)
+        areas = self._sums(self.areas, is_positive)
+        sums = self._sums(np.where(is_positive, ratios, 0.0) * self.areas)
         return np.divide(sums, areas, out=np.full(len(areas), np.inf), where=areas > 0)
 
     def largest(self, ratios: FloatArray) -> FloatArray:
@@ -209,10 +211,10 @@ class LayoutGroup:
         gain = before[touched] - after[touched]
         areas = self.areas[touched]
         gained = np.bincount(of_face, gain * areas, count)
-        least = -SAME * np.bincount(of_face, before[touched] * areas, count)
+        least = -RELATIVE_TOLERANCE * np.bincount(of_face, before[touched] * areas, count)
         worst = np.zeros(count)
         np.maximum.at(worst, of_face, after[touched])
-        is_worse = worst[patch] > (1 + SAME) * self.largest(before)[self.of_vertex]
+        is_worse = worst[patch] > (1 + RELATIVE_TOLERANCE) * self.largest(before)[self.of_vertex]
         is_lost = ((gained < least)[patch] | is_worse) & was_free
         back = np.zeros(len(moved), dtype=bool)
         back[self.corners[is_lost[faces]]] = True
@@ -260,7 +262,7 @@ def _joined(meshes: Sequence[TriangleMesh], starts: IntArray) -> TriangleMesh:
 def fill_ratios(
     lengths: FloatArray, points: FloatArray, corners: IntArray, chosen: IntArray, ratios: FloatArray
 ) -> None:
-    """Write the ratio of singular values of the maps of chosen triangles; infinite for those turned over.
+    """Write the ratio of singular values of the maps of chosen triangles; infinite for those flipped.
 
     Args:
         lengths: (m, 3) side lengths of the triangles as they should be.
@@ -290,6 +292,6 @@ def _around(mesh: TriangleMesh, is_bent: BoolArray) -> BoolArray:
     """Return (n,) True for the vertices of triangles and of the rings around them."""
     inside = np.zeros(len(mesh.vertices), dtype=bool)
     inside[mesh.faces[is_bent]] = True
-    for _ in range(RINGS):
+    for _ in range(RELAXED_RINGS):
         inside[mesh.faces[has_any(inside, mesh.faces)]] = True
     return inside

@@ -11,14 +11,14 @@ from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ..base.compiled import compiled
 from ..geometry.planar import heights, signed_angles
 from ..geometry.straight import FlatTriangles
-from .patches import DEGENERATE, Patches
+from .patches import DEGENERATE_HEIGHT, Patches
 
 # Height over longest side that triangles are asked to get at least.
 LEAST_HEIGHT = 0.1
 # Rings of triangles around the bad ones that are let loose at most: 1, 2, 4, and so on until it works.
 MAX_RINGS = 4
 # Angles around a vertex that miss theirs do so by whole turns; what rounding makes of them is far less than this.
-WINDS = 1.0
+WINDING_ERROR = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +54,8 @@ def untangle(
     tried with small neighbourhoods first; vertices on seams move only if nothing else helps, and vertices on
     the boundary, whose shape changes with them, only after that.
 
-    Triangles that are all upright may still wind around a vertex more than once, if another one, with curvature or on
-    the boundary, has that much less around it. Such patches are not accepted: rather, triangles stay inverted.
+    Triangles that are all positively oriented may still wind around a vertex more than once, if another one, with
+    curvature or on the boundary, has that much less around it. They are rejected: their triangles stay inverted.
 
     The work is bounded by the size of the mesh.
 
@@ -73,7 +73,7 @@ def untangle(
         V. Garanzha et al., "Foldover-free maps in 50 lines of code", 2021: an energy that grows without
         bound as a triangle loses its area, with a regularisation that makes it finite beyond.
     """
-    if not are_low(flat.sides, DEGENERATE):
+    if not are_low(flat.sides, DEGENERATE_HEIGHT):
         return Untangled(flat, np.empty(0, dtype=np.int64), 0.0, np.empty(0, dtype=np.int64))
     state = _Untangling(flat, faces, angles, on_boundary, _thickened(rest))
     for stay in stays:
@@ -112,7 +112,7 @@ class _Untangling:
         self.sides, self.is_own = flat.sides.reshape(-1, 3), False
         self.moves = np.zeros(len(angles))
         self.is_bad = np.empty(len(faces), dtype=bool)
-        find_low(flat.sides, DEGENERATE, self.is_bad)
+        find_low(flat.sides, DEGENERATE_HEIGHT, self.is_bad)
 
     def improve(self, rings: int, stay: BoolArray) -> None:
         """Untangle what can be with so many rings around bad triangles let loose, but for vertices that stay."""
@@ -122,9 +122,9 @@ class _Untangling:
             self._accept(patches, patches.solve())
 
     def _accept(self, patches: Patches, shifts: ComplexArray) -> None:
-        """Take over the patches that are upright now and wind around no vertex."""
+        """Take over the patches that are positively oriented now and wind around no vertex."""
         result = patches.moved(shifts)
-        is_upright = heights(result) > DEGENERATE
+        is_upright = heights(result) > DEGENERATE_HEIGHT
         failed = np.zeros(patches.count, dtype=bool)
         failed[patches.face_patch[~is_upright]] = True
         trial = np.where(failed[patches.face_patch, None], patches.sides, result)
@@ -161,7 +161,7 @@ class _Untangling:
 def winding_vertices(
     sides: ComplexArray, faces: IntArray, angles: FloatArray, is_free: BoolArray
 ) -> IntArray:
-    """Return the vertices among upright triangles around which these turn by more, or less, than the surface does.
+    """Return the vertices around which positively oriented triangles turn by more, or less, than the surface.
 
     Args:
         sides: (m, 3) of the triangles.
@@ -170,10 +170,10 @@ def winding_vertices(
         is_free: (n,) vertices of the boundary around which there may be any angle of less than a turn.
     """
     is_bad = np.zeros(len(angles), dtype=bool)
-    is_bad[faces[~(heights(sides) > DEGENERATE)]] = True
+    is_bad[faces[~(heights(sides) > DEGENERATE_HEIGHT)]] = True
     sums = np.bincount(faces.ravel(), signed_angles(sides).ravel(), len(angles))
-    winds = np.abs(sums - angles) > WINDS
-    winds[is_free] = sums[is_free] >= np.maximum(2 * np.pi, angles[is_free] + WINDS)
+    winds = np.abs(sums - angles) > WINDING_ERROR
+    winds[is_free] = sums[is_free] >= np.maximum(2 * np.pi, angles[is_free] + WINDING_ERROR)
     return np.flatnonzero(~is_bad & winds)
 
 
@@ -187,7 +187,7 @@ def _neighbourhood(faces: IntArray, seeds: IntArray, rings: int, count: int) -> 
 
 
 def _thickened(rest: ComplexArray) -> ComplexArray:
-    """Return the sides (m, 3) of upright triangles, but not too thin."""
+    """Return the sides (m, 3) of positively oriented triangles, but not too thin."""
     f = np.arange(len(rest))
     longest = np.abs(rest).argmax(axis=1)
     base = np.abs(rest[f, longest])
@@ -202,7 +202,7 @@ def _thickened(rest: ComplexArray) -> ComplexArray:
 
 @compiled
 def is_low(sides: ComplexArray, base: int, least: float) -> bool:
-    """Return whether a triangle, by its first side, is not higher than a share of its longest side, or upside down."""
+    """Return whether a triangle, by its first side, is not higher than a share of its longest side, or is flipped."""
     doubled = sides[base].real * sides[base + 1].imag - sides[base].imag * sides[base + 1].real
     longest = 0.0
     for h in range(base, base + 3):
@@ -212,7 +212,7 @@ def is_low(sides: ComplexArray, base: int, least: float) -> bool:
 
 @compiled
 def are_low(sides: ComplexArray, least: float) -> bool:
-    """Return whether any triangle with sides (3m,) is not higher than a share of its longest side, or upside down."""
+    """Return whether any triangle with sides (3m,) is not higher than a share of its longest side, or is flipped."""
     f = 0
     while f < len(sides) // 3 and not is_low(sides, 3 * f, least):
         f += 1

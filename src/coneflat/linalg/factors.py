@@ -19,9 +19,9 @@ from ..base.arrays import FloatArray
 from ..errors import MetricError
 
 # Unknowns below which loading MKL, 0.03 s in each process, takes longer than what it saves.
-LARGE = 12_000
+MIN_PARDISO_UNKNOWNS = 12_000
 # Unknowns of scattered parts below which SuperLU is faster.
-SCATTERED = 20_000
+MAX_SUPERLU_UNKNOWNS = 20_000
 
 
 class NotPositiveDefinite(ArithmeticError):
@@ -137,11 +137,11 @@ def factorize(
     size = matrix.shape[0]
     if size == 0:
         return Factor(matrix)
-    is_by_pardiso = max(size, whole) >= LARGE and has_pardiso()
+    is_by_pardiso = max(size, whole) >= MIN_PARDISO_UNKNOWNS and has_pardiso()
     try:
         if used_up is not None:
             return used_up.renewed(matrix)
-        if is_scattered and size < SCATTERED:
+        if is_scattered and size < MAX_SUPERLU_UNKNOWNS:
             return SuperLUFactor(matrix)
         return _by_pardiso(matrix) if is_by_pardiso else CholespyFactor(matrix)
     except NotPositiveDefinite:

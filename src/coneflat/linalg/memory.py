@@ -7,18 +7,18 @@ from pathlib import Path
 from ..errors import TooLargeError
 
 # Triangles from which on it is asked.
-LARGE = 1_000_000
+CHECKED_TRIANGLES = 1_000_000
 # Bytes at the peak of a flattening for each triangle: measured on five and ten million. With cones of which many are
 # tried it is more; less is refused than does not fit.
-BYTES = 1400
+BYTES_PER_TRIANGLE = 1400
 CGROUP = Path("/sys/fs/cgroup")
 
 
 def check_memory(triangles: int) -> None:
     """Raise TooLargeError if no flattening of so many triangles fits into the memory that is free."""
-    if triangles < LARGE:
+    if triangles < CHECKED_TRIANGLES:
         return
-    needed, free = triangles * BYTES, free_memory()
+    needed, free = triangles * BYTES_PER_TRIANGLE, free_memory()
     if needed > free:
         raise TooLargeError(
             f"{triangles:,} triangles take about {_size(needed)} of memory, and {_size(free)} are free"

@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from ..base.arrays import FloatArray
-from ..base.progress import go_on
+from ..base.progress import check_cancelled
 from ..errors import MetricError
 
 # A step of this share of the variables is lost in the sum.
@@ -135,7 +135,7 @@ def _search_line(
         place = here.place + length * step
         if np.array_equal(place, here.place):  # shorter than rounding
             return None
-        go_on()
+        check_cancelled()
         found = function.evaluate(place)
         is_short = float(found.residual @ step) >= 0
         if (is_short or found.largest <= least / 2) and found.is_admissible:

@@ -124,8 +124,8 @@ def measure(
     Raises:
         ArrayShapeError, NonFiniteError: the arrays do not fit the mesh, or UVs are not finite.
         FaceIndexError: faces have indices of no vertex.
-        OptionError: cones are no vertices.
-        LengthError: the lengths are no metric.
+        OptionError: cones are not vertices.
+        LengthError: the lengths are not a metric.
 
     Examples:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
@@ -148,7 +148,7 @@ def measure(
 def _check_arrays(
     mesh: TriangleMesh, corner_uv: FloatArray, cones: IntArray | None, prescribed: FloatArray | None
 ) -> None:
-    """Refuse what is no mesh with UVs; compiled loops would read beyond the ends of arrays."""
+    """Refuse what is not a mesh with UVs; compiled loops would read beyond the ends of arrays."""
     if not isinstance(mesh, TriangleMesh):
         raise ArrayShapeError(
             f"mesh must be a TriangleMesh, check_mesh(vertices, faces).mesh say, not {shown(mesh)}"
@@ -158,7 +158,7 @@ def _check_arrays(
         raise NonFiniteError("corner_uv has points that are NaN or infinite")
     bad = [] if cones is None else [v for v in np.asarray(cones).tolist() if not 0 <= v < len(mesh.vertices)]
     if bad:
-        raise OptionError(f"cones are no vertices of the mesh: {list_some(bad)}")
+        raise OptionError(f"cones are not vertices of the mesh: {list_some(bad)}")
     for name, found, wanted in (
         ("corner_uv", np.shape(corner_uv), (*np.shape(mesh.faces), 2)),
         (
@@ -395,7 +395,7 @@ def sum_angles(faces: IntArray, corner_uv: FloatArray, count: int) -> tuple[Floa
             v[i] = corner_uv[f, (i + 1) % 3, 1] - corner_uv[f, i, 1]
             length[i] = math.hypot(u[i], v[i])
             if length[i] > 0.0:
-                # Of length one, lest products of tiny or huge ones are no numbers.
+                # Of length one, lest products of tiny or huge ones are not numbers.
                 u[i], v[i] = u[i] / length[i], v[i] / length[i]
         for i in range(3):
             before = (i + 2) % 3

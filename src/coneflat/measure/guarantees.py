@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 # Of a double, and of the 32-bit numbers of GLB files, relative to 1.
 DOUBLE, SINGLE = 2.0**-53, 2.0**-24
 # Points are off by so many roundings: of the coordinates, and of what turned, moved and scaled them.
-ROUNDINGS = 8
+MAX_ROUNDINGS = 8
 # Radians, or parts of a length, that a layout may be off by beside rounding. Metrics are solved to about 1e-11.
-EXACT = 1e-6
+EXACT_TOLERANCE = 1e-6
 # Radians for methods that have no exact angles: a vertex that triangles go around twice is off by 2 pi.
-WINDING = 1.0
+WINDING_TOLERANCE = 1.0
 # Mean of QC, and what a twentieth of the area is above, from which on a layout is unfit for most uses, though every
-# triangle is upright. Single triangles are worse on many models.
+# triangle is positively oriented. Single triangles are worse on many models.
 EXTREME_QC, EXTREME_TAIL = 1.25, 2.0
-# By how much a round boundary may turn otherwise than a circle at a vertex: it is found in rounds, to a thousandth of
-# a radian, and as a part of what the circle turns by, so that it looks round.
+# How far the turn of a round boundary at a vertex may be off a circle's: radians, as it is found iteratively to a
+# thousandth, plus a share of the circle's turn, which no eye sees.
 NOT_ROUND, NOT_ROUND_SHARE = 1e-3, 0.02
 # Relative difference of the sides of marked seams that methods without a flat metric are let go.
-ROUGH = 0.01
+ROUGH_TOLERANCE = 0.01
 
 
 def broken_promises(result: Flattening, unit: float = DOUBLE) -> tuple[str, ...]:
@@ -45,7 +45,7 @@ def broken_promises(result: Flattening, unit: float = DOUBLE) -> tuple[str, ...]
         unit: rounding of the coordinates, relative to 1.
     """
     return (
-        *_upright(result),
+        *_orientation(result),
         *_apart(result),
         *_angle_sums(result, unit),
         *_equal_sides(result, unit),
@@ -74,7 +74,7 @@ def remeasured(
     """
     told = broken_promises(result)
     old = result.distortion
-    # By a power of two, lest squares of tiny or huge lengths are no numbers.
+    # By a power of two, lest squares of tiny or huge lengths are not numbers.
     exponent = -unit_exponent(changed.vertices[changed.faces])
     distortion = measure(
         TriangleMesh(np.ldexp(changed.vertices, exponent), changed.faces),
@@ -110,13 +110,10 @@ def _is_exact(result: Flattening) -> bool:
     return result.settings.get("method") == "exact"
 
 
-def _upright(result: Flattening) -> Iterator[str]:
+def _orientation(result: Flattening) -> Iterator[str]:
     measures = result.distortion
-    parts = [
-        plural(count, f"triangle {what}", f"triangles {what}")
-        for count, what in ((measures.flipped, "upside down"), (measures.degenerate, "without area"))
-        if count
-    ]
+    kinds = ((measures.flipped, "flipped triangle"), (measures.degenerate, "degenerate triangle"))
+    parts = [plural(count, what) for count, what in kinds if count]
     if parts:
         advice = "refine the mesh there" if _is_exact(result) else "method exact has fewest"
         verb, broken = "is" if parts[0].startswith("1 ") else "are", result.solve.broken
@@ -134,13 +131,13 @@ def _apart(result: Flattening) -> Iterator[str]:
 
 def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
     largest = result.distortion.angle_sum_error
-    most = EXACT if _is_exact(result) else WINDING
+    most = EXACT_TOLERANCE if _is_exact(result) else WINDING_TOLERANCE
     if not largest > most:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
     errors, change = angle_sum_errors(mesh, result.corner_uv, result.prescribed)
     with np.errstate(invalid="ignore"):
-        off = np.flatnonzero(np.abs(errors) > most + ROUNDINGS * unit * change)
+        off = np.flatnonzero(np.abs(errors) > most + MAX_ROUNDINGS * unit * change)
     if len(off):
         worst = off[np.argmax(np.abs(errors[off]))]
         yield (
@@ -152,13 +149,13 @@ def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
 def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
     settings = result.settings
     marked = settings.get("seams") is not None or settings.get("sharp_angle") is not None
-    most = EXACT if _is_exact(result) else ROUGH if marked else np.inf
+    most = EXACT_TOLERANCE if _is_exact(result) else ROUGH_TOLERANCE if marked else np.inf
     if not result.distortion.seam_mismatch_max > most:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
     one, two = np.abs(sides_between(result.corner_uv)).ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]].T
     off, mean = np.abs(one - two), (one + two) / 2
-    beyond = off > most * mean + ROUNDINGS * unit
+    beyond = off > most * mean + MAX_ROUNDINGS * unit
     if beyond.any():
         worst = (off[beyond] / mean[beyond]).max()
         yield f"The two sides of seams differ in length, by up to {worst:.2g} of it."
@@ -176,7 +173,7 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
     if result.lengths is not None:
         lengths = result.lengths.ravel()[sides] * result.uv_scale
     off = np.abs(np.abs(sides_between(result.corner_uv).ravel()[sides]) - lengths)
-    beyond = off > EXACT * lengths + ROUNDINGS * unit
+    beyond = off > EXACT_TOLERANCE * lengths + MAX_ROUNDINGS * unit
     if beyond.any():
         worst = (off[beyond] / np.maximum(lengths[beyond], np.finfo(float).tiny)).max()
         yield f"Lengths along the boundary are not kept: they differ by up to {worst:.2g} of them."
@@ -205,7 +202,7 @@ def _round_boundary(result: Flattening, unit: float) -> Iterator[str]:
     even = turns * share[on_round] / np.maximum(around, np.finfo(float).tiny)
     off = (
         np.abs(-missing[on_round] - even)
-        - ROUNDINGS * unit * change[on_round]
+        - MAX_ROUNDINGS * unit * change[on_round]
         - NOT_ROUND_SHARE * np.abs(even)
     )
     worst = int(np.argmax(off))
@@ -218,7 +215,7 @@ def _round_boundary(result: Flattening, unit: float) -> Iterator[str]:
 
 def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:
     rotations = result.rotations
-    if rotations is None or not rotations.worst > EXACT:
+    if rotations is None or not rotations.worst > EXACT_TOLERANCE:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
     shorter = (
@@ -228,8 +225,8 @@ def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:
     )
     off = seam_rotations(mesh, result.corner_uv, rotations.quantum)
     off = np.where(rotations.binds(off), off, 0.0)
-    if (off * shorter > EXACT * shorter + ROUNDINGS * unit).any():
-        along = np.abs(rotations.handles).max(initial=0.0) > EXACT
+    if (off * shorter > EXACT_TOLERANCE * shorter + MAX_ROUNDINGS * unit).any():
+        along = np.abs(rotations.handles).max(initial=0.0) > EXACT_TOLERANCE
         advice = ", as loops along handles do: correct them (correct_handles=True)" if along else ""
         yield f"Seams turn by up to {rotations.worst:.2g} rad beside multiples of {rotations.quantum:.4g} rad{advice}."
 

@@ -118,7 +118,7 @@ def as_rows(result: Flattening) -> list[Row]:
     untangled = ""
     if solve.untangled_vertices:
         untangled = (
-            f"triangles upside down; {plural(solve.untangled_triangles, 'was', 'were')}, until "
+            f"flipped triangles; {plural(solve.untangled_triangles, 'was', 'were')}, until "
             f"{plural(solve.untangled_vertices, 'vertex', 'vertices')} moved by at most "
             f"{solve.untangled_move:.2g} edges"
         )

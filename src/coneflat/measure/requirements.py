@@ -80,7 +80,7 @@ def parse_requirements(texts: Iterable[str], known: Iterable[str]) -> tuple[Requ
     for part in (part for text in texts for part in text.split(",")):
         match = _FORM.fullmatch(part)
         if match is None:
-            raise OptionError(f"{part.strip()!r} is no requirement; write flipped=0 or qc_mean<=1.05")
+            raise OptionError(f"{part.strip()!r} is not a requirement; write flipped=0 or qc_mean<=1.05")
         name, relation = match["name"], "=" if match["relation"] == "==" else match["relation"]
         if name not in known:
             raise OptionError(f"there is no measure {name!r}: choose from {', '.join(sorted(known))}")

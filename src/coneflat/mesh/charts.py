@@ -13,7 +13,7 @@ from ..base.sets import number_sets, unite
 from .connectivity import TriangleMesh, end_corners
 
 # UV distance over UV edge length at which two sides of an edge count as one.
-JOINED = 1e-6
+JOIN_TOLERANCE = 1e-6
 
 Values = TypeVar("Values", FloatArray, IntArray)
 
@@ -54,7 +54,7 @@ def uv_seams(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
 def joined_edges(mesh: TriangleMesh, corner_uv: FloatArray) -> BoolArray:
     """Return (e,) True for inner edges whose two sides lie on each other in the plane; `corner_uv` is (m, 3, 2)."""
     uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
-    joined: BoolArray = find_joined(mesh.edge_halfedges, uv, JOINED)
+    joined: BoolArray = find_joined(mesh.edge_halfedges, uv, JOIN_TOLERANCE)
     return joined
 
 

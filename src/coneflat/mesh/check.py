@@ -69,7 +69,7 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -
             left as it is.
 
     Raises:
-        EmptyMeshError, ArrayShapeError, NonFiniteError, FaceIndexError: the arrays are no mesh.
+        EmptyMeshError, ArrayShapeError, NonFiniteError, FaceIndexError: the arrays are not a mesh.
         DegenerateFaceError: a face uses a vertex twice.
         NonManifoldError: an edge has more than two faces, or a vertex more than one fan.
         NonOrientableError: the faces cannot be oriented consistently.

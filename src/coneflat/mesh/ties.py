@@ -11,7 +11,7 @@ from .connectivity import TriangleMesh
 
 # Relative to the range of the values: far above what rounding makes of equal ones, far below what tells others
 # apart.
-EQUAL = 1e-9
+EQUAL_TOLERANCE = 1e-9
 
 
 def _own_vectors(centred: FloatArray) -> tuple[FloatArray | None, FloatArray | None]:
@@ -68,7 +68,7 @@ def tie_key(vertices: FloatArray) -> FloatArray:
     # On symmetric shapes many vertices are alike. Which of them come first does not matter, but from there on the
     # others must follow alike: small parts of the distances from the first vertex by it, the second, the third.
     for weight in (0.05, 0.02, 0.01):
-        away = centred - centred[np.argmax(key >= key.max() - EQUAL)]
+        away = centred - centred[np.argmax(key >= key.max() - EQUAL_TOLERANCE)]
         key += weight * np.sqrt(dots(away, away))
     return key
 
@@ -85,5 +85,5 @@ def mesh_tie_key(mesh: TriangleMesh) -> FloatArray:
 def argmax_tied(values: FloatArray, key: FloatArray) -> int:
     """Return where a value is largest; among those that are equal but for rounding, where the key is."""
     top = values.max()
-    tied = np.flatnonzero(values >= top - EQUAL * max(top - values.min(), np.finfo(float).tiny))
+    tied = np.flatnonzero(values >= top - EQUAL_TOLERANCE * max(top - values.min(), np.finfo(float).tiny))
     return int(tied[np.argmax(key[tied])])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
-from ..base.defaults import TYPED
+from ..base.defaults import TYPED_TOLERANCE
 from ..errors import CurvatureError
 from ..mesh.connectivity import TriangleMesh
 
@@ -100,7 +100,7 @@ def prescribed_boundary(
     if len(corners):
         values[corners] = np.where(np.isnan(curvatures), needed / len(corners), curvatures)
         found = float(values.sum())
-        if abs(found - needed) > TYPED:
+        if abs(found - needed) > TYPED_TOLERANCE:
             raise CurvatureError(
                 f"the corners' curvatures must sum to {needed / np.pi:.6g} pi, but sum to {found / np.pi:.6g} pi"
             )

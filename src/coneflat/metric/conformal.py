@@ -18,15 +18,15 @@ from ..linalg.newton import HALVINGS, Limits, Point, minimise
 from .hessian import HeldInverse, HessianPattern, Inverse, conjugate_gradients, corrected
 
 # Residual, radians, below which nothing is left to gain: the rounding of a sum of a few angles.
-GOAL = 1e-13
+GOAL_RESIDUAL = 1e-13
 # Largest change of phi in one step. Beyond e^5 in length the quadratic model says nothing any more.
 LARGEST_STEP = 5.0
 # A step is solved for to the accuracy of the residual, but to this at least: more is lost to the next.
-COARSEST = 0.05
+MAX_RELATIVE_RESIDUAL = 0.05
 # Below so many vertices a factorization takes less time than the calls that conjugate gradients are made of.
-SMALL = 200
+MAX_DIRECT_VERTICES = 200
 # Log scales that differ by less than this have nearly the same Hessian.
-NEARLY = 0.05
+MAX_REUSE_CHANGE = 0.05
 # Halvings of a step at most where the surface can be doubled instead of creeping along triangles that are about to
 # break.
 HALVINGS_BOUNDED = 6
@@ -158,8 +158,8 @@ class ConformalProblem:
             self.preconditioner = None
         if self._pattern is None:
             self._pattern = HessianPattern(self.triangulation)
-        if self.preconditioner is not None and len(here.place) >= SMALL:
-            accuracy = min(max(state.largest, GOAL / state.largest / 4), COARSEST)
+        if self.preconditioner is not None and len(here.place) >= MAX_DIRECT_VERTICES:
+            accuracy = min(max(state.largest, GOAL_RESIDUAL / state.largest / 4), MAX_RELATIVE_RESIDUAL)
             hessian = self._pattern.matrix(state.cots, self.fixed)
             inverse = self._corrected(self.preconditioner, hessian, state.place)
             step = conjugate_gradients(hessian, state.residual, inverse, accuracy)
@@ -174,7 +174,7 @@ class ConformalProblem:
     def _corrected(self, inverse: Inverse, hessian: csc_matrix, log_scale: FloatArray) -> Inverse:
         """Return an inverse corrected for the Hessian, or for one that was nearly the same."""
         known = self._known
-        if known is None or known[0] is not inverse or np.ptp(log_scale - known[1]) > NEARLY:
+        if known is None or known[0] is not inverse or np.ptp(log_scale - known[1]) > MAX_REUSE_CHANGE:
             known = self._known = inverse, log_scale, corrected(inverse, hessian, self.fixed)
         return known[2]
 
@@ -194,7 +194,7 @@ def find_scale(
         start = problem.evaluate(np.where(problem.fixed, log_scale, 0.0))
     halvings = HALVINGS_BOUNDED if problem.is_bounded else HALVINGS
     best, steps = minimise(
-        problem, start, Limits(tolerance, max_steps, GOAL, halvings, largest_step=LARGEST_STEP)
+        problem, start, Limits(tolerance, max_steps, GOAL_RESIDUAL, halvings, largest_step=LARGEST_STEP)
     )
     return best if best is problem.last else problem.evaluate(best.place), steps
 

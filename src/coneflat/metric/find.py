@@ -26,16 +26,16 @@ from .linear import linear_flat_metric
 from .solve import ExactChoices, exact_flat_metric
 
 # Steps at most, and radians at which to stop; it takes six or so if the cones are well placed.
-STEPS, TOLERANCE = 60, 1e-11
+MAX_STEPS, TOLERANCE = 60, 1e-11
 # Largest change of the log of a length in one step: from there on, what is least is found anew.
 LARGEST_CHANGE = 0.2
 # A step of less than this part of the whole is too little: triangles are as flat as can be.
 LEAST_PART = 1e-3
 # What scaling counts in the norm of a strain, relative to shear: next to nothing, for it can be undone conformally.
-SCALING = 1e-3
+SCALING_WEIGHT = 1e-3
 # Shear at cones turns loops best, for it amounts to moving the cones; but little room has to bear much of it then.
 # In so many rings around them shear counts more by the factor by which scaling counts less.
-RINGS = 3
+CONE_RINGS = 3
 
 
 def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> FlatMetric:
@@ -124,7 +124,7 @@ def corrected_flat_metric(
     first = float(np.abs(off).max())
     fixed = choices.is_open(mesh)
     changes = None
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         if np.abs(off).max() <= TOLERANCE:
             change = float(np.abs(np.log(lengths / given)).max())
             note = (
@@ -208,10 +208,14 @@ def shear_norm(mesh: TriangleMesh, lengths: FloatArray, cones: IntArray) -> csc_
     parts = np.linalg.inv(harmonics)  # (m, 3, 3): from the changes of the sides to m, a, b
     near = np.zeros(len(mesh.vertices), dtype=bool)
     near[cones] = True
-    for _ in range(RINGS - 1):
+    for _ in range(CONE_RINGS - 1):
         near[mesh.edges[near[mesh.edges].any(axis=1)]] = True
     is_spared = near[mesh.faces].any(axis=1)
-    norms = (double_areas(lengths) * np.where(is_spared, 1 / SCALING, 1.0))[:, None] * [SCALING, 1.0, 1.0]
+    norms = (double_areas(lengths) * np.where(is_spared, 1 / SCALING_WEIGHT, 1.0))[:, None] * [
+        SCALING_WEIGHT,
+        1.0,
+        1.0,
+    ]
     blocks = np.einsum("fki,fk,fkj->fij", parts, norms, parts)
     edges = mesh.halfedge_edges.reshape(-1, 3)
     rows, columns = np.repeat(edges, 3, axis=1), np.tile(edges, (1, 3))

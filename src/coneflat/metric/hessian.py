@@ -21,7 +21,7 @@ from ..mesh.connectivity import sort_few
 # at most: those around cones and in coarse triangles. Conjugate gradients then take a quarter to a sixth of the
 # iterations, and the factorization of these rows takes a twentieth of that of all: 17% of the time of a flattening of
 # 97,000 triangles, 2 to 9% on other models.
-CHANGED, MOST = 0.03, 0.1
+CHANGED_SHARE, MAX_CORRECTED_SHARE = 0.03, 0.1
 
 
 class HessianPattern:
@@ -296,7 +296,7 @@ def corrected(inverse: Inverse, matrix: csc_matrix, held: BoolArray) -> Inverse:
 
     one, other = matrix, inverse.laplacian
     share = changed_share(one.indptr, one.indices, one.data, other.indptr, other.indices, other.data, held)
-    chosen = np.flatnonzero(share > max(CHANGED, float(np.quantile(share, 1 - MOST))))
+    chosen = np.flatnonzero(share > max(CHANGED_SHARE, float(np.quantile(share, 1 - MAX_CORRECTED_SHARE))))
     if not len(chosen):
         return inverse
     columns = matrix[:, chosen]

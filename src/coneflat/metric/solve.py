@@ -25,7 +25,7 @@ ROUNDS, ROUND_CHANGE = 40, 1e-3
 HOLE_STEP = 0.5
 # Relative errors of lengths that rounding cannot make.
 LENGTH_TOLERANCE = 1e-9
-# Curvature, radians, at a vertex of a round boundary that is no part of a circle any more but a corner too sharp to be
+# Curvature, radians, at a vertex of a round boundary that is not part of a circle any more but a corner too sharp to be
 # one: the sides beside it are nearly all of the boundary. Then the round before has to do.
 TOO_SHARP = 0.99 * np.pi
 

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..base.defaults import LEAST_QUANTUM, TYPED
+from ..base.defaults import LEAST_QUANTUM, TYPED_TOLERANCE
 from ..errors import OptionError
 from .declared import WIDEST_CONE, AtlasOptions, ConeOptions, MetricOptions, RunOptions, SeamOptions
 
 # What asks for the sparse search for cones, and it alone.
-ASKING = ("cone_count", "positive_only", "weights", "required_cones", "forbidden_cones", "quantise")
+SEARCH_OPTIONS = ("cone_count", "positive_only", "weights", "required_cones", "forbidden_cones", "quantise")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,14 +49,14 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
         if not self.searches_cones:
             # Cones without curvatures have the least area distortion by weight.
             is_fitted = any(k is None for k in self.named_cones.values())
-            for name in ASKING:
+            for name in SEARCH_OPTIONS:
                 if self._is_set(name) and not (name == "weights" and is_fitted):
                     yield f"{name} is an option of cones 'sparse', not of cones {self.cone_choice!r}"
             if self.boundary_kind == "straight":
                 yield "a straight boundary gets its corners from the search: use cones 'sparse'"
         if quantum is None and self.correct_handles:
             yield "rotations along handles are made whole for quantised cones only: give quantise, pi/2 say"
-        if quantum is not None and not LEAST_QUANTUM <= quantum <= 2 * math.pi * (1 + TYPED):
+        if quantum is not None and not LEAST_QUANTUM <= quantum <= 2 * math.pi * (1 + TYPED_TOLERANCE):
             yield (
                 f"quantise must be from {LEAST_QUANTUM:g} radians, below which it restricts nothing, to 2 pi, not "
                 f"{quantum:g}"
@@ -77,7 +77,7 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
     @cached_property
     def asks_for_search(self) -> bool:
         """Whether something is said that only the sparse search heeds."""
-        return any(self._is_set(name) for name in ASKING)
+        return any(self._is_set(name) for name in SEARCH_OPTIONS)
 
     @property
     def cone_choice(self) -> str:

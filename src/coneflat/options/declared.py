@@ -228,7 +228,7 @@ class SeamOptions:
 
     Attributes:
         seams: Edges that are cut in any case, pairs of vertices, or input: the seams of the file's own UVs, or both, as
-            ("input", pairs). They act like a boundary. An edge that no other meets is no cut.
+            ("input", pairs). They act like a boundary. An edge that no other meets is not a cut.
         no_seams: Edges, pairs of vertices, that the first cut must not use, not for sharp edges or seams of the file
             either; or vertices: then the edges between two of them. No search puts a cone where no seam could reach.
             What is cut later so that nothing overlaps avoids these edges where it can.
@@ -237,7 +237,7 @@ class SeamOptions:
             60.
         hide_seams: How much seams prefer what can hardly be seen, in deep folds and, with a direction up, below: at 1,
             it costs a tenth of its length.
-        seam_weights: By how much seams are dearer at each vertex: numbers, or the name of a property in the file.
+        seam_weights: By how much seams are costlier at each vertex: numbers, or the name of a property in the file.
     """
 
     seams: ArrayLike | str | tuple[str, ArrayLike] | None = option(None, Edges(("input",)), one_mesh=True)
@@ -277,12 +277,12 @@ class InputOptions:
         repair: Drop, split and cut what makes the input no manifold, with a note, instead of refusing it. Commands do
             so unless told otherwise.
         strict: Refuse triangles without area, which otherwise are opened by a tiny change of lengths; for commands,
-            what is no manifold, too.
+            what is not manifold, too.
         progress: Called with what is being done and the fraction of the whole that is done.
     """
 
     lengths: ArrayLike | None = option(None, Kind(), flag=False, one_mesh=True)
-    # A file's user can seldom mend it; whoever has arrays wants to know that they are no mesh.
+    # A file's user can seldom mend it; whoever has arrays wants to know that they are not a mesh.
     repair: bool = option(False, Flag(), command_default=True)
     strict: bool = option(False, Flag())
     progress: Progress | None = option(None, Kind(), flag=False)

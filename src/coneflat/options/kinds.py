@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 from ..base.text import shown
@@ -61,7 +62,7 @@ class Number(Kind):
 
     Attributes:
         least, most: bounds that it may reach.
-        is_whole: it is a whole number.
+        is_whole: it is an integer.
         is_positive: it is finite and above 0.
         is_angle, is_strength: it is one.
         optional: None stands for no number.
@@ -88,7 +89,7 @@ class Number(Kind):
     @property
     def text(self) -> str:
         """What numbers there are."""
-        noun = "a whole number" if self.is_whole else "a number"
+        noun = "an integer" if self.is_whole else "a number"
         if self.is_positive:
             return f"{noun} above 0"
         if self.least == -math.inf:
@@ -107,7 +108,7 @@ def strength(most: float) -> Number:
 
 
 def whole(most: float = math.inf) -> Number:
-    """Return a whole number from 1 to a largest one."""
+    """Return an integer from 1 to a largest one."""
     return Number(1, most, is_whole=True)
 
 
@@ -222,12 +223,12 @@ def as_number(name: str, value: object) -> float:
 
 
 def as_whole(name: str, value: object) -> int:
-    """Return a whole number, or raise OptionError."""
+    """Return an integer, or raise OptionError."""
     import numpy as np
 
     number = math.nan if isinstance(value, (bool, np.bool_)) else as_number(name, value)
     if not number.is_integer() or abs(number) >= 2**62:
-        raise OptionError(f"{name} must be a whole number, not {shown(value)}")
+        raise OptionError(f"{name} must be an integer, not {shown(value)}")
     return int(number)
 
 
@@ -278,7 +279,7 @@ def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dic
             twice = next(v for i, v in enumerate(listed) if v in listed[:i])
             raise OptionError(f"vertex {twice} is given as a {noun} twice")
     else:
-        is_count = noun == "cone" and type(vertices) is int
+        is_count = noun == "cone" and isinstance(vertices, Integral) and int(vertices) > 0
         advice = f": for so many cones give cone_count={shown(vertices)}" if is_count else ""
         raise OptionError(
             f"{noun}s must be vertices, or a map from vertex to curvature, not {type(vertices).__name__}{advice}"

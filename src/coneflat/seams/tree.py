@@ -19,7 +19,7 @@ from ..mesh.open_mesh import cut_open
 from ..mesh.ties import mesh_tie_key
 from ..stages import Cut, SeamSpec
 
-NOTHING = np.empty(0, dtype=np.int64)
+NO_EDGES = np.empty(0, dtype=np.int64)
 # Relative: on grids many paths are equally long, and rounding should not choose among them, lest the result
 # depend on the numbering. Far above rounding, far below what anyone would see in a seam.
 TIE_BREAK = 1e-7
@@ -31,8 +31,8 @@ def find_seams(
     edge_costs: FloatArray,
     is_avoided: BoolArray | None = None,
     *,
-    required: IntArray = NOTHING,
-    forbidden: IntArray = NOTHING,
+    required: IntArray = NO_EDGES,
+    forbidden: IntArray = NO_EDGES,
 ) -> IntArray:
     """Return the edges (k,) to cut so that a connected mesh becomes a disk with all cones on its border.
 
@@ -48,7 +48,7 @@ def find_seams(
 
     Raises:
         SeamError: every set of seams needs forbidden edges; or edges are both required and forbidden.
-        OptionError: costs are no positive numbers.
+        OptionError: costs are not positive numbers.
     """
     is_required, is_forbidden = np.zeros((2, len(mesh.edges)), dtype=bool)
     is_required[required] = True

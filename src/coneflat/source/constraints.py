@@ -33,7 +33,7 @@ class Constraints:
         required: vertices that are cones in any case of a search; their curvatures are NaN.
         is_allowed: (n,) whether a search may put a cone there.
         weights: (n,) importance of each vertex, or None.
-        seam_weights: (n,) by which seams are dearer, or None.
+        seam_weights: (n,) by which seams are costlier, or None.
         on_marks: (n,) vertices on seams that are marked, or None.
     """
 
@@ -101,7 +101,7 @@ def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh)
     for vertex in options.forbidden_cones:
         if not 0 <= vertex < input_count:
             raise OptionError(
-                f"a forbidden cone, {vertex}, is no vertex: these are numbered from 0 to {input_count - 1}"
+                f"a forbidden cone, {vertex}, is not a vertex: these are numbered from 0 to {input_count - 1}"
             )
     is_allowed = ~np.isin(names, list(options.forbidden_cones))
     for name in names[required.vertices[~is_allowed[required.vertices]]]:
@@ -124,7 +124,7 @@ def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) 
     names = np.array(list(given), dtype=np.int64)
     highest = int(checked.vertex_origin[-1])
     for name in names[(names < 0) | (names > highest)]:
-        raise OptionError(f"{noun} {name} is no vertex of a face: these are numbered from 0 to {highest}")
+        raise OptionError(f"{noun} {name} is not a vertex of a face: these are numbered from 0 to {highest}")
     found = np.searchsorted(checked.vertex_origin, names)
     for name in names[checked.vertex_origin[found] != names]:
         raise OptionError(f"{noun} {name} cannot be used: no face uses this vertex")
@@ -148,7 +148,7 @@ def _weights_of_some(noun: str, weights: Mapping[Any, Any], count: int) -> Float
     for vertex, weight in weights.items():
         at = as_whole(f"a vertex of {noun}", vertex)
         if not 0 <= at < count:
-            raise OptionError(f"{noun}: {at} is no vertex: these are numbered from 0 to {count - 1}")
+            raise OptionError(f"{noun}: {at} is not a vertex: these are numbered from 0 to {count - 1}")
         values[at] = as_number(f"{noun}: that of vertex {at}", weight)
     return values
 

@@ -16,9 +16,9 @@ from . import Part
 
 # How far the vertices of a copy, moved, turned and scaled, may be from those of the first, as a share of the largest
 # coordinates: what rounding makes of these. And by what share sides may differ: a tenth of what metrics are good to.
-ROUNDING, OF_SIDES = 2.0**-48, 1e-10
+COPY_ROUNDING, SIDE_TOLERANCE = 2.0**-48, 1e-10
 # Digits of what copies are looked for by, before they are compared.
-DIGITS = 6
+MATCHED_DIGITS = 6
 
 
 @dataclass(frozen=True)
@@ -79,13 +79,15 @@ def _kind(part: Part) -> tuple[object, ...]:
     """Return what is equal for copies, and for few others."""
     lengths = part.lengths
     size = np.sqrt((lengths * lengths).sum())
-    shape = [float(f"{value / size:.{DIGITS}g}") for value in (lengths[0, 0], lengths.sum(), lengths.max())]
+    shape = [
+        float(f"{value / size:.{MATCHED_DIGITS}g}") for value in (lengths[0, 0], lengths.sum(), lengths.max())
+    ]
     flags = part.seams.is_avoided, part.seams.is_forbidden, part.cones.is_allowed, part.metric.keeps_length
     return (part.mesh.faces.tobytes(), *(each.tobytes() for each in flags), *shape)
 
 
 def _scale_of_copy(first: Part, part: Part) -> float | None:
-    """Return how much larger a component is than one that it is a copy of; None if it is no copy.
+    """Return how much larger a component is than one that it is a copy of; None if it is not a copy.
 
     W. Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
     """
@@ -99,5 +101,5 @@ def _scale_of_copy(first: Part, part: Part) -> float | None:
     off: FloatArray = np.abs((one @ ((left * handed) @ right)) * scale - two).max(axis=1)
     reach = float(np.abs(part.mesh.vertices).max() + scale * np.abs(first.mesh.vertices).max())
     sides = np.abs(scale * first.lengths - part.lengths)
-    is_copy = off.max() <= ROUNDING * reach and (sides <= OF_SIDES * part.lengths).all()
+    is_copy = off.max() <= COPY_ROUNDING * reach and (sides <= SIDE_TOLERANCE * part.lengths).all()
     return scale if is_copy else None

@@ -78,14 +78,14 @@ def result_numbering(checked: CheckedMesh, input_count: int) -> tuple[IntArray, 
 
 
 def at_unit_size(checked: CheckedMesh) -> CheckedMesh:
-    """Return the mesh scaled by a power of two, which rounds nothing, so that squares of lengths are no extremes.
+    """Return the mesh scaled by a power of two, which rounds nothing, so that squares of lengths are not extremes.
 
     Raises:
         NonFiniteError: it is so small that UV units per unit of length are beyond numbers.
     """
     size = float(np.abs(checked.mesh.vertices).max())
     if size < SMALLEST:
-        raise NonFiniteError(f"positions of at most {size:.3g} are too small for numbers: scale the mesh")
+        raise NonFiniteError(f"positions of at most {size:.3g} are below double precision: scale the mesh")
     exponent = -unit_exponent(checked.mesh.vertices)
     mesh = checked.mesh.moved_to(np.ldexp(checked.mesh.vertices, exponent))
     return replace(checked, mesh=mesh, exponent=exponent)
@@ -109,7 +109,7 @@ def lengths_of_input(checked: CheckedMesh, lengths: ArrayLike, face_count: int) 
         face_count: f.
 
     Raises:
-        ArrayShapeError, NonFiniteError, LengthError: they are no metric, by the input's numbers of faces and vertices.
+        ArrayShapeError, NonFiniteError, LengthError: they are not a metric; by the input's numbers.
     """
     values = turn_corners(checked, as_lengths(lengths, face_count))
     names = {"face_names": checked.face_origin, "vertex_names": checked.vertex_origin}

@@ -27,7 +27,7 @@ def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh, forbi
     forbidden: (e,) edges that are not to be cut, sharp or not.
 
     Raises:
-        OptionError: a pair of vertices is no edge; the input has no UVs.
+        OptionError: a pair of vertices is not an edge; the input has no UVs.
         SeamError: a pair of vertices is forbidden.
     """
     mesh = checked.mesh
@@ -72,7 +72,7 @@ def named_edges(checked: CheckedMesh, pairs: IntArray) -> IntArray:
     """Return the edges between pairs (k, 2) of the input's vertices.
 
     Raises:
-        OptionError: a pair of vertices is no edge.
+        OptionError: a pair of vertices is not an edge.
     """
     origin = checked.vertex_origin
     bound = int(origin.max()) + 1
@@ -105,7 +105,7 @@ def forbidden_edges(checked: CheckedMesh, options: Options, count: int) -> BoolA
         return forbidden
     strange = given[(given < 0) | (given >= count)]
     if len(strange):
-        raise OptionError(f"no_seams: {strange[0]} is no vertex: these are numbered from 0 to {count - 1}")
+        raise OptionError(f"no_seams: {strange[0]} is not a vertex: these are numbered from 0 to {count - 1}")
     inside = np.zeros(count, dtype=bool)
     inside[given] = True
     ends: BoolArray = inside[checked.vertex_origin][checked.mesh.edges]

@@ -78,7 +78,7 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "--cones", "1", "--max-cones", "3"], "leave out --max-cones"),
         (["model.obj", "--paper", "--distortion", "1"], "leave out --distortion"),
         (["model.obj", "--magic"], "--magic"),
-        (["model.obj", "--hide-seams", "much"], "'much' is no strength"),
+        (["model.obj", "--hide-seams", "much"], "'much' is not a strength"),
         (["empty.obj"], "empty.obj"),
         (["text.ply"], "text.ply"),
         (["model.xyz"], ".xyz"),
@@ -86,7 +86,7 @@ def test_paper_is_the_published_method(model, tmp_path):
 )
 def test_bad_input_is_one_line_and_exit_code_2(model, tmp_path, arguments, message):
     (tmp_path / "empty.obj").write_text("")
-    (tmp_path / "text.ply").write_text("this is no mesh")
+    (tmp_path / "text.ply").write_text("this is not a mesh")
     (tmp_path / "model.xyz").write_text("0 0 0")
     before = sorted(tmp_path.iterdir())
     done = run("flatten", *arguments, cwd=tmp_path)
@@ -173,11 +173,11 @@ def test_textures(model, tmp_path):
         assert arrays["uv"].min() >= 8 / 512 - 1e-12
         assert arrays["uv"].max() <= 1 - 8 / 512 + 1e-12
     for words, message in (
-        (("--up", "north"), "no direction"),
+        (("--up", "north"), "not a direction"),
         (("--up", "0,0,0"), "not all 0"),
         (("--padding", "-1"), "padding must be"),
-        (("--tiles", "0"), "tiles must be a whole number from 1 to 1,000"),
-        (("--resolution", "0"), "resolution must be a whole number from 1"),
+        (("--tiles", "0"), "tiles must be an integer from 1 to 1,000"),
+        (("--resolution", "0"), "resolution must be an integer from 1"),
     ):
         done = run("flatten", model, "-q", *words, cwd=tmp_path)
         assert done.returncode == 2
@@ -225,4 +225,4 @@ def test_no_seams_takes_vertices_and_pairs(tmp_path):
     done = run("flatten", "ball.obj", "--no-seams", "3", "--no-seams", "pairs.txt", cwd=tmp_path)
     assert "--no-seams takes vertices or pairs of them, not both" in done.stderr
     done = run("flatten", "ball.obj", "--no-seams", "x", cwd=tmp_path)
-    assert "--no-seams: 'x' is no vertex, and there is no such file" in done.stderr
+    assert "--no-seams: 'x' is not a vertex, and there is no such file" in done.stderr

@@ -40,10 +40,10 @@ class TestForm:
     @pytest.mark.parametrize(
         ("text", "message"),
         [
-            ("flipped", "'flipped' is no requirement; write flipped=0"),
-            ("", "'' is no requirement"),
-            ("flipped=0,", "'' is no requirement"),
-            ("=3", "'=3' is no requirement"),
+            ("flipped", "'flipped' is not a requirement; write flipped=0"),
+            ("", "'' is not a requirement"),
+            ("flipped=0,", "'' is not a requirement"),
+            ("=3", "'=3' is not a requirement"),
             ("flipped=none", "'none' is not a number"),
             ("flipped=nan", "'nan' is not a number"),
             ("beauty=1", "no measure 'beauty': choose from .*area_std, .*flipped, .*overlap, "),

@@ -124,7 +124,7 @@ class TestWhatIsNone:
     @pytest.mark.parametrize(
         ("old", "new", "message"),
         [
-            ("\nf ", "\nf 1/1 2/2 3/3 4/4\nf ", "polygons that are no triangles"),
+            ("\nf ", "\nf 1/1 2/2 3/3 4/4\nf ", "polygons that are not triangles"),
             ("\nf ", "\nf 1 2 3\nf ", "triangle corners without UVs"),
             (
                 "\nf ",
@@ -142,7 +142,7 @@ class TestWhatIsNone:
 
     def test_maps_that_do_not_fit(self, known):
         places = known.corner_grid.copy()
-        with pytest.raises(GridError, match="turned over or without area"):
+        with pytest.raises(GridError, match="flipped or without area"):
             grid_of_corners(known.vertices, known.faces, places[..., ::-1])
         places[5] += 0.25
         with pytest.raises(GridError, match="miss each other by 0.[23]"):

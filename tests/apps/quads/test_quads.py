@@ -102,13 +102,13 @@ def test_what_is_no_grid_map_is_refused():
         extract_quads(broken(grid, shifts=shifts))
     corners = grid.corner_grid.copy()
     corners[5, 1] += 0.25
-    with pytest.raises(GridError, match="grid units apart|upside down"):
+    with pytest.raises(GridError, match="grid units apart|flipped"):
         extract_quads(broken(grid, corner_grid=corners))
     with pytest.raises(
         GridError, match=r"8 vertices with other angles than said: .* has 3 quarter turns, not 4"
     ):
         extract_quads(broken(grid, cones=grid.cones[:0], quarters=grid.quarters[:0]))
-    with pytest.raises(GridError, match="upside down"):
+    with pytest.raises(GridError, match="flipped"):
         extract_quads(mirrored(grid))
 
 

@@ -124,7 +124,7 @@ def test_splitting_keeps_the_surface_and_its_seams(share, boundary):
     assert len(mesh.faces) == len(before.faces) + (inner * is_split).sum()
     assert mesh.euler_characteristic == before.euler_characteristic
     assert isinstance(mesh, TriangleMesh)
-    # Lengths are those between positions, areas add up, in space and in the plane, and none is turned over.
+    # Lengths are those between positions, areas add up, in space and in the plane, and none is flipped.
     assert split.lengths == pytest.approx(edge_lengths(mesh.vertices, mesh.faces))
     assert double_areas(split.lengths).sum() == pytest.approx(double_areas(layout.lengths).sum())
     flat = [np.stack([z.points.real, z.points.imag], axis=1)[z.corners] for z in (split, layout)]

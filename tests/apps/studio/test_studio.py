@@ -67,9 +67,9 @@ class TestChoices:
         [
             (lambda c: c.added(4), StudioError, "vertex 4 is a cone already"),
             (lambda c: c.moved(4, 9), StudioError, "vertex 9 is a cone already"),
-            (lambda c: c.moved(5, 6), StudioError, "vertex 5 is no cone"),
-            (lambda c: c.removed(5), StudioError, "vertex 5 is no cone"),
-            (lambda c: c.locked(5, True), StudioError, "vertex 5 is no cone"),
+            (lambda c: c.moved(5, 6), StudioError, "vertex 5 is not a cone"),
+            (lambda c: c.removed(5), StudioError, "vertex 5 is not a cone"),
+            (lambda c: c.locked(5, True), StudioError, "vertex 5 is not a cone"),
             (lambda c: c.angled(4, -1.0), StudioError, "a positive angle of at most 720 degrees, not -57.2"),
             (lambda c: c.cut((4,)), StudioError, "a path leads from one vertex to others"),
             (lambda c: c.cut((4, 4)), StudioError, "a path leads from one vertex to others"),
@@ -136,7 +136,7 @@ class TestProject:
         [
             (lambda p: "{", "it is not JSON"),
             (lambda p: "[" * 100_000, "it is not JSON"),
-            (lambda p: "[]", "is no project of coneflat"),
+            (lambda p: "[]", "is not a project of coneflat"),
             (lambda p: {**p, "version": 2}, "a project of version 2; this coneflat reads version 1"),
             (lambda p: {**p, "mesh": None}, "missing or broken"),
             (lambda p: {**p, "choices": {}}, "missing or broken"),

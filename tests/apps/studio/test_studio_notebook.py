@@ -49,7 +49,7 @@ def test_choices_are_set_and_read(page):
     assert page.choices["options"] == {"stretch": 0.5}
     for bad, message in (
         ({"options": {"stretch": 7}}, "from 0 to 1"),
-        ({"cuts": 5}, "these are no choices"),
+        ({"cuts": 5}, "these are not choices"),
         ({"paint": {"glue": "1"}}, "nothing is painted as 'glue'"),
     ):
         with pytest.raises((StudioError, OptionError), match=message):
@@ -76,7 +76,7 @@ def test_files_and_projects(tmp_path, monkeypatch):
         coneflat.studio("nowhere.obj")
     with pytest.raises(ArrayShapeError, match="must have the shape"):
         coneflat.studio(np.zeros((3, 2)), np.array([[0, 1, 2]]))
-    with pytest.raises(ArrayShapeError, match="whole numbers"):
+    with pytest.raises(ArrayShapeError, match="integers"):
         coneflat.studio(np.zeros((3, 3)), np.zeros((1, 3)))
 
 

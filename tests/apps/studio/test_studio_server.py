@@ -133,7 +133,7 @@ class TestPage:
         page.post("/mesh?name=ball.obj", content=ball.read_bytes())
         answer = page.post("/act", json={"do": "remove", "vertex": 10**9})
         assert answer.status_code == 400
-        assert "vertex 1000000000 is no cone" in answer.text
+        assert "vertex 1000000000 is not a cone" in answer.text
         for garbled in (b"{", b"[]", b"\xff", b'{"do": NaN}'):
             assert page.post("/act", content=garbled).status_code == 400
         assert page.post("/export/exe").status_code == 400

@@ -119,7 +119,7 @@ class TestWords:
         [
             ("other cones (--distortion, --cone-count)", "other cones (“Distortion”, “Number”)"),
             ("remesh them, or run with --repair", "remesh them, or run with “Repair the mesh”"),
-            ("cone_count must be a whole number", "“Number” must be a whole number"),
+            ("cone_count must be an integer", "“Number” must be an integer"),
             ("padding must be 0 and up", "“Texels between charts” must be 0 and up"),
             ("the padding must be 0", "the padding must be 0"),
             ("the greedy search (--cones greedy)", "the greedy search (--cones greedy of coneflat flatten)"),

@@ -133,7 +133,7 @@ class TestCommand:
         [
             (("none.obj",), "none.obj: there is no such file"),
             (("ball.obj", "--kind", "magic"), "'magic' is not one of 'layout'"),
-            (("ball.obj", "-o", "x.bmp"), "'.bmp', which is no known format; figures are written as"),
+            (("ball.obj", "-o", "x.bmp"), "'.bmp', which is not a known format; figures are written as"),
             (("ball.obj", "-o", "none/x.png"), "there is no folder"),
             (("ball.obj", "--eye", "front"), "--kind layout takes no --eye: only checker"),
             (("ball.obj", "--kind", "curve", "--color-charts"), "takes no --color-charts"),
@@ -142,7 +142,7 @@ class TestCommand:
                 "only layout, checker, quality, color, cones, curvature do",
             ),
             (("ball.obj", "--kind", "cones", "--eye", "1,2"), "three numbers"),
-            (("ball.obj", "--kind", "cones", "--eye", "1,x,2"), "'1,x,2' is no direction"),
+            (("ball.obj", "--kind", "cones", "--eye", "1,x,2"), "'1,x,2' is not a direction"),
             (("ball.obj", "--dpi", "9000"), "between 10 and 2400"),
             (("ball.obj", "--kind", "quality", "--colors", "no"), "no colour map 'no'"),
             (("uvless.npz",), "holds no UVs: 'uv' is missing"),

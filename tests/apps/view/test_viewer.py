@@ -102,7 +102,7 @@ class TestPictures:
         with pytest.raises(MeshFileError, match="is a folder, not a file"):
             read_picture(tmp_path)
         (tmp_path / "text.png").write_text("no picture")
-        with pytest.raises(MeshFileError, match=r"text\.png is no PNG, JPEG, GIF or WebP picture"):
+        with pytest.raises(MeshFileError, match=r"text\.png is not a PNG, JPEG, GIF or WebP picture"):
             read_picture(tmp_path / "text.png")
         with open(tmp_path / "large.png", "wb") as file:
             file.write(PIXEL)
@@ -190,7 +190,7 @@ class TestFiles:
     def test_bad_targets(self, result, tmp_path):
         with pytest.raises(
             UnknownFormatError,
-            match=r"ends with '.png', which is no known format; pages are written as .html, .htm",
+            match=r"ends with '.png', which is not a known format; pages are written as .html, .htm",
         ):
             result.view(tmp_path / "out.png")
         with pytest.raises(MeshFileError, match="there is no folder"):

@@ -118,7 +118,7 @@ class Journal:
 
     Attributes:
         rows: the last row of each result.
-        broken: the number of lines that are no rows, such as the last one of a run that was cut off.
+        broken: the number of lines that are not rows, such as the last one of a run that was cut off.
 
     Raises:
         MeshFileError: the file cannot be read or written.

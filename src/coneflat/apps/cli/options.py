@@ -69,7 +69,7 @@ def _strength(value: Any) -> float:
     try:
         return float(value)
     except ValueError as error:
-        raise click.BadParameter(f"{value!r} is no strength: write a number after it, 1 say") from error
+        raise click.BadParameter(f"{value!r} is not a strength: write a number after it, 1 say") from error
 
 
 def _direction(value: Any) -> tuple[float, float, float]:
@@ -82,7 +82,7 @@ def _direction(value: Any) -> tuple[float, float, float]:
     try:
         one, two, three = (float(word) for word in text.split(","))
     except ValueError as error:
-        raise click.BadParameter(f"{value!r} is no direction; write z, -y or 0,0.5,1") from error
+        raise click.BadParameter(f"{value!r} is not a direction; write z, -y or 0,0.5,1") from error
     return (one, two, three)
 
 
@@ -91,7 +91,7 @@ def eye_of(value: Any) -> Any:
     try:
         return tuple(float(number) for number in value.split(",")) if "," in value else value
     except ValueError as error:
-        raise click.BadParameter(f"{value!r} is no direction; write 1,0.5,2 or front-right") from error
+        raise click.BadParameter(f"{value!r} is not a direction; write 1,0.5,2 or front-right") from error
 
 
 def flag_of(name: str) -> str:

@@ -60,7 +60,7 @@ _INPUT = (
         cls=Grouped,
         group="Input",
         default=True,
-        help="Repair what is no manifold (split edges and vertices, drop degenerate faces, cut one-sided surfaces), "
+        help="Repair what is not manifold (split edges and vertices, drop degenerate faces, cut one-sided surfaces), "
         "with a note; or refuse it, and triangles without area, too.  [default: repair]",
     ),
     click.option(

@@ -73,7 +73,7 @@ def read_vertices(option: str, text: str) -> tuple[int, ...]:
     words = text.replace(",", " ").split()
     for word in words:
         if not re.fullmatch(r"[-+]?[0-9]{1,18}", word):
-            raise OptionError(f"{option}: {word!r} is no vertex, and there is no such file")
+            raise OptionError(f"{option}: {word!r} is not a vertex, and there is no such file")
     return tuple(dict.fromkeys(int(word) for word in words))
 
 

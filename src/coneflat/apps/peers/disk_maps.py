@@ -49,7 +49,7 @@ def least_squares_conformal(
 ) -> FloatArray:
     """Return (n, 2) the map of a disk that keeps shapes best, in the least squares sense, with two vertices pinned.
 
-    It minimises the energy of Eq. 4 and 5 of the paper. Triangles may be turned over. The pins decide on
+    It minimises the energy of Eq. 4 and 5 of the paper. Triangles may be flipped. The pins decide on
     more than place and size: scale varies with them.
 
     Args:
@@ -79,7 +79,7 @@ def spectral_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
 
     This is the Fiedler vector of L_C u = lambda B u, where B is one at boundary vertices and zero inside (Section 3 of
     the paper): the eigenvector of the smallest lambda among those whose boundary is centred, found, like there, as that
-    of the largest 1 / lambda. No vertex is pinned. Triangles may be turned over.
+    of the largest 1 / lambda. No vertex is pinned. Triangles may be flipped.
 
     Args:
         disk: a topological disk.

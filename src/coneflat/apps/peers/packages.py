@@ -42,7 +42,7 @@ def run_peer(name: str, base: Flattening) -> tuple[Flattening, float]:
     """Return what a peer makes of the mesh of a flattening, and how many seconds it takes.
 
     Raises:
-        MetricError: it fails, or what it returns is no map of the mesh.
+        MetricError: it fails, or what it returns is not a map of the mesh.
     """
     peer = PEERS[name]
     try:

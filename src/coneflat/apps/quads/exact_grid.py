@@ -16,13 +16,13 @@ from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray, compiled, list_some, plural
 from ...errors import GridError
 from ...geometry import fill_orientations, sides_between
-from .layout import LOOSE, quarters_around
+from .layout import GRID_TOLERANCE, quarters_around
 
 if TYPE_CHECKING:
     from .integer_map import IntegerGrid
 
 # Grid units: what is so near a grid line is on it. Solvers leave 1e-12; what is on a line is to stay there.
-SNAP = 1e-9
+SNAP_DISTANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
     start = np.zeros((len(mesh.vertices), 2))
     start[mesh.faces.ravel()[fans[0]]] = step * np.round(given.reshape(-1, 2)[fans[0]] / step)
     whole = np.round(start)
-    snapped = np.where(np.abs(start - whole) <= SNAP, whole, start)
+    snapped = np.where(np.abs(start - whole) <= SNAP_DISTANCE, whole, start)
     exact = ExactGrid(mesh, given, twin, turns, shifts, fans)
     corners, is_off = _carried(exact, snapped)
     bad = mesh.faces[_signs(corners) <= 0]
@@ -93,7 +93,7 @@ def _crossings(grid: IntegerGrid, twin: IntArray) -> tuple[IntArray, FloatArray]
         where = list_some(np.flatnonzero(inner)[wrong] // 3)
         raise GridError(
             f"{plural(int(wrong.sum()), 'half-edge')} with a motion that is not the inverse of the twin's, "
-            f"in faces {where}: this is no integer-grid map"
+            f"in faces {where}: this is not an integer-grid map"
         )
     return turns, shifts
 
@@ -170,7 +170,7 @@ def _require_map(exact: ExactGrid, given: FloatArray, is_off: BoolArray) -> None
             f"no grid points: {list_some(bad)}"
         )
     off = np.abs(exact.corners - given).max(axis=(1, 2))
-    bad = np.flatnonzero(~(off <= LOOSE))
+    bad = np.flatnonzero(~(off <= GRID_TOLERANCE))
     if len(bad):
         raise GridError(
             f"the two sides of edges of {plural(len(bad), 'face')} are up to {np.max(off):.1e} grid units apart: "
@@ -179,7 +179,7 @@ def _require_map(exact: ExactGrid, given: FloatArray, is_off: BoolArray) -> None
     bad = np.flatnonzero(_signs(exact.corners) <= 0)
     if len(bad):
         raise GridError(
-            f"{plural(len(bad), 'triangle')} without area or upside down in the grid: {list_some(bad)}"
+            f"{plural(len(bad), 'triangle')} without area or flipped in the grid: {list_some(bad)}"
         )
 
 

@@ -17,7 +17,7 @@ from .integer_map import IntegerGrid
 from .quad_mesh import QuadMesh, require_manifold
 
 # Squares at most: with about a kilobyte for each at the height of the work, what many machines have room for.
-MOST = 20_000_000
+MAX_SQUARES = 20_000_000
 
 
 def extract_quads(grid: IntegerGrid) -> QuadMesh:
@@ -31,12 +31,12 @@ def extract_quads(grid: IntegerGrid) -> QuadMesh:
     point alone have a vertex each there.
 
     Raises:
-        GridError: the map is no integer-grid map, so coarse that quads have a vertex twice, or of too many squares.
+        GridError: the map is not an integer-grid map, so coarse that quads have a vertex twice, or of too many squares.
     """
     area = float(signed_double_areas(grid.corner_grid).sum()) / 2
-    if area > MOST:
+    if area > MAX_SQUARES:
         raise GridError(
-            f"a grid of {area:,.0f} squares is too fine for quads, of which {MOST:,} are made at most"
+            f"a grid of {area:,.0f} squares is too fine for quads, of which {MAX_SQUARES:,} are made at most"
         )
     exact = exact_grid(grid)
     found = find_points(exact)

@@ -278,7 +278,7 @@ def read_grid(path: str | PathLike[str]) -> IntegerGrid:
         UnknownFormatError: the ending is another.
         MeshFileError: the file is not there, may not be read, or holds no manifold of triangles with UVs.
         MeshError: it has no vertices or faces, or some that do not exist.
-        GridError: the UVs are no integer-grid map: triangles are turned over, or sides of seams do not fit.
+        GridError: the UVs are not an integer-grid map: triangles are flipped, or sides of seams do not fit.
     """
     path = as_path(path)
     if known_ending(path, GRID_FORMATS, "integer grids are read from") == ".npz":
@@ -289,7 +289,7 @@ def read_grid(path: str | PathLike[str]) -> IntegerGrid:
 def _grid_of_obj(path: Path, content: bytes) -> IntegerGrid:
     mesh = parse_obj(path, content)
     if (np.diff(mesh.offsets) != 3).any():
-        raise MeshFileError(f"{path} holds no integer grid: it has polygons that are no triangles")
+        raise MeshFileError(f"{path} holds no integer grid: it has polygons that are not triangles")
     uv, at = mesh.uv, mesh.texture
     if uv is None or at is None or at.min() < 0 or at.max() >= len(uv):
         raise MeshFileError(f"{path} holds no integer grid: there are triangle corners without UVs")

@@ -3,7 +3,7 @@
 A point lies inside a triangle, within an edge or at a vertex; which, exact signs decide (H.-C. Ebke, D. Bommes, M.
 Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013). Lines are followed for one unit from point to point,
 across triangles and seams, just beside themselves, on their left or on their right, so they never meet a vertex: exact
-signs tell which two sides of a triangle a line crosses, and one along edges is no special case.
+signs tell which two sides of a triangle a line crosses, and one along edges is not a special case.
 """
 
 from __future__ import annotations

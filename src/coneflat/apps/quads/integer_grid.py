@@ -17,7 +17,7 @@ from ...layout import StretchEnergy
 from ...measure import broken_promises
 from ...options import WordOrVertices
 from .integer_map import IntegerGrid
-from .layout import LOOSE, aligned
+from .layout import GRID_TOLERANCE, aligned
 from .options import QUADS, QuadOptions
 from .round_layout import grid_near, grid_of, noted
 from .sharp import not_taken, sharp_layouts
@@ -56,14 +56,14 @@ def integer_grid(
             may be "auto", too, and is by default: "straight" where that has a grid and cones are not given, or "free".
 
     Raises:
-        GridError: no grid of this size was found that turns no triangle over.
+        GridError: no grid of this size was found that flips no triangle.
         MeshError, CurvatureError, OptionError, SeamError, MetricError: as `coneflat.flatten`.
 
     Notes:
         A smooth layout with quantised cones (Kaelberer, Nieser, Polthier, "QuadCover", 2007) is scaled; translations of
         seams and places of cones are rounded together, to the lattice point that is nearest by the energy that going
         there costs at least; and the layout is relaxed with these (integer-grid maps: Bommes, Campen, Ebke, Alliez,
-        Kobbelt 2013), from the smooth one by steps that turn no triangle over. Edges from cone to cone are split
+        Kobbelt 2013), from the smooth one by steps that flip no triangle. Edges from cone to cone are split
         before.
 
     Examples:
@@ -107,7 +107,7 @@ def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
     parsed = WordOrVertices((), "cone").parse("cones", given)
     for vertex, curvature in parsed.items() if isinstance(parsed, dict) else ():
         quarters = np.nan if curvature is None else curvature / (np.pi / 2)
-        if not abs(quarters - np.rint(quarters)) <= LOOSE:
+        if not abs(quarters - np.rint(quarters)) <= GRID_TOLERANCE:
             raise OptionError(
                 f"cones of a grid have curvatures that are multiples of pi/2; that of vertex {vertex} is "
                 f"{'not given' if curvature is None else f'{curvature:g}'}"

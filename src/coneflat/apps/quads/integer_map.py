@@ -13,7 +13,7 @@ from ...base import BoolArray, FloatArray, IntArray, list_some, plural
 from ...errors import GridError
 from ...geometry import double_areas, edge_lengths, sides_between, signed_double_areas
 from ...mesh import NEXT, PREVIOUS
-from .layout import LOOSE, quarters_around
+from .layout import GRID_TOLERANCE, quarters_around
 from .transitions import UNITS
 
 
@@ -28,7 +28,7 @@ class IntegerGrid:
         vertices: (n, 3) positions in model units.
         faces: (m, 3) vertex indices.
         corner_grid: (m, 3, 2) the point of the grid of every triangle corner, in units of the grid; no triangle is
-            turned over.
+            flipped.
         turns: (3m,) from 0 to 3; -1 on the boundary.
         shifts: (3m, 2) integers; 0 on the boundary.
         cones: (s,) vertices that lie on grid points and have other than four quads.
@@ -98,7 +98,7 @@ class IntegerGrid:
         Raises:
             UnknownFormatError: the ending is another.
             MeshFileError: the file is not there, may not be read, or holds no manifold of triangles with UVs.
-            GridError: the UVs are no integer-grid map.
+            GridError: the UVs are not an integer-grid map.
         """
         from .files import read_grid
 
@@ -148,7 +148,7 @@ def grid_of_corners(
         known: measures of the grid, notes and features; measures left out are not a number, but for the size.
 
     Raises:
-        GridError: triangles are turned over, or the sides of seams are no copies of each other by quarter turns and
+        GridError: triangles are flipped, or the sides of seams are not copies of each other by quarter turns and
             whole translations.
     """
     mesh = TriangleMesh(vertices, faces)
@@ -156,14 +156,14 @@ def grid_of_corners(
     turned = np.flatnonzero(~(flat > 0))
     if len(turned):
         raise GridError(
-            f"{plural(len(turned), 'triangle')} of {len(faces):,} with UVs turned over or without area "
-            f"({list_some(turned)}): this is no integer-grid map"
+            f"{plural(len(turned), 'triangle')} of {len(faces):,} with UVs flipped or without area "
+            f"({list_some(turned)}): this is not an integer-grid map"
         )
     turns, shifts, off = find_motions(mesh, corner_grid)
-    if not off <= LOOSE:
+    if not off <= GRID_TOLERANCE:
         raise GridError(
             f"the sides of a seam miss each other by {off:.2g} squares, up to quarter turns and whole translations: "
-            "this is no integer-grid map"
+            "this is not an integer-grid map"
         )
     quarters = quarters_around(mesh, sides_between(corner_grid))
     is_used = np.bincount(faces.ravel(), minlength=len(vertices)) > 0

@@ -1,4 +1,4 @@
-"""Integer linear algebra: equations in whole numbers, and the lattice points nearest to a given one."""
+"""Integer linear algebra: equations in integers, and the lattice points nearest to a given one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...base import FloatArray, IntArray, compiled
 from ...errors import GridError
 
 # Places of the search tree that are visited in all, at most.
-VISITS = 200_000
+MAX_VISITS = 200_000
 
 
 class WholeSolutions(NamedTuple):
@@ -80,7 +80,7 @@ class Lattice:
 
     Attributes:
         one: (d,) one of them.
-        basis: (d, k) whole numbers.
+        basis: (d, k) integers.
         gram: (d, d) scalar products of all vectors.
     """
 
@@ -89,7 +89,7 @@ class Lattice:
     gram: FloatArray
 
     def where(self, row: IntArray, value: int) -> Lattice | None:
-        """Return the part where (d,) row times the vector is a whole number; None where there is none."""
+        """Return the part where (d,) row times the vector is an integer; None where there is none."""
         within = whole_solutions((row @ self.basis)[None], np.array([value - int(row @ self.one)]))
         if within is None:
             return None
@@ -99,7 +99,7 @@ class Lattice:
         """Return the same lattice by a basis that is nearly orthogonal."""
         return replace(self, basis=self.basis @ self._reduction()[1])
 
-    def nearest(self, place: FloatArray, count: int, visits: int = VISITS) -> IntArray:
+    def nearest(self, place: FloatArray, count: int, visits: int = MAX_VISITS) -> IntArray:
         """Return (k, d) the vectors nearest to a real one (d,), the nearest first.
 
         The first k = count found are exact if the search ends by itself; it begins at Babai's point and ends after so
@@ -169,7 +169,7 @@ def enumerate_points(
 ) -> int:
     """Fill the whole vectors nearest to a target, in any order, and their squared distances; return how many.
 
-    Depth first from the last coordinate; at each depth whole numbers by their distance, so that the first leaf is
+    Depth first from the last coordinate; at each depth integers by their distance, so that the first leaf is
     Babai's point.
     """
     size, most = len(target), len(squares)
@@ -209,7 +209,7 @@ def enumerate_points(
             depth += 1
             if depth == size:
                 break
-        # The next nearest whole number: to the other side, one further.
+        # The next nearest integer: to the other side, one further.
         here[depth] += step[depth]
         step[depth] = -step[depth] - (1 if step[depth] > 0 else -1)
     return number

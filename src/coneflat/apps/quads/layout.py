@@ -24,7 +24,7 @@ from ...mesh import NEXT, PREVIOUS, label_components, label_faces, point_vertice
 
 # Radians, or squares, by which what is to be straight, parallel up to quarter turns, or in one place may be off: far
 # more than rounding, far less than what matters.
-LOOSE = 1e-6
+GRID_TOLERANCE = 1e-6
 
 
 def _none() -> IntArray:
@@ -101,7 +101,7 @@ class Layout:
         return float(self.double_areas().sum()) / 2
 
     def double_areas(self) -> FloatArray:
-        """Return (m,) twice the areas of triangles in the plane, negative for those turned over."""
+        """Return (m,) twice the areas of triangles in the plane, negative for those flipped."""
         return signed_double_areas(as_pairs(self.points)[self.corners])
 
     def scaled(self, factor: float) -> Layout:
@@ -125,8 +125,8 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Layo
         size: of a square in model units, instead.
 
     Raises:
-        GridError: triangles are turned over.
-        SeamError: the sides of a seam are no rigid copies of each other.
+        GridError: triangles are flipped.
+        SeamError: the sides of a seam are not rigid copies of each other.
     """
     mesh = TriangleMesh(result.vertices, result.faces)
     own = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
@@ -134,7 +134,7 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Layo
     flat = signed_double_areas(result.corner_uv)
     if not (flat > 0).all():
         raise GridError(
-            f"{int((flat <= 0).sum())} of {len(flat):,} triangles of the layout are turned over or have no area"
+            f"{int((flat <= 0).sum())} of {len(flat):,} triangles of the layout are flipped or have no area"
         )
     area = float(double_areas(lengths).sum()) / 2
     if size is None:
@@ -210,7 +210,7 @@ def _side_angles(layout: Layout, component: IntArray) -> tuple[BoolArray, FloatA
     angles = _directions(np.abs(vector), vector, component, label)
     off = np.zeros(len(angles))
     np.maximum.at(off, label, np.abs(np.angle((vector * np.exp(-1j * angles[label])) ** 4) / 4))
-    return (np.bincount(label, minlength=len(angles)) > 0) & (off <= LOOSE), angles
+    return (np.bincount(label, minlength=len(angles)) > 0) & (off <= GRID_TOLERANCE), angles
 
 
 def _directions(

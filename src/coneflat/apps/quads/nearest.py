@@ -9,7 +9,7 @@ import numpy as np
 from ...base import FloatArray, IntArray, compiled
 
 # Triangles in a box of the lowest level.
-LEAF = 4
+LEAF_TRIANGLES = 4
 
 
 def surface_distances(vertices: FloatArray, faces: IntArray, queries: FloatArray) -> FloatArray:
@@ -22,7 +22,10 @@ def surface_distances(vertices: FloatArray, faces: IntArray, queries: FloatArray
     corners = np.ascontiguousarray(vertices[faces], dtype=np.float64)
     order = _halved(corners.mean(axis=1))
     low, high = corners.min(axis=1)[order], corners.max(axis=1)[order]
-    low, high = low.reshape(-1, LEAF, 3).min(axis=1), high.reshape(-1, LEAF, 3).max(axis=1)
+    low, high = (
+        low.reshape(-1, LEAF_TRIANGLES, 3).min(axis=1),
+        high.reshape(-1, LEAF_TRIANGLES, 3).max(axis=1),
+    )
     boxes = [np.concatenate([low, high], axis=1)]
     while len(low) > 1:
         low, high = np.minimum(low[::2], low[1::2]), np.maximum(high[::2], high[1::2])
@@ -34,9 +37,9 @@ def surface_distances(vertices: FloatArray, faces: IntArray, queries: FloatArray
 
 
 def _halved(centres: FloatArray) -> IntArray:
-    """Return triangles in an order in which those near each other are, LEAF times a power of two; some come twice."""
-    leaves = 2 ** max(0, int(np.ceil(np.log2(len(centres) / LEAF))))
-    order = np.arange(leaves * LEAF) * len(centres) // (leaves * LEAF)
+    """Return triangles ordered by place, a power of two times `LEAF_TRIANGLES` of them; some come twice."""
+    leaves = 2 ** max(0, int(np.ceil(np.log2(len(centres) / LEAF_TRIANGLES))))
+    order = np.arange(leaves * LEAF_TRIANGLES) * len(centres) // (leaves * LEAF_TRIANGLES)
     groups = 1
     while groups < leaves:
         parts = order.reshape(groups, -1)
@@ -54,8 +57,8 @@ def _fill_squares(
 ) -> None:
     """Fill (q,) the squared distances of points from triangles.
 
-    tree: (2 k - 1, 6) boxes, least and greatest corner: node i is above 2 i + 1 and 2 i + 2, the last k hold LEAF
-        triangles each, in their order.
+    tree: (2 k - 1, 6) boxes, least and greatest corner: node i is above 2 i + 1 and 2 i + 2, the last k hold
+        `LEAF_TRIANGLES` each, in their order.
     """
     first_leaf = len(tree) // 2
     stack = np.empty(128, dtype=np.int64)
@@ -70,7 +73,9 @@ def _fill_squares(
             if _box_square(tree[node], point) >= best:
                 continue
             if node >= first_leaf:
-                for i in range(LEAF * (node - first_leaf), LEAF * (node - first_leaf + 1)):
+                for i in range(
+                    LEAF_TRIANGLES * (node - first_leaf), LEAF_TRIANGLES * (node - first_leaf + 1)
+                ):
                     c = corners[order[i]]
                     best = min(best, nearest_in_triangle(point, c[0], c[1], c[2], weights))
                 continue

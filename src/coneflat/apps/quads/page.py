@@ -26,7 +26,7 @@ class Domains:
 
     Attributes:
         domain: (p,) of each quad.
-        places: (p, 4, 2) whole numbers: where the corners of each quad lie in its rectangle, whose least is (0, 0).
+        places: (p, 4, 2) integers: where the corners of each quad lie in its rectangle, whose least is (0, 0).
         sides: (d, 2) quads along x and along y of each, y being no more.
         is_cut: (4p,) whether side i of quad q, 4 q + i, from its corner i to the next, is on the border of a domain.
     """
@@ -41,7 +41,7 @@ def find_domains(mesh: QuadMesh) -> Domains:
     """Return the rectangles that lines from irregular vertices part a mesh of quads into.
 
     From each irregular vertex all lines set out at one time, and each ends where it meets another, or the boundary.
-    What is no rectangle then, as a torus without irregular vertices is none, is parted by lines from its first vertex.
+    Other pieces, like a torus without irregular vertices, are divided by lines from their first vertex.
     """
     twin, starts = _twins(mesh), mesh.quads.ravel()
     is_cut = twin < 0
@@ -56,7 +56,7 @@ def find_domains(mesh: QuadMesh) -> Domains:
         found, is_bad = _laid_out(twin, is_cut, len(mesh.quads))
         if not is_bad.any():
             return found
-        # One more vertex of each that is no rectangle: the first whose lines are not all there.
+        # One more vertex of each that is not a rectangle: the first whose lines are not all there.
         first = np.flatnonzero(is_bad[np.repeat(found.domain, 4)] & ~is_cut)
         _, one_of = np.unique(np.repeat(found.domain, 4)[first], return_index=True)
         seeds = np.unique(starts[first[one_of]])
@@ -95,7 +95,7 @@ def _next(side: IntArray) -> IntArray:
 
 
 def _laid_out(twin: IntArray, is_cut: BoolArray, count: int) -> tuple[Domains, BoolArray]:
-    """Return the domains as they lie in the plane, and which of them are no rectangles."""
+    """Return the domains as they lie in the plane, and which of them are not rectangles."""
     inner = np.flatnonzero(~is_cut)
     number, domain = label_components(count, inner // 4, twin[inner] // 4)
     turn, origin = np.full(count, -1), np.zeros((count, 2), dtype=np.int64)
@@ -137,7 +137,7 @@ def _turned(turn: IntArray, vectors: IntArray) -> IntArray:
 
 
 def arranged(domains: Domains) -> tuple[IntArray, int]:
-    """Return (p, 4, 2) whole numbers where corners of quads lie if all rectangles lie apart, and the side of a square.
+    """Return (p, 4, 2) integers where corners of quads lie if all rectangles lie apart, and the side of a square.
 
     They lie in rows, the tallest below, so that all are about square; a gap of one quad is around each.
     """

@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import TriangleMesh
 from ...base import ComplexArray, FloatArray, IntArray
-from ...cones import ROOM, ConeSearch, quantise_cones
+from ...cones import CONE_ANGLE_PER_TRIANGLE, ConeSearch, quantise_cones
 from ...errors import CurvatureError, GridError, MetricError, OptionError, SeamError
 from ...geometry import as_complex, as_pairs, double_areas, signed_double_areas
 from ...layout import Lines, PointConstraints, SeamChains, StretchEnergy, lay_out, relax
@@ -92,7 +92,7 @@ def _flat_patches(
     coarse = np.concatenate(turned)
     if len(coarse):
         raise CoarseError(
-            coarse, f"{len(coarse)} of {len(corners):,} triangles are turned over on straight sides"
+            coarse, f"{len(coarse)} of {len(corners):,} triangles are flipped on straight sides"
         )
     every = np.concatenate([*cones, opened.irregular])
     sides = Sides(np.setdiff1d(opened.nodes, opened.irregular))
@@ -105,7 +105,7 @@ def _flat_patch(
     """Return a connected patch flattened conformally, with angles of whole quarter turns on its boundary.
 
     Points (u, 2) of the plane, (m, 3) that at each triangle corner, and cones, vertices inside. Triangles that are too
-    coarse for straight sides may be turned over.
+    coarse for straight sides may be flipped.
 
     Args:
         mesh: the patch.
@@ -121,7 +121,7 @@ def _flat_patch(
     corners = np.where(mesh.is_boundary_vertex, (np.pi / 2) * (2 - quarters), 0.0)
     solution = _cones(mesh, lengths, corners, distortion, options)
     choices = ExactChoices(scale_at_cones=False, boundary=straight_boundary(mesh, solution.target))
-    # Rotations along handles are no quarter turns yet, nor are loops of the boundary parallel: both come to be so when
+    # Rotations along handles are not quarter turns yet, nor are loops of the boundary parallel: both come to be so when
     # patches are brought together.
     metric = exact_flat_metric(mesh, lengths, solution, choices)
     seams = find_seams(mesh, solution.cones, lengths.ravel()[mesh.edge_halfedges[:, 0]])
@@ -136,7 +136,7 @@ def _cones(
     surface = Surface.of(mesh, lengths)
     inside = ~mesh.is_boundary_vertex
     total = 4 * mesh.euler_characteristic - round(float(corners.sum()) / (np.pi / 2))
-    room = ROOM * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
+    room = CONE_ANGLE_PER_TRIANGLE * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
     try:
         search = ConeSearch(
             surface.laplacian,
@@ -171,7 +171,7 @@ def _fitting(opened: Opened, layout: Layout) -> ComplexArray:
     """Return the points of patches relaxed so that sides are straight, along the axes, and quarter turns of each other.
 
     Raises:
-        ConvergenceError: they cannot be without turning a triangle over, as far as is known.
+        ConvergenceError: they cannot be without flipping a triangle, as far as is known.
         GridError: sides and seams, each turned to the nearest axis, contradict each other.
     """
     sides = _all_sides(opened, layout, layout.chains(quarter_turns=True))

@@ -170,7 +170,7 @@ def require_manifold(quads: IntArray, vertex_count: int, edge_count: int) -> Non
 def least_jacobians(points: FloatArray, quads: IntArray) -> FloatArray:
     """Return (p,) the least scaled Jacobian of each quad: sines of its angles, seen along the normal.
 
-    The normal is that of the two diagonals; 1 is a rectangle's, and below 0 a quad is turned over at a corner.
+    The normal is that of the two diagonals; 1 is a rectangle's, and below 0 a quad is flipped at a corner.
     """
     corners = points[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])

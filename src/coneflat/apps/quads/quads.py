@@ -42,7 +42,7 @@ def quads(
         options: of `coneflat.flatten`; by default cones have three, five or six quads.
 
     Raises:
-        GridError: no grid of this size was found that turns no triangle over, or it is too coarse for quads.
+        GridError: no grid of this size was found that flips no triangle, or it is too coarse for quads.
         OptionError: an option makes no sense.
         MeshError, CurvatureError, SeamError, MetricError: as `coneflat.flatten`.
 

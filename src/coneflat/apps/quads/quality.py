@@ -30,7 +30,7 @@ class QuadMeasures:
         angle_mean, angle_p95, angle_max: of all corner angles, degrees off 90.
         edge_mean, edge_cv: of edge lengths, the mean, and the standard deviation over it.
         jacobian_mean, jacobian_min: of the least scaled Jacobian of each quad, 1 for rectangles; below 0 a quad is
-            turned over at a corner.
+            flipped at a corner.
         to_surface, from_surface: the largest distance from the quads to the surface and back, model units; see
             `surface_gaps`.
         hausdorff: the larger of both.

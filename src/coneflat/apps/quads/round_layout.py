@@ -17,7 +17,7 @@ from .rounding import Rounding, find_rounding
 from .transitions import Transitions, find_transitions
 
 # Part of the squares wanted by which there may be more or fewer without a note.
-NOTED = 0.1
+NOTED_SHARE = 0.1
 
 
 def grid_of(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
@@ -42,7 +42,7 @@ def grid_of(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
         raise GridError(f"no grid of about {wanted:,.0f} quads was found: {why}; {advice}")
     factor, last = 1.0, _squares(found)
     for _ in range(4):
-        if abs(_squares(found) - wanted) <= NOTED * wanted:
+        if abs(_squares(found) - wanted) <= NOTED_SHARE * wanted:
             break
         # Half of the way after the first: squares come and go by whole rows.
         factor *= (wanted / last) if factor == 1.0 else math.sqrt(wanted / last)
@@ -53,7 +53,7 @@ def grid_of(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
         if abs(np.log(last / wanted)) < abs(np.log(_squares(found) / wanted)):
             found = replace(other, size=layout.size)
     squares = _squares(found)
-    if abs(squares - wanted) > NOTED * wanted:
+    if abs(squares - wanted) > NOTED_SHARE * wanted:
         found = noted(found, f"The grid has an area of {squares:,.0f} squares, not {wanted:,.0f}.")
     if split:
         found = noted(
@@ -115,7 +115,7 @@ def _relaxed(
     """Return the layout relaxed with whole translations of seams and cones on whole places.
 
     Raises:
-        ConvergenceError: they cannot be reached without turning a triangle over.
+        ConvergenceError: they cannot be reached without flipping a triangle.
     """
     chains, count = transitions.chains, 2 * len(transitions.quarters)
     places = transitions.places(smooth, values.astype(np.float64))
@@ -172,7 +172,7 @@ def _described(
     qc_mean, least_area = _distortion(layout, points)
     move_rms, move_max = _moves(layout, smooth, points)
     note = (
-        f"The {plural(tries, 'nearest lattice point')} could not be reached without turning triangles over; the next "
+        f"The {plural(tries, 'nearest lattice point')} could not be reached without flipping triangles; the next "
         "one could."
     )
     return IntegerGrid(

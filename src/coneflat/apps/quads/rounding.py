@@ -24,7 +24,7 @@ class Stiffness:
 
     A shift is a field of plane vectors whose copies across seams are quarter turns of each other plus the change of the
     translation. Its energy, the integral of its squared derivative, is that of the change of the map, and the same
-    wherever the seams run. It tells how near a change comes to turning triangles over, as a distance between
+    wherever the seams run. It tells how near a change comes to flipping triangles, as a distance between
     translations, in which some run around all of the model and some around a finger, does not.
     """
 
@@ -81,12 +81,12 @@ def _turned_copies(transitions: Transitions) -> csr_matrix:
 
 
 # Units: cones that are farther from each other along the surface are not rounded onto each other.
-NEAR = 3.0
+NEAR_CONE_DISTANCE = 3.0
 # Radians by which the vector between such cones may turn, and pairs that are kept apart at once, None for all, as long
 # as cones can be kept apart so; if not, the next of these.
-WAYS = ((np.pi / 3, None), (np.pi / 2, None), (np.pi / 3, 1), (np.pi / 2, 1))
+SEPARATIONS = ((np.pi / 3, None), (np.pi / 2, None), (np.pi / 3, 1), (np.pi / 2, 1))
 # Places of the search tree visited for the nearest one alone, of which only that cones fall together is asked.
-QUICK = 2_000
+QUICK_VISITS = 2_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +154,7 @@ class Rounding:
     def candidates(self) -> list[IntArray]:
         """Return whole values (v,) of the variables near the smooth ones that put no two cones on one place.
 
-        First those that turn no triangle over as far as the second order tells, each kind the nearest first.
+        First those that flip no triangle as far as the second order tells, each kind the nearest first.
 
         Raises:
             GridError: cones cannot be kept apart.
@@ -163,12 +163,12 @@ class Rounding:
         whole = Lattice(np.zeros(size, dtype=np.int64), np.eye(size, dtype=np.int64), self.metric)
         lattice = whole.reduced()
         apart: list[IntArray] = []
-        for turned, at_once in WAYS:
+        for turned, at_once in SEPARATIONS:
             try:
                 apart = self._apart(lattice, turned, at_once)
                 break
             except GridError:
-                if (turned, at_once) == WAYS[-1]:
+                if (turned, at_once) == SEPARATIONS[-1]:
                     raise
         values = [np.asarray(self.basis @ each) for each in apart]
         areas = self._turned_over(np.stack(values, axis=1) - self.smooth[:, None])
@@ -177,7 +177,7 @@ class Rounding:
     def _apart(self, lattice: Lattice, turned: float, at_once: int | None) -> list[IntArray]:
         """Return near vectors of a lattice that keep all cones apart, and turn those near each other by less."""
         while True:  # each time the lattice loses a dimension at least
-            bad = self.pairs.collapsed(lattice.nearest(self.start, 1, QUICK)[0], turned)
+            bad = self.pairs.collapsed(lattice.nearest(self.start, 1, QUICK_VISITS)[0], turned)
             if not len(bad):
                 break
             for pair in self.pairs.apart(bad)[:at_once].tolist():
@@ -190,7 +190,9 @@ class Rounding:
                 lattice = lattice if part is None else part
             lattice = lattice.reduced()
         # The nearest of all may be another than that of the quick search.
-        found = np.concatenate([lattice.nearest(self.start, 64), lattice.nearest(self.start, 1, QUICK)])
+        found = np.concatenate(
+            [lattice.nearest(self.start, 64), lattice.nearest(self.start, 1, QUICK_VISITS)]
+        )
         return [each for each in found if not len(self.pairs.collapsed(each, turned))][:16]
 
     def _turned_over(self, changes: FloatArray) -> FloatArray:
@@ -242,7 +244,7 @@ def _near_pairs(layout: Layout, transitions: Transitions, basis: IntArray, start
         (np.abs(points[ends] - points[starts]), (tails, heads)), shape=(len(mesh.vertices),) * 2
     )
     graph = graph.maximum(graph.T)
-    found, before = dijkstra(graph, indices=cones, limit=NEAR, return_predecessors=True)
+    found, before = dijkstra(graph, indices=cones, limit=NEAR_CONE_DISTANCE, return_predecessors=True)
     halfedge = csr_matrix((np.arange(1, len(tails) + 1), (tails, heads)), shape=graph.shape)
     is_cone = np.zeros(len(mesh.vertices), dtype=bool)
     is_cone[cones] = True
@@ -331,12 +333,18 @@ def _paths_to_sides(layout: Layout) -> list[list[int]]:
     graph = csr_matrix((lengths[kept], (mesh.tails[kept], mesh.heads[kept])), shape=(len(label),) * 2)
     graph = graph.maximum(graph.T)
     distance, before, source = dijkstra(
-        graph, indices=np.flatnonzero(label >= 0), limit=NEAR, min_only=True, return_predecessors=True
+        graph,
+        indices=np.flatnonzero(label >= 0),
+        limit=NEAR_CONE_DISTANCE,
+        min_only=True,
+        return_predecessors=True,
     )
     one, two = mesh.edges[~along & np.isfinite(distance)[mesh.edges].all(axis=1)].T
     total = distance[one] + distance[two] + np.asarray(graph[one, two]).ravel()
     pairs = np.sort(label[source[np.stack([one, two], axis=1)]], axis=1)
-    near = np.flatnonzero((total <= NEAR) & (pairs[:, 0] != pairs[:, 1]) & (pairs[:, 0] < side_count))
+    near = np.flatnonzero(
+        (total <= NEAR_CONE_DISTANCE) & (pairs[:, 0] != pairs[:, 1]) & (pairs[:, 0] < side_count)
+    )
     near = near[np.lexsort((total[near], pairs[near, 1], pairs[near, 0]))]
     _, first = np.unique(pairs[near], axis=0, return_index=True)
 

@@ -1,6 +1,6 @@
 """Layouts in which sharp edges lie along the axes: all of them, or as many as can.
 
-The patches between sharp edges are flattened with straight sides, each alone, and relaxed together.
+Edges that no layout can follow are left out, and the rest is tried again.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from .layout import Layout
 from .patch_layout import CoarseError, PatchError, sharp_layout
 
 # What may be asked of the cones inside patches, and of the input; the rest is as grids of whole surfaces want it.
-TAKEN = (
+ACCEPTED_OPTIONS = (
     "sharp_angle", "boundary", "min_cone_angle", "max_cone_angle", "distortion", "repair", "strict", "threads",
 )  # fmt: skip
 # Times that sharp edges are left out.
-TRIES = 6
+MAX_TRIES = 6
 
 
 def sharp_layouts(
@@ -83,7 +83,11 @@ def not_taken(given: Mapping[str, Any], usual: Mapping[str, Any]) -> list[str]:
     """Return the names of options that have no effect here, and differ from the usual ones."""
     options: Options = read_options({**usual, **given})
     before: Options = read_options(usual)
-    pairs = ((name, getattr(options, name), getattr(before, name)) for name in given if name not in TAKEN)
+    pairs = (
+        (name, getattr(options, name), getattr(before, name))
+        for name in given
+        if name not in ACCEPTED_OPTIONS
+    )
     # Some may be arrays.
     return sorted(
         name
@@ -131,7 +135,7 @@ class _Search:
     def layouts(self) -> Iterator[Layout]:
         """Yield layouts; their features are `edges` of `mesh` until the next."""
         with_edges = True
-        for attempt in range(TRIES):
+        for attempt in range(MAX_TRIES):
             if not len(self.edges) and not (with_edges and self.mesh.is_boundary_edge.any()):
                 return
             with_edges = len(self.edges) > 0
@@ -152,7 +156,7 @@ class _Search:
     def _layout(self, attempt: int) -> Layout:
         def tell(patch: int, count: int) -> None:
             if self.progress is not None:
-                done = (attempt + patch / count) / TRIES
+                done = (attempt + patch / count) / MAX_TRIES
                 self.progress(f"patch {patch + 1:,} of {count:,} between sharp edges", done)
 
         for _ in range(4):

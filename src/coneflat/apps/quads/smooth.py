@@ -16,9 +16,9 @@ from .options import ROUNDS
 from .quad_mesh import QuadMesh, least_jacobians
 
 # Scaled Jacobian below which no quad goes that was above, nor any deeper that was below.
-LEAST = 0.5
+MIN_JACOBIAN = 0.5
 # Radians: edges of the surface that bend more are sharp, and quad vertices on them stay.
-SHARP = np.deg2rad(40.0)
+SHARP_ANGLE = np.deg2rad(40.0)
 
 
 def smooth_quads(quads: QuadMesh, rounds: int = ROUNDS, features: ArrayLike = ()) -> QuadMesh:
@@ -80,9 +80,9 @@ def _squared(points: FloatArray, quads: IntArray) -> FloatArray:
 
 
 def _held_back(old: FloatArray, new: FloatArray, quads: IntArray) -> BoolArray:
-    """Return (q,) the vertices that must stay, lest a quad be worse than LEAST and than it was."""
+    """Return (q,) the vertices that must stay, lest a quad be worse than MIN_JACOBIAN and than it was."""
     stays = np.zeros(len(old), dtype=bool)
-    bound = np.minimum(least_jacobians(old, quads), LEAST)
+    bound = np.minimum(least_jacobians(old, quads), MIN_JACOBIAN)
     while True:
         points = np.where(stays[:, None], old, new)
         bad = least_jacobians(points, quads) < bound
@@ -96,7 +96,7 @@ def _is_held(quads: QuadMesh, features: IntArray) -> BoolArray:
     """Return (q,) the vertices on sharp edges of the surface, and on features (f, 2)."""
     mesh = quads.surface
     sharp = np.zeros(len(mesh.edges), dtype=bool)
-    sharp[sharp_edges(mesh, SHARP)] = True
+    sharp[sharp_edges(mesh, SHARP_ANGLE)] = True
     sharp[edge_indices(mesh, features)] = True
     has_sharp = np.zeros(len(mesh.vertices), dtype=bool)
     has_sharp[mesh.edges[sharp]] = True
@@ -121,7 +121,7 @@ def lift_worst(
 ) -> None:
     """Move vertices of bad quads to where the worst quad around each is best, on the surface.
 
-    No quad around a vertex becomes worse than the worst of them was, and none that was upright is turned over.
+    No quad around a vertex becomes worse than the worst of them was, and none that was positively oriented is flipped.
 
     Args:
         points: (q, 3) the vertices, changed.
@@ -183,10 +183,10 @@ def _lift(
 
 
 def untangled(quads: QuadMesh) -> QuadMesh:
-    """Return a quad mesh with fewer quads turned over, none if that is found.
+    """Return a quad mesh with fewer quads flipped, none if that is found.
 
     Vertices around them move one at a time, on the surface, those on sharp edges among them, which smoothing leaves
-    where they are: an edge that is followed less closely is less bad than a quad that is turned over. Those on the
+    where they are: an edge that is followed less closely is less bad than a quad that is flipped. Those on the
     boundary stay.
     """
     points, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()

@@ -1,4 +1,4 @@
-"""Seams whose two sides are quarter turns of each other, as equations between whole numbers.
+"""Seams whose two sides are quarter turns of each other, as equations between integers.
 
 Copies of a vertex in the plane are moved onto each other by the motions of seams, z_right = i^q z_left + t. All that
 may vary are the translations t of the chains of seam edges, and the places of cones; around each vertex within the
@@ -17,10 +17,10 @@ from scipy.sparse import coo_matrix, csr_matrix
 from ...base import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import GridError
 from ...layout import SeamChains
-from .layout import LOOSE, Layout, charts_of, first_points, joining_chains
+from .layout import GRID_TOLERANCE, Layout, charts_of, first_points, joining_chains
 
 UNITS = np.array([1, 1j, -1, -1j])
-# The same, quarter turns to the left, as matrices of whole numbers.
+# The same, quarter turns to the left, as matrices of integers.
 TURNS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]])
 
 
@@ -64,14 +64,14 @@ def find_transitions(layout: Layout) -> Transitions:
     """Return the transitions of a layout.
 
     Raises:
-        SeamError: the sides of a seam are no rigid copies of each other.
-        GridError: they are no quarter turns of each other.
+        SeamError: the sides of a seam are not rigid copies of each other.
+        GridError: they are not quarter turns of each other.
     """
     chains = layout.chains()
     angle = np.angle(chains.rotation) / (np.pi / 2)
     quarters = np.rint(angle).astype(np.int64)
     off = float(np.abs(angle - quarters).max(initial=0.0)) * np.pi / 2
-    if off > LOOSE:
+    if off > GRID_TOLERANCE:
         raise GridError(
             f"seams turn by up to {off:.2g} rad beside quarter turns: flatten with quantise=pi/2 and correct_handles, "
             "and a mesh with several boundaries with boundary='straight'"

@@ -30,7 +30,7 @@ from .outputs import curve_of, quads_of, saved
 from .worker import Head, read_frame, write_frame
 
 #: Polygons from which on the first layout is shown, too: of smaller meshes the last is there as soon.
-EARLY = 20_000
+EARLY_POLYGONS = 20_000
 #: What stands for numbers until they are known, and what the first layout is.
 TO_COME = "…"
 FIRST = "First view: distortion is yet to be evened out, and overlaps to be parted  ·  …"
@@ -82,7 +82,7 @@ class Bench:
         result: of the last flattening; None where it has failed.
     """
 
-    def __init__(self, early_from: int = EARLY) -> None:
+    def __init__(self, early_from: int = EARLY_POLYGONS) -> None:
         """early_from: polygons of meshes whose first layout is shown, too."""
         self.result: Flattening | None = None
         self._early_from = early_from

@@ -21,7 +21,7 @@ from ...options import Flag, Options, as_number, as_whole, declarations, read_op
 from .paint import Paint, Region
 
 #: Options that are chosen as they are; cones and seams are chosen one by one.
-PLAIN = (
+PLAIN_OPTIONS = (
     "distortion", "cone_count", "boundary", "stretch", "charts", "seams", "sharp_angle", "hide_seams",
     "resolution", "padding", "repair",
 )  # fmt: skip
@@ -60,7 +60,7 @@ class Choices:
     """What the user has chosen; nothing of it ever changes, a change makes another.
 
     Attributes:
-        options: those of `PLAIN` that are not left at their defaults.
+        options: those of `PLAIN_OPTIONS` that are not left at their defaults.
         by_hand: `cones` are all there are; else a search places others around those that are locked.
         cones: those placed or locked, by vertex.
         cuts: paths along edges, as vertices, that are cut.
@@ -87,8 +87,8 @@ class Choices:
         Raises:
             OptionError: it is none that the studio has, or the value makes no sense.
         """
-        if name not in PLAIN:
-            raise OptionError(f"the studio sets no option {shown(name)}: it has {', '.join(PLAIN)}")
+        if name not in PLAIN_OPTIONS:
+            raise OptionError(f"the studio sets no option {shown(name)}: it has {', '.join(PLAIN_OPTIONS)}")
         if name == "boundary" and value not in BOUNDARIES:
             raise OptionError(f"unknown boundary {shown(value)}: choose from {', '.join(BOUNDARIES)}")
         if name == "seams" and value not in (None, "input"):
@@ -165,7 +165,7 @@ class Choices:
         cones = self._by_vertex()
         cone = replace(cones.get(vertex, Cone(vertex)), locked=locked)
         if vertex not in cones and (self.by_hand or not locked):
-            raise StudioError(f"vertex {vertex} is no cone")
+            raise StudioError(f"vertex {vertex} is not a cone")
         cones[vertex] = cone
         if not self.by_hand and not locked:
             del cones[vertex]
@@ -286,7 +286,7 @@ class Choices:
 
         Raises:
             OptionError, StudioError: they make no sense.
-            KeyError, TypeError, ValueError, AttributeError: they are no choices at all.
+            KeyError, TypeError, ValueError, AttributeError: they are not choices at all.
         """
         chosen = cls()
         for name, value in plain["options"].items():
@@ -316,7 +316,7 @@ class Choices:
     def _cone(self, vertex: int) -> Cone:
         cones = self._by_vertex()
         if vertex not in cones:
-            raise StudioError(f"vertex {vertex} is no cone")
+            raise StudioError(f"vertex {vertex} is not a cone")
         return cones[vertex]
 
     def _with_cones(self, *, cones: Mapping[int, Cone], by_hand: bool | None = None) -> Choices:
@@ -352,7 +352,7 @@ def edges_of(path: tuple[int, ...]) -> set[frozenset[int]]:
 
 
 #: Numbers that are written one by one.
-FEW = 12
+LISTED_NUMBERS = 12
 
 
 def replay(mesh: str, project: str, choices: Choices) -> dict[str, str]:
@@ -396,14 +396,14 @@ def _written(value: Any) -> str:
         return repr(value.tolist())
     if isinstance(value, tuple):
         return f"({', '.join(_written(each) for each in value)})"
-    if isinstance(value, list) and len(value) > FEW:
+    if isinstance(value, list) and len(value) > LISTED_NUMBERS:
         return f"[{_ranges(value)}]"
-    if isinstance(value, dict) and len(value) > FEW:
+    if isinstance(value, dict) and len(value) > LISTED_NUMBERS:
         # Those that have one value are together.
         groups: dict[Any, list[int]] = {}
         for vertex, each in value.items():
             groups.setdefault(each, []).append(vertex)
-        if len(groups) <= FEW:
+        if len(groups) <= LISTED_NUMBERS:
             parts = (
                 f"**dict.fromkeys([{_ranges(sorted(group))}], {each!r})" for each, group in groups.items()
             )

@@ -38,7 +38,7 @@ CONTROLS = {
     "padding": "Texels between charts",
     "repair": "Repair the mesh",
 }
-#: A flag, or a name that is no word; a name that is one means an option where a message begins with it.
+#: A flag, or a name that is not a word; a name that is one means an option where a message begins with it.
 _NAMED = re.compile(
     r"--(?P<flag>[a-z]+(?:-[a-z]+)*)(?: (?:greedy|exact|linear)\b)?"
     rf"|\b(?P<name>{'|'.join(name for name in CONTROLS if '_' in name)})\b"

@@ -59,7 +59,7 @@ class Studio:
                 jupyter-server-proxy, "/user/NAME/proxy/{port}/" on a hub. Then the token alone keeps others out.
 
         Raises:
-            ArrayShapeError: it is no mesh.
+            ArrayShapeError: it is not a mesh.
             MeshFileError, ProjectError: the file cannot be read.
             OptionError: the extra `studio` is not installed, or `through` names no port.
         """
@@ -96,7 +96,7 @@ class Studio:
             raise ArrayShapeError(f"vertices must have the shape (n, 3), not {vertices.shape}")
         if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
             raise ArrayShapeError(
-                f"faces must be whole numbers of the shape (m, 3), not of {triangles.shape} and type {triangles.dtype}"
+                f"faces must be integers of the shape (m, 3), not of {triangles.shape} and type {triangles.dtype}"
             )
         if folder is None:
             self._own_folder = tempfile.TemporaryDirectory(prefix="coneflat-")
@@ -194,7 +194,7 @@ def studio(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Studio:
         options: the other arguments of `Studio`.
 
     Raises:
-        ArrayShapeError: it is no mesh.
+        ArrayShapeError: it is not a mesh.
         MeshFileError, ProjectError: the file cannot be read.
         OptionError: the extra `studio` is not installed, or `through` names no port.
 

@@ -52,7 +52,7 @@ class Region:
             found = _RUN.fullmatch(word)
             first, last = (found[1], found[2] or found[1]) if found else ("1", "0")
             if int(first) > int(last):
-                raise StudioError(f"a region is written as 3-17 20; {shown(word)} is no part of one")
+                raise StudioError(f"a region is written as 3-17 20; {shown(word)} is not part of one")
             runs.append((int(first), int(last)))
         region = cls.of_runs(runs)
         if region.count > MOST_PAINTED:

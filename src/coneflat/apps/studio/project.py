@@ -74,18 +74,18 @@ def read_project(path: Path) -> Project:
     """
     try:
         if path.stat().st_size > 64 * 1024 * 1024:  # a project of a million drawn edges is smaller
-            raise ProjectError(f"{path} is no project: it has {path.stat().st_size:,} bytes")
+            raise ProjectError(f"{path} is not a project: it has {path.stat().st_size:,} bytes")
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ProjectError(f"cannot read {path}: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:
-        raise ProjectError(f"{path} is no project: it is not JSON") from error
+        raise ProjectError(f"{path} is not a project: it is not JSON") from error
     return _project(path, content)
 
 
 def _project(path: Path, content: Any) -> Project:
     if not isinstance(content, dict) or content.get("kind") != KIND:
-        raise ProjectError(f"{path} is no project of coneflat")
+        raise ProjectError(f"{path} is not a project of coneflat")
     if content.get("version") != VERSION:
         raise ProjectError(
             f"{path} is a project of version {content.get('version')!r}; this coneflat reads version {VERSION}"
@@ -97,7 +97,9 @@ def _project(path: Path, content: Any) -> Project:
     except ConeflatError as error:
         raise ProjectError(f"{path} holds choices that make no sense: {error}") from error
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ProjectError(f"{path} is no project: something in it is missing or broken ({error})") from error
+        raise ProjectError(
+            f"{path} is not a project: something in it is missing or broken ({error})"
+        ) from error
     return Project(Path(os.path.normpath(path.parent / file)), sha256, choices)
 
 
@@ -164,7 +166,7 @@ def file_within(name: str, folder: Path) -> Path:
     if not name:
         raise StudioError("no file is named: give the name of a mesh or a project in the session's folder")
     if name != Path(name).name or name.startswith(".") or "\\" in name or "\0" in name:
-        raise StudioError(f"{shown(name)} is no name of a file in the session's folder")
+        raise StudioError(f"{shown(name)} is not a name of a file in the session's folder")
     path = folder / name
     if not path.resolve().is_relative_to(folder):
         raise StudioError(f"{shown(name)} leads out of the session's folder")

@@ -142,7 +142,7 @@ def studio_app(
     async def upload(request: Request) -> Response:
         path = file_within(request.query_params.get("name", ""), session.folder)
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
-            raise StudioError(f"{path.name} is no mesh that can be read: {', '.join(INPUT_FORMATS)}")
+            raise StudioError(f"{path.name} is not a mesh that can be read: {', '.join(INPUT_FORMATS)}")
         stored = await _store(request, path)
         await run_sync(session.open_named, stored.name)
         return JSONResponse({"version": session.version})
@@ -164,7 +164,7 @@ def studio_app(
 
 
 def _media_type(ending: str) -> str:
-    return mimetypes.guess_type(f"it{ending}")[0] or "application/octet-stream"
+    return mimetypes.MimeTypes(()).guess_type(f"it{ending}")[0] or "application/octet-stream"
 
 
 def _number(request: Request, name: str) -> int | str:

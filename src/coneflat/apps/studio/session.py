@@ -90,7 +90,7 @@ class Session:
         """Work on a mesh or a project in the session's folder.
 
         Raises:
-            StudioError: it is no file of the folder.
+            StudioError: it is not a file of the folder.
             MeshFileError, ProjectError: as of `open`.
         """
         self._begin(*opened(file_within(name, self.folder), self.folder, only_within=True))
@@ -150,7 +150,7 @@ class Session:
             except ConeflatError:
                 raise
             except (KeyError, TypeError, ValueError, AttributeError) as error:
-                raise StudioError(f"these are no choices: {shown(dict(plain))}") from error
+                raise StudioError(f"these are not choices: {shown(dict(plain))}") from error
             self._take(chosen, None)
 
     def _require_mesh(self) -> None:
@@ -253,7 +253,9 @@ class Session:
             StudioError: there is none, or no such format.
         """
         if ending not in EXPORTS:
-            raise StudioError(f"{shown(ending)} is no format that results are saved as: {', '.join(EXPORTS)}")
+            raise StudioError(
+                f"{shown(ending)} is not a format that results are saved as: {', '.join(EXPORTS)}"
+            )
         return self._asked({"do": "export", "ending": ending})[1]
 
     def quads(self, ending: str, count: object) -> bytes:
@@ -264,7 +266,7 @@ class Session:
             OptionError: the number makes no sense.
         """
         if ending not in QUADS:
-            raise StudioError(f"{shown(ending)} is no format that quads are saved as: {', '.join(QUADS)}")
+            raise StudioError(f"{shown(ending)} is not a format that quads are saved as: {', '.join(QUADS)}")
         number = as_whole("the number of quads", count)
         if not 1 <= number <= MOST_QUADS:
             raise StudioError(f"the number of quads must be from 1 to {MOST_QUADS:,}, not {number:,}")

@@ -25,10 +25,10 @@ _OF_A_SEARCH = ("cones", "curvature error", "of the metric")
 def own_flattening(source: Joined, *, strict: bool = False) -> Flattening | None:
     """Return the UVs that a file has as a flattening; None if no triangle has any.
 
-    Triangles without UVs are left out, with a note, and so is nothing else: what is no manifold is repaired.
+    Triangles without UVs are left out, with a note, and so is nothing else: what is not manifold is repaired.
 
     Raises:
-        MeshError: the triangles are no mesh.
+        MeshError: the triangles are not a mesh.
         MeshFileError: UVs are too large to be shown.
     """
     try:
@@ -42,7 +42,7 @@ def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
 
     Raises:
         MissingUVError: no triangle has UVs.
-        MeshError: the triangles are no mesh.
+        MeshError: the triangles are not a mesh.
         MeshFileError: UVs are too large to be shown.
     """
     measured = measure_mapped(mapped, strict=strict)

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
-from ..sparse.dense_model import GAIN, BestSets, DenseModel, above_rounding
+from ..sparse.dense_model import MIN_RELATIVE_GAIN, BestSets, DenseModel, above_rounding
 from ..sparse.fit_curvatures import fit_curvatures
 from .moves import Quanta, best_merge, best_pair, best_split, descend, energy_of
 
 # Exchanges tried at a time: for more than a hundred cones, what comes later gains little.
-EXCHANGES = 100
+MAX_EXCHANGES = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,12 +122,12 @@ class Lattice:
         """Return cones after merging and splitting, one pair at a time, has come to rest, or has taken long."""
         fixed = len(self.model.fixed)
         place, unchanged = fixed, 0
-        for _ in range(EXCHANGES):
+        for _ in range(MAX_EXCHANGES):
             if unchanged >= len(cones) - fixed:
                 break
             rest = self.without(cones, place)
             again = None if rest is None or not len(rest) else self.grown(rest)
-            if again is not None and again.energy < cones.energy * (1 - GAIN):
+            if again is not None and again.energy < cones.energy * (1 - MIN_RELATIVE_GAIN):
                 cones, unchanged = again, 0
             else:
                 unchanged += 1

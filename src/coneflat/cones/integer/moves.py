@@ -12,11 +12,11 @@ import numpy as np
 
 from ...base.arrays import BoolArray, FloatArray, IntArray
 from ...base.compiled import compiled
-from ..solution import TIE
+from ..solution import TIE_TOLERANCE
 from ..sparse.dense_model import first_least
 
 # Transfers of up to so many quanta at once, either way: of the quarter turns there is room for no more in a cone.
-REACH = 3
+MAX_QUANTA = 3
 
 
 class Quanta(NamedTuple):
@@ -75,7 +75,7 @@ def is_within(index: int, quanta: Quanta) -> bool:
 
 @compiled
 def without_members(usable: BoolArray, members: IntArray) -> BoolArray:
-    """Return a mask of the usable candidates that are no members."""
+    """Return a mask of the usable candidates that are not members."""
     free = usable.copy()
     for member in members:
         free[member] = False
@@ -103,20 +103,20 @@ def descend(
     free = without_members(usable, members)
     for _ in range(100 + 20 * size):  # comes to rest in a few per cone
         gradient = slopes(gram, slope, members, quantum, indices)
-        best, kind, one, other, amount = -TIE * abs(energy), 0, -1, -1, 0
+        best, kind, one, other, amount = -TIE_TOLERANCE * abs(energy), 0, -1, -1, 0
         for i in range(size):
             s = members[i]
             if not quanta.has_sum:
-                for d in range(-REACH, REACH + 1):
+                for d in range(-MAX_QUANTA, MAX_QUANTA + 1):
                     k = quantum * d
                     change = (2 * gradient[s] + k * gram[s, s]) * k
-                    if change < best - TIE * abs(best) and is_within(indices[i] + d, quanta):
+                    if change < best - TIE_TOLERANCE * abs(best) and is_within(indices[i] + d, quanta):
                         best, kind, one, amount = change, 1, i, d
             for j in range(size):
-                for d in range(1, REACH + 1 if i != j else 0):
+                for d in range(1, MAX_QUANTA + 1 if i != j else 0):
                     change = transfer(gram, gradient, s, members[j], quantum * d)
                     if (
-                        change < best - TIE * abs(best)
+                        change < best - TIE_TOLERANCE * abs(best)
                         and is_within(indices[i] - d, quanta)
                         and is_within(indices[j] + d, quanta)
                     ):
@@ -124,7 +124,7 @@ def descend(
             for t in range(count if i >= fixed else 0):
                 if free[t]:
                     change = transfer(gram, gradient, s, t, quantum * indices[i])
-                    if change < best - TIE * abs(best):
+                    if change < best - TIE_TOLERANCE * abs(best):
                         best, kind, one, other = change, 3, i, t
         if kind == 0:
             break
@@ -157,7 +157,7 @@ def best_split(
     free = without_members(usable, members)
     gradient = slopes(gram, slope, members, quanta.quantum, indices)
     best, chosen, amount, giver = np.inf, -1, 0, -1
-    for d in range(-REACH, REACH + 1):
+    for d in range(-MAX_QUANTA, MAX_QUANTA + 1):
         if not is_within(d, quanta):
             continue
         k = quanta.quantum * d
@@ -170,7 +170,7 @@ def best_split(
                         change = transfer(gram, gradient, members[i], t, k)
                     else:
                         change = (2 * gradient[t] + k * gram[t, t]) * k
-                    if chosen < 0 or change < best - TIE * abs(best):
+                    if chosen < 0 or change < best - TIE_TOLERANCE * abs(best):
                         best, chosen, amount, giver = change, t, d, i if quanta.has_sum else -1
     return chosen, amount, giver
 
@@ -213,6 +213,6 @@ def best_merge(
     for j in range(len(members)):
         if j != place and is_within(indices[j] + indices[place], quanta):
             change = transfer(gram, gradient, s, members[j], k)
-            if not is_found or change < best - TIE * abs(best):
+            if not is_found or change < best - TIE_TOLERANCE * abs(best):
                 best, chosen, is_found = change, j, True
     return is_found, chosen

@@ -13,32 +13,32 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
-from ...base.defaults import DISTORTION, LEAST_QUANTUM, TYPED
+from ...base.defaults import DISTORTION, LEAST_QUANTUM, TYPED_TOLERANCE
 from ...errors import CurvatureError, OptionError
 from ...geometry.handles import off_multiple
 from ...stages import ConeSolution
 from ..solution import FULL_TURN
-from ..sparse.dense_model import GAIN
-from ..sparse.exact_model import ROUNDS, WORTHWHILE
-from ..sparse.search import COARSE_DOUBT, ConeSearch
+from ..sparse.dense_model import MIN_RELATIVE_GAIN
+from ..sparse.exact_model import MAX_ROUNDS, MIN_PROMISED_GAIN
+from ..sparse.search import COARSE_MODEL_ERROR, ConeSearch
 from .lattice import IndexedCones, Lattice
 from .moves import Quanta
 
 # Vertices around each cone among which it may move, and moves of one or two cones at most.
-NEIGHBOURS, MOVES = 60, 30
+MAX_NEIGHBOURS, MAX_MOVES = 60, 30
 # How often to compare the linear model with the metric that it stands for.
-COMPARISONS = 4
+MAX_COMPARISONS = 4
 # Radians below which nothing is gained.
-ENOUGH = 1e-4
+MIN_GAIN = 1e-4
 
 
 # Curvature, radians, that stands for "no bound": more than that of any cone worth having.
 UNBOUNDED = 2000 * math.pi
 # The survey ends so many sizes after the goal is met, or after E has ceased to fall: more cones of whole quanta need
 # not be better.
-BEYOND, STALLED = 2, 5
+SIZES_PAST_GOAL, SIZES_PAST_STALL = 2, 5
 # Fewer cones are not sought from a number whose E^2 is more than so many times the goal.
-HOPELESS = 4.0
+MAX_ENERGY_RATIO = 4.0
 
 
 def align_handles(
@@ -61,8 +61,8 @@ def align_handles(
     by_curvature = operator.solve(np.ascontiguousarray(by_scale[:, operator.vertices].T))
     best, best_off = quantised, off_multiple(turned(quantised.solution), quantised.quantum)
     trial, off = best, best_off
-    for _ in range(COMPARISONS):
-        if np.abs(best_off).max() <= ENOUGH:
+    for _ in range(MAX_COMPARISONS):
+        if np.abs(best_off).max() <= MIN_GAIN:
             break
         moved = moved_cones(search, trial, by_curvature, off, bound)
         if np.array_equal(moved.solution.cones, trial.solution.cones):
@@ -89,7 +89,7 @@ def moved_cones(
     places = search.unknowns_of(quantised.solution.cones)
     curvatures = quantised.quantum * quantised.indices.astype(np.float64)
     before, caution = (places, off), 1.0
-    for _ in range(MOVES):
+    for _ in range(MAX_MOVES):
         here = search.solution_of(places, curvatures).log_scale[operator.vertices]
         slack = bound**2 - float(here @ operator.weighted(here))
         if slack < 0 and places is not before[0]:
@@ -105,12 +105,12 @@ def moved_cones(
         bending = np.concatenate(
             [search.exact.squared_distances(places[c], targets[cones == c]) for c in np.unique(cones)]
         )
-        dearer = 2 * k * (score[targets] - score[old]) + caution * k**2 * bending
+        costlier = 2 * k * (score[targets] - score[old]) + caution * k**2 * bending
         # The last stands for no move.
-        cones, turned, dearer = np.append(cones, -1), np.vstack([turned, 0 * off]), np.append(dearer, 0.0)
+        cones, turned, costlier = np.append(cones, -1), np.vstack([turned, 0 * off]), np.append(costlier, 0.0)
         missing = ((off + turned) ** 2).sum(axis=1)
         pairs = missing[:, None] + missing - (off**2).sum() + 2 * turned @ turned.T
-        pairs[(dearer[:, None] + dearer > max(slack, 0.0)) | (cones[:, None] == cones)] = np.inf
+        pairs[(costlier[:, None] + costlier > max(slack, 0.0)) | (cones[:, None] == cones)] = np.inf
         one, two = np.unravel_index(np.argmin(pairs), pairs.shape)
         if not pairs[one, two] < 0.9 * (off**2).sum():
             break
@@ -129,7 +129,7 @@ def _moves(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray]:
     """Return which cone, and whereto, of all moves to usable vertices nearby; required cones stay."""
     cones, targets = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for i in range(len(search.coarse.fixed), len(places)):
-        near = search.exact.near(int(places[i]), NEIGHBOURS)
+        near = search.exact.near(int(places[i]), MAX_NEIGHBOURS)
         near = near[~np.isin(near, places)]
         cones.append(np.full(len(near), i))
         targets.append(near)
@@ -138,7 +138,7 @@ def _moves(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray]:
 
 @dataclass(frozen=True, eq=False)
 class QuantisedCones:
-    """Cones with whole numbers of quanta.
+    """Cones with integers of quanta.
 
     Attributes:
         solution: the cones.
@@ -195,7 +195,7 @@ def quantise_cones(
         if polish(search, lattice, exact, size) <= goal:
             break
     for size in reversed(sizes[: sizes.index(first)]):
-        near = lattice.best.energy(size) <= goal * COARSE_DOUBT
+        near = lattice.best.energy(size) <= goal * COARSE_MODEL_ERROR
         if not near or not polish(search, lattice, exact, size) <= goal:
             break
     found = exact.best.fewest(goal)
@@ -207,22 +207,22 @@ def quantise_cones(
 
 def open_lattice(search: ConeSearch, quantum: float) -> Lattice:
     """Return the lattice of multiples of a quantum that a search's limits allow, without cones yet."""
-    if not LEAST_QUANTUM <= quantum <= FULL_TURN * (1 + TYPED):
+    if not LEAST_QUANTUM <= quantum <= FULL_TURN * (1 + TYPED_TOLERANCE):
         raise OptionError(f"quantum must be from {LEAST_QUANTUM:g} radians to 2 pi, not {quantum:g}")
     parts = round(FULL_TURN / quantum)
-    if abs(parts * quantum - FULL_TURN) <= TYPED * FULL_TURN:
+    if abs(parts * quantum - FULL_TURN) <= TYPED_TOLERANCE * FULL_TURN:
         quantum = FULL_TURN / parts
     limits = search.limits
     total = None
     if limits.has_sum:
         total = round(limits.total / quantum)
-        if abs(total * quantum - limits.total) > TYPED * max(abs(limits.total), 1.0):
+        if abs(total * quantum - limits.total) > TYPED_TOLERANCE * max(abs(limits.total), 1.0):
             raise CurvatureError(
-                f"curvatures must sum to 2 pi chi = {limits.total / np.pi:.6g} pi, which is no multiple of "
+                f"curvatures must sum to 2 pi chi = {limits.total / np.pi:.6g} pi, which is not a multiple of "
                 f"{quantum / np.pi:.6g} pi"
             )
-    least = math.ceil(max(limits.least, -UNBOUNDED) / quantum - TYPED)
-    most = math.floor(limits.most / quantum + TYPED)
+    least = math.ceil(max(limits.least, -UNBOUNDED) / quantum - TYPED_TOLERANCE)
+    most = math.floor(limits.most / quantum + TYPED_TOLERANCE)
     if (
         least > most
         or least == most == 0
@@ -244,7 +244,7 @@ def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
     """
     order, required = search.exact.in_order(members), len(search.exact.fixed)
     slope = search.exact.slope[members[order[required:]]]
-    steps = np.round(slope / max(GAIN * np.abs(slope).max(initial=0.0), np.finfo(float).tiny))
+    steps = np.round(slope / max(MIN_RELATIVE_GAIN * np.abs(slope).max(initial=0.0), np.finfo(float).tiny))
     return np.append(order[:required], order[required:][np.argsort(-steps, kind="stable")])
 
 
@@ -253,7 +253,7 @@ def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None
     model, best = search.coarse, lattice.best
     fewest = max(lattice.fewest, len(model.fixed))
     most = min(most + 1, search.most_cones)
-    model.climb(goal / COARSE_DOUBT, most)
+    model.climb(goal / COARSE_MODEL_ERROR, most)
     for found in model.best:
         _offer(lattice, lattice.rounded(found.members))
     if not best.sizes:
@@ -262,14 +262,14 @@ def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None
             return
         best.offer(lattice.exchanged(start))
     size, beyond, stalled, least = min(best.sizes), 0, 0, math.inf
-    while size < most and beyond < BEYOND and stalled < STALLED:
+    while size < most and beyond < SIZES_PAST_GOAL and stalled < SIZES_PAST_STALL:
         _offer(lattice, lattice.grown(best[size]), most)
         size = min((other for other in best.sizes if other > size), default=most)
         beyond += best.energy(size) <= goal
-        stalled = 0 if best.energy(size) < least * (1 - WORTHWHILE) else stalled + 1
+        stalled = 0 if best.energy(size) < least * (1 - MIN_PROMISED_GAIN) else stalled + 1
         least = min(least, best.energy(size))
     for size in reversed(best.sizes):
-        if best.energy(size) > goal * HOPELESS and size < most:
+        if best.energy(size) > goal * MAX_ENERGY_RATIO and size < most:
             break
         _offer(lattice, lattice.shrunk(best[size]), most)
 
@@ -279,7 +279,7 @@ def _offer(lattice: Lattice, cones: IndexedCones | None, most: float = math.inf)
     if (
         cones is not None
         and len(cones) <= most
-        and cones.energy < COARSE_DOUBT * lattice.best.energy(len(cones))
+        and cones.energy < COARSE_MODEL_ERROR * lattice.best.energy(len(cones))
     ):
         lattice.best.offer(lattice.exchanged(cones))
 
@@ -289,13 +289,13 @@ def polish(search: ConeSearch, lattice: Lattice, exact: Lattice, size: int) -> f
     model, start = search.exact, lattice.best[size]
     members = model.insert(search.places[start.members])
     cones = exact.exchanged(exact.descended(members, start.indices))
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         known = len(model.unknowns)
         model.insert(model.targets(cones.members, exact.curvatures(cones), cones.energy))
         if len(model.unknowns) == known:
             break
         moved = exact.exchanged(exact.descended(cones.members, cones.indices))
-        stalled = not moved.energy < cones.energy * (1 - WORTHWHILE)
+        stalled = not moved.energy < cones.energy * (1 - MIN_PROMISED_GAIN)
         cones = moved
         if stalled:
             break

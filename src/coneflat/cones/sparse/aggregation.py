@@ -13,23 +13,23 @@ from scipy.sparse import csr_matrix, diags
 
 from ...base.arrays import FloatArray, IntArray
 from ...base.compiled import compiled
-from ..solution import TIE
+from ..solution import TIE_TOLERANCE
 
 # Largest factor by which one level shrinks the model: an aggregate is a vertex and its neighbours.
 LARGEST_AGGREGATE = 7.0
 # Couplings below this share of the geometric mean of the diagonals do not join vertices: across slivers, and to hubs,
 # whose aggregates would swallow all around them.
-WEAK = 0.02
+MIN_COUPLING = 0.02
 # Damping of the Jacobi step that smooths the aggregates: 4/3 over the largest eigenvalue of D^-1 L, about 2.
 DAMPING = 2 / 3
 # Entries below this share of what is large in their row are rounding.
-ROUNDED = 1e-12
+RELATIVE_ROUNDING = 1e-12
 # Functions that meet at an unknown at most, or it is not smoothed: a hub, which would join all of them to one another.
-MEETING = 100
+MAX_MEETING_FUNCTIONS = 100
 # The last level has at most so many times the number of functions wanted, if smaller aggregates can do it.
-CLOSE = 1.05
+MAX_SIZE_RATIO = 1.05
 # A level with more than this share of the unknowns of the one before is no progress.
-STUCK = 0.9
+MAX_LEVEL_SHARE = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,9 +62,9 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
         ratio = level.shape[0] / size
         steps = max(1, round(np.log(ratio) / np.log(LARGEST_AGGREGATE)))
         most = size if steps == 1 else None
-        for weak in (WEAK, 0.0):
+        for weak in (MIN_COUPLING, 0.0):  # all couplings may be weak, as on slivers
             part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most, weak)
-            if part.shape[1] <= STUCK * level.shape[0]:
+            if part.shape[1] <= MAX_LEVEL_SHARE * level.shape[0]:
                 break
         else:
             # Hardly anything is coupled, as on a strip between two boundaries: whatever is next in order.
@@ -92,20 +92,23 @@ def _pieces(labels: IntArray, number: int) -> csr_matrix:
 def _smoothed_aggregates(
     level: csr_matrix, order: IntArray, size: float, most: int | None, weak: float
 ) -> csr_matrix:
-    """Return basis functions made of about `size` vertices each, `most` of them if that can be had."""
+    """Return basis functions made of about `size` vertices each, `most` of them if that can be had.
+
+    Couplings below the share `weak` do not join vertices.
+    """
     count = level.shape[0]
     diagonal = np.maximum(level.diagonal(), 1e-300)
     rows = level.indptr.astype(np.int64), level.indices.astype(np.int64), level.data, diagonal, order
     labels, number = aggregate(*rows, size, weak)
     before = count + 1
-    while most is not None and most * CLOSE < number < before:
+    while most is not None and most * MAX_SIZE_RATIO < number < before:
         # Vertices left over make aggregates smaller than wished, and another level for that little makes all dense.
         size *= number / most
         before = number
         labels, number = aggregate(*rows, size, weak)
     pieces = _pieces(labels, number)
     image = csr_matrix(level @ pieces)
-    damping = np.where(np.diff(image.indptr) > MEETING, 0.0, DAMPING / diagonal)
+    damping = np.where(np.diff(image.indptr) > MAX_MEETING_FUNCTIONS, 0.0, DAMPING / diagonal)
     smoothed = csr_matrix(pieces - diags(damping) @ image)
     return _without_rounding(smoothed, np.ones(count))
 
@@ -117,7 +120,7 @@ def _without_rounding(matrix: csr_matrix, sizes: FloatArray) -> csr_matrix:
     which aggregates are made must not depend on that.
     """
     kept = matrix.copy()
-    kept.data[np.abs(kept.data) <= ROUNDED * np.repeat(sizes, np.diff(kept.indptr))] = 0.0
+    kept.data[np.abs(kept.data) <= RELATIVE_ROUNDING * np.repeat(sizes, np.diff(kept.indptr))] = 0.0
     kept.eliminate_zeros()
     return kept
 
@@ -135,7 +138,7 @@ def aggregate(
     """Return (n,) the aggregate of each vertex, and their number.
 
     A vertex whose neighbours are mostly free takes those that are coupled most strongly; leftovers join their strongest
-    neighbour's aggregate.
+    neighbour's aggregate. Couplings below the share `weak` of the geometric mean of the diagonals do not count.
     """
     count = len(diagonal)
     labels = np.full(count, -1, np.int64)
@@ -164,7 +167,7 @@ def aggregate(
                 other = indices[e]
                 if other != vertex and labels[other] < 0:
                     strength = -weights[e] / np.sqrt(diagonal[vertex] * diagonal[other])
-                    if strength > best * (1 + TIE):
+                    if strength > best * (1 + TIE_TOLERANCE):
                         strongest, best = other, strength
             if strongest < 0:
                 break
@@ -178,7 +181,7 @@ def aggregate(
         strongest, best = -1, 0.0
         for e in range(indptr[vertex], indptr[vertex + 1]):
             other = indices[e]
-            if other != vertex and labels[other] >= 0 and -weights[e] > best * (1 + TIE):
+            if other != vertex and labels[other] >= 0 and -weights[e] > best * (1 + TIE_TOLERANCE):
                 strongest, best = other, -weights[e]
         if strongest >= 0:
             joined[vertex] = labels[strongest]
@@ -206,6 +209,6 @@ def representatives(basis: csr_matrix, fitness: FloatArray) -> IntArray:
     column = np.repeat(np.arange(basis.shape[1]), np.diff(columns.indptr))
     largest = np.zeros(basis.shape[1])
     np.maximum.at(largest, column, columns.data)
-    is_largest = (columns.data > 0) & (columns.data >= largest[column] * (1 - TIE))
+    is_largest = (columns.data > 0) & (columns.data >= largest[column] * (1 - TIE_TOLERANCE))
     _, first = np.unique(column[is_largest], return_index=True)
     return np.unique(columns.indices[is_largest][first]).astype(np.int64)

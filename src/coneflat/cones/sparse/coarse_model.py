@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 from ...base.arrays import FloatArray, IntArray
 from ...base.compiled import compiled
 from ...errors import MetricError
-from ..solution import TIE
+from ..solution import TIE_TOLERANCE
 from .aggregation import coarse_basis, representatives
 from .green import GreenOperator
 
@@ -51,7 +51,7 @@ class CoarseModel:
         one number takes most of the error away.
         """
         # A surface that is evenly curved has no E to compare.
-        scale = constant / self.constant if min(constant, self.constant) > TIE**2 else 1.0
+        scale = constant / self.constant if min(constant, self.constant) > TIE_TOLERANCE**2 else 1.0
         return CoarseModel(self.basis, self.kernel * scale, self.slope * scale, constant)
 
     def squared_distances(self, one: int, others: IntArray) -> FloatArray:

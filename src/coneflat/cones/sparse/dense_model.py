@@ -16,16 +16,16 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from ...base.arrays import BoolArray, FloatArray, IntArray
-from ..solution import TIE
+from ..solution import TIE_TOLERANCE
 from .fit_curvatures import fit_curvatures, inverse_with_sum
 from .limits import Limits
 
 # A set must lower E^2 by this share to replace one of its size: rounding must not decide.
-GAIN = 1e-6
+MIN_RELATIVE_GAIN = 1e-6
 # Part of a cone's own energy that the others must leave, or it depends on them.
-DEPENDENT = 1e-10
+MIN_INDEPENDENT_SHARE = 1e-10
 # So many cones more that bring E^2 down by less than this factor are no use: bounds are in the way.
-STALL, STALLED = 10, 0.99
+STALL_CONES, STALL_FACTOR = 10, 0.99
 
 
 class Sized(Protocol):
@@ -83,7 +83,7 @@ class BestSets(Generic[SetT]):
 
     def offer(self, found: SetT) -> bool:
         """Keep a set if it is the best of its size, and tell so."""
-        is_better = found.energy < self.energy(len(found)) * (1 - GAIN)
+        is_better = found.energy < self.energy(len(found)) * (1 - MIN_RELATIVE_GAIN)
         if is_better:
             self._sets[len(found)] = found
         return is_better
@@ -126,7 +126,7 @@ def firsts_least(values: FloatArray) -> IntArray:
     """Return (r,) the first column of each row (r, c) whose value is the least but for rounding."""
     least = values.min(axis=1)
     finite = np.where(np.isfinite(least), least, 0.0)
-    columns: IntArray = (values <= (least + TIE * np.abs(finite))[:, None]).argmax(axis=1)
+    columns: IntArray = (values <= (least + TIE_TOLERANCE * np.abs(finite))[:, None]).argmax(axis=1)
     return columns
 
 
@@ -176,7 +176,7 @@ class DenseModel:
         if limits.has_sum and not len(free):
             free = members[:1]
         remain, _, _ = self._project(free)
-        is_apart = remain > TIE * diagonal
+        is_apart = remain > TIE_TOLERANCE * diagonal
         gradient = self._gradient(members, fitted)
         x = -gradient / np.where(is_apart, remain, 1.0)
         if fitted.feasible:
@@ -192,7 +192,7 @@ class DenseModel:
         change, which = np.full(len(members), np.inf), np.full(len(members), -1)
         diagonal, places = self.gram.diagonal(), np.flatnonzero(self._inside(members, fitted))
         remain, rows, kept = self._project(members[places])
-        is_moved = (places >= len(self.fixed)) & (kept * diagonal[members[places]] > DEPENDENT)
+        is_moved = (places >= len(self.fixed)) & (kept * diagonal[members[places]] > MIN_INDEPENDENT_SHARE)
         is_open = self.usable.copy()
         is_open[members] = False
         candidates = np.flatnonzero(is_open)
@@ -203,7 +203,7 @@ class DenseModel:
         k = fitted.curvatures[places, None]
         h = remain[candidates] + w * w * share
         g = self._gradient(members, fitted)[candidates] - w * k * share
-        is_apart = h > TIE * diagonal[candidates]
+        is_apart = h > TIE_TOLERANCE * diagonal[candidates]
         x = np.clip(-g / np.where(is_apart, h, 1.0), self.least[candidates], self.limits.most)
         values = np.where(is_apart, k * k * share + (2 * g + h * x) * x, np.inf)
         best = firsts_least(values)
@@ -213,7 +213,7 @@ class DenseModel:
     def _inside(self, members: IntArray, fitted: Fit) -> BoolArray:
         """Return (s,) which members' curvatures no bound holds."""
         k = fitted.curvatures
-        span = TIE * (1.0 + np.abs(k))
+        span = TIE_TOLERANCE * (1.0 + np.abs(k))
         inside: BoolArray = (self.least[members] + span < k) & (k < self.limits.most - span)
         return inside
 
@@ -275,13 +275,13 @@ class DenseModel:
             change, which = self.swaps(members, fitted)
             for _ in range(len(members)):
                 place = first_least(change)
-                if not change[place] <= -GAIN * fitted.energy:
+                if not change[place] <= -MIN_RELATIVE_GAIN * fitted.energy:
                     break
                 change[place] = np.inf
                 tried = members.copy()
                 tried[place] = which[place]
                 found = self.fit(tried)
-                if found.energy < fitted.energy * (1 - GAIN):
+                if found.energy < fitted.energy * (1 - MIN_RELATIVE_GAIN):
                     members, fitted, improved = tried, found, True
                     break
         return ConeSet(fitted.energy, members)
@@ -296,7 +296,7 @@ class DenseModel:
             if (
                 size >= most
                 or energy <= bound
-                or energy >= STALLED * self.best.energy(size - STALL) < math.inf
+                or energy >= STALL_FACTOR * self.best.energy(size - STALL_CONES) < math.inf
             ):
                 break
             members = self.grown(self.best[size].members if size in self.best else found.members)

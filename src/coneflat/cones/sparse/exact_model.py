@@ -11,9 +11,9 @@ from .limits import Limits
 from .linear_model import LinearModel
 
 # A move is tried if it promises to lower E^2 by this share.
-WORTHWHILE = 1e-3
+MIN_PROMISED_GAIN = 1e-3
 # Rounds of moves for a set of cones; most come to rest after three or four.
-ROUNDS = 12
+MAX_ROUNDS = 12
 
 
 class ExactModel(DenseModel):
@@ -104,14 +104,14 @@ class ExactModel(DenseModel):
         """Move cones over the mesh until E comes to rest; return E^2 of the best set of their number."""
         found = self.exchanged(members)
         self.best.offer(found)
-        for _ in range(ROUNDS):
+        for _ in range(MAX_ROUNDS):
             known, before = len(self.unknowns), found.energy
             self.insert(self.targets(found.members, self.fit(found.members).curvatures, before))
             if len(self.unknowns) == known:
                 break
             found = self.exchanged(found.members)
             self.best.offer(found)
-            if not found.energy < before * (1 - WORTHWHILE):
+            if not found.energy < before * (1 - MIN_PROMISED_GAIN):
                 break
         return self.best.energy(len(found))
 
@@ -135,7 +135,7 @@ class ExactModel(DenseModel):
                 continue
             change = 2 * k * (score[near] - score[s]) + k * k * self.squared_distances(s, near)
             best = first_least(change)
-            if change[best] < -WORTHWHILE * energy:
+            if change[best] < -MIN_PROMISED_GAIN * energy:
                 targets.append(int(near[best]))
         return np.unique(np.array(targets, dtype=np.int64))
 

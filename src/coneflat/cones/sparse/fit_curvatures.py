@@ -9,15 +9,15 @@ import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
 from ...base.compiled import compiled
-from ..solution import TIE
+from ..solution import TIE_TOLERANCE
 
 # What is added to the diagonal, as a share of its largest entry: cones on neighbouring vertices are nearly dependent.
 SMALLEST_PIVOT = 1e-13
 # What a multiplier may be off by, relative to the largest gradient, before its bound is released.
-RELEASE = 1e-11
+RELEASE_TOLERANCE = 1e-11
 # Steps after which changing bounds all at once is given up, as it may cycle. One by one alone takes twelve times as
 # long for the 173 cones of 49 handles, most of which are at a bound.
-AT_ONCE = 20
+MAX_STEPS_AT_ONCE = 20
 
 
 def fit_curvatures(
@@ -34,7 +34,7 @@ def fit_curvatures(
     """
     has_sum = not math.isnan(total)
     if not len(slope):
-        return np.zeros(0), 0.0, not has_sum or abs(total) < TIE
+        return np.zeros(0), 0.0, not has_sum or abs(total) < TIE_TOLERANCE
     slack = 1e-12 * (1.0 + abs(total))
     feasible = not has_sum or bool(least.sum() - slack <= total <= most.sum() + slack)
     if not feasible:
@@ -94,7 +94,7 @@ class _Program:
                 continue
             # Whether one held at a bound would rather leave it.
             gradient = self.gram @ curvatures + self.slope
-            nothing = RELEASE * float(np.abs(gradient).max())
+            nothing = RELEASE_TOLERANCE * float(np.abs(gradient).max())
             high = int(np.where(state == 1, gradient, -np.inf).argmax())
             low = int(np.where(state == -1, gradient, np.inf).argmin())
             has_high, has_low = state[high] == 1, state[low] == -1
@@ -183,7 +183,7 @@ def change_at_once(
     """
     size = len(slope)
     state, curvatures, gradient = np.zeros(size, np.int64), np.zeros(size), np.empty(size)
-    for _ in range(AT_ONCE):
+    for _ in range(MAX_STEPS_AT_ONCE):
         free, best, multiplier = best_free(gram, slope, total, state, curvatures)
         if not len(free):
             return None
@@ -193,7 +193,7 @@ def change_at_once(
             gradient[i] = slope[i]
             for j in range(size):
                 gradient[i] += gram[i, j] * curvatures[j]
-            nothing = max(nothing, RELEASE * abs(gradient[i]))
+            nothing = max(nothing, RELEASE_TOLERANCE * abs(gradient[i]))
         for i in range(size):
             new = state[i]
             if new == 0:

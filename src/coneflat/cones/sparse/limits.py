@@ -10,7 +10,7 @@ import numpy as np
 from ...base.arrays import BoolArray, IntArray
 from ...base.text import plural
 from ...errors import CurvatureError, OptionError
-from ..solution import FULL_TURN, TIE
+from ..solution import FULL_TURN, TIE_TOLERANCE
 
 # More cones than these, beside the required ones, are not searched for: a seam through them all is no use.
 MOST_SEARCHED = 200
@@ -74,7 +74,7 @@ class Limits:
     @property
     def fewest(self) -> int:
         """The least number of cones that can carry the total."""
-        if not self.has_sum or abs(self.total) < TIE:
+        if not self.has_sum or abs(self.total) < TIE_TOLERANCE:
             return 0
         bound = self.most if self.total > 0 else self.least
         return math.ceil(self.total / bound - 1e-9) if math.isfinite(bound) else 1
@@ -110,7 +110,7 @@ class Limits:
     def check_count(self, count: int, required: int) -> None:
         """Raise an error if so many cones, `required` of them given, cannot carry the curvature."""
         if isinstance(count, bool) or count != int(count) or count < 0:
-            raise OptionError(f"the number of cones must be a whole number and not negative, not {count!r}")
+            raise OptionError(f"the number of cones must be an integer and not negative, not {count!r}")
         if count < required:
             raise CurvatureError(f"{plural(required, 'cone')} required, but only {count} allowed")
         if count < self.fewest:

@@ -5,7 +5,7 @@ small norm of phi is sparse approximation. The literature goes from relaxations 
 "Optimal cone singularities for conformal flattening", 2018; Q. Fang, W. Ouyang, M. Li, L. Liu, X.-M. Fu, "Computing
 sparse cones with bounded distortion for conformal parameterizations", 2021) to moving given cones (M. Li, Q. Fang,
 Z. Zhang, L. Liu, X.-M. Fu, "Efficient cone singularity construction for conformal parameterizations", 2023). Here
-positions are exchanged, as in subset selection, on a dense coarse model, where that costs next to nothing, and finished
+positions are exchanged, as in subset selection, on a dense coarse model, where that is cheap, and finished
 with exact energies.
 """
 
@@ -29,7 +29,7 @@ from ...geometry.operators import vertex_areas, weighted_areas
 from ...mesh.connectivity import TriangleMesh
 from ...mesh.ties import tie_key as key_of_shape
 from ...stages import ConeSolution
-from ..solution import FULL_TURN, TIE
+from ..solution import FULL_TURN, TIE_TOLERANCE
 from .coarse_model import candidates
 from .dense_model import ConeSet, DenseModel
 from .exact_model import ExactModel
@@ -37,9 +37,9 @@ from .limits import MOST_SEARCHED, Limits
 from .linear_model import LinearModel
 
 # How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself.
-COARSE_DOUBT = 1.35
+COARSE_MODEL_ERROR = 1.35
 # Where the best set of a size misses by less than this factor of E^2, moves on the mesh may make up for it.
-NEAR = 1.15
+MAX_REFINED_RATIO = 1.15
 
 
 @dataclass(frozen=True)
@@ -230,13 +230,13 @@ class ConeSearch:
         found: list[SparseCones] = []
         for count in self.exact.best.sizes:
             cones = self._cones(self.exact.best[count])
-            if count <= most and (not found or cones.distortion < found[-1].distortion - TIE):
+            if count <= most and (not found or cones.distortion < found[-1].distortion - TIE_TOLERANCE):
                 found.append(cones)
         return found
 
     def _survey(self, goal: float, most: int) -> int:
         """Find good sets of all sizes up to the one that is needed, and a little on, on the coarse model; return it."""
-        self._climb(goal / COARSE_DOUBT, most, most)
+        self._climb(goal / COARSE_MODEL_ERROR, most, most)
         count = len(self.coarse.best.fewest(goal, most))
         self.coarse.descend(count - 3, count + 1)
         return len(self.coarse.best.fewest(goal, most))
@@ -274,7 +274,9 @@ class ConeSearch:
             return False
         coarse, exact = self.coarse.best, self.exact.best
         expected = exact.energy(count + 1) * coarse.energy(count)
-        return exact.energy(count) <= NEAR * goal or expected <= NEAR * goal * coarse.energy(count + 1)
+        return exact.energy(
+            count
+        ) <= MAX_REFINED_RATIO * goal or expected <= MAX_REFINED_RATIO * goal * coarse.energy(count + 1)
 
     def _climb(self, bound: float, most: int, count: int) -> None:
         """Find sets on the coarse model, of at most `most` cones; it is an error if none has `count` or fewer."""
@@ -307,7 +309,7 @@ class ConeSearch:
         unknowns, required = self.exact.unknowns, len(self._required)
         members = found.members[self.exact.in_order(found.members)]
         curvatures = self.exact.fit(members).curvatures
-        keep = np.abs(curvatures) > TIE
+        keep = np.abs(curvatures) > TIE_TOLERANCE
         keep[:required] = True
         kept = curvatures[keep]
         if self.limits.has_sum and len(kept):
@@ -325,7 +327,7 @@ def required_vertices(required: Iterable[int], is_boundary: BoolArray) -> IntArr
     cones = np.array(list(required), dtype=np.int64)
     bad = cones[(cones < 0) | (cones >= len(is_boundary))]
     if len(bad):
-        raise OptionError(f"required cones are no vertices of the mesh: {list_some(bad)}")
+        raise OptionError(f"required cones are not vertices of the mesh: {list_some(bad)}")
     if len(np.unique(cones)) < len(cones):
         raise OptionError("a required cone is given twice")
     if is_boundary[cones].any():

@@ -1,4 +1,4 @@
-"""The JSON and the arrays of glTF 2.0 files, every reference checked before anything is allocated.
+"""The JSON and the arrays of glTF 2.0 files, the references that arrays follow checked before anything is allocated.
 
 An own reader, because no library keeps all of what a GLB that is written has to reproduce, nor looks at what a file
 asks for before it is given. Names and numbers are those of the specification (Khronos, glTF 2.0, Sections 3.6, 4.4).
@@ -76,7 +76,7 @@ class GltfData:
         except ValueError as error:
             raise MeshFileError(f"{path} is not a readable glTF file: its JSON is broken: {error}") from error
         if not isinstance(tree, dict):
-            raise MeshFileError(f"{path} is not a glTF file: its JSON is no object")
+            raise MeshFileError(f"{path} is not a glTF file: its JSON is not an object")
         self.tree: Item = tree
         version = str(self.entry(tree, "asset", dict).get("version", "2.0"))
         if not version.startswith("2."):
@@ -88,7 +88,7 @@ class GltfData:
         self._check_names()
 
     def _check_names(self) -> None:
-        """Refuse names that are no text: a GLB written keeps them, and other programs stumble over them."""
+        """Refuse names that are not text: a GLB written keeps them, and other programs stumble over them."""
         for kind, items in self.tree.items():
             for i, item in enumerate(items if isinstance(items, list) else ()):
                 if isinstance(item, dict) and not isinstance(item.get("name", ""), str):
@@ -106,18 +106,18 @@ class GltfData:
         """Return the list or the object that an object has under a name, or an empty one; others are refused."""
         value = item.get(name, kind()) if isinstance(item, dict) else None
         if not isinstance(value, kind):
-            self.fail(f"{name!r} is no {'list' if kind is list else 'object'} where there should be one")
+            self.fail(f"{name!r} is not {'a list' if kind is list else 'an object'}")
         return value
 
     def item(self, name: str, index: Any) -> Item:
         """Return an object of one of the tree's lists, such as "meshes"."""
         every = self.tree.get(name, [])
         if not isinstance(every, list):
-            self.fail(f"{name!r} is no list")
+            self.fail(f"{name!r} is not a list")
         if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(every):
             self.fail(f"{str(index)[:20]} is none of its {len(every)} {name}")
         if not isinstance(every[index], dict):
-            self.fail(f"number {index} of its {name} is no object")
+            self.fail(f"number {index} of its {name} is not an object")
         return Item(every[index])
 
     def items(self, name: str) -> Iterator[Item]:
@@ -166,7 +166,7 @@ class GltfData:
         return rows
 
     def values(self, index: Any, columns: int) -> FloatArray:
-        """Return (count, columns) an array of vectors as doubles; whole numbers that stand for fractions as these.
+        """Return (count, columns) an array of vectors as doubles; integers that stand for fractions as these.
 
         Raises:
             MeshFileError: as of `raw`; or it has another number of columns.
@@ -187,10 +187,10 @@ class GltfData:
         return np.ascontiguousarray(self.raw(index)).view(form.kind).reshape(-1).astype(np.int64)
 
     def count(self, item: Item, name: str, default: int | None = None) -> int:
-        """Return a whole number, 0 and up, that an object has."""
+        """Return an integer, 0 and up, that an object has."""
         value = item.get(name, default)
         if not isinstance(value, int) or isinstance(value, bool) or value < 0:
-            self.fail(f"{name!r} is {str(value)[:20]}, not a whole number")
+            self.fail(f"{name!r} is {str(value)[:20]}, not an integer")
         return value
 
     def beside(self, uri: str) -> Path:
@@ -233,7 +233,7 @@ class GltfData:
             if uri is None:
                 found = binary if i == 0 else None
             elif not isinstance(uri, str):
-                self.fail(f"the address of buffer {i} is no text")
+                self.fail(f"the address of buffer {i} is not text")
             elif uri.startswith("data:"):
                 found = self.decoded(uri, f"buffer {i}")
             elif "://" in uri:

@@ -78,7 +78,7 @@ def parse_gltf(path: Path, content: bytes) -> MeshFile:
         MeshFileError: the file is broken, or its data are compressed in a way that cannot be decoded.
     """
     reading = _Reading(GltfData(path, content))
-    # What is no number, or becomes none under a transform, is passed on.
+    # What is not a number, or becomes none under a transform, is passed on.
     with np.errstate(all="ignore"):
         for node, matrix in shown_nodes(reading.data):
             mesh = reading.data.item("nodes", node).get("mesh")
@@ -237,7 +237,7 @@ def shown_nodes(data: GltfData) -> Iterator[tuple[int, FloatArray]]:
     A file without a scene shows all its nodes.
 
     Raises:
-        MeshFileError: nodes are no trees, or their transforms no numbers.
+        MeshFileError: nodes are not trees, or their transforms no numbers.
     """
     seen: set[int] = set()
     stack = [(node, np.eye(4)) for node in reversed(_roots(data))]

@@ -1,4 +1,4 @@
-"""Newton's method on the distortion of triangles, none of which is ever turned over."""
+"""Newton's method on the distortion of triangles, none of which is ever flipped."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from .energies import Energy
 from .motions import Motions
 
 # Part of the energy, and of the way to where the constraints hold, that is lost in a sum.
-ROUNDING = 1e-12
+RELATIVE_ROUNDING = 1e-12
 # Where the constraints hold is out of reach after a step that goes less than this part of the way.
-STUCK = 1e-3
+MIN_PROGRESS = 1e-3
 # Part of the way that a step goes at most where seams and sides have to turn: on a longer one, sides fold over.
 TURNING_STRIDE = 0.1
 # Once less than this part of the unknowns is in parts that are not at their least, these go on alone.
-FEW = 0.6
+MIN_ACTIVE_SHARE = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ def descend(
     goes as far towards them as triangles allow (an infeasible start: Boyd and Vandenberghe 2004, Section 10.3).
 
     Args:
-        points: (u,) where no triangle that moves is turned over.
+        points: (u,) where no triangle that moves is flipped.
         motions: how they move.
         elements: the triangles that do.
         energy: what is minimised.
@@ -88,8 +88,8 @@ def descend(
     active = np.ones(parts, dtype=bool)
     factor: Factor | None = None
     taken = 0
-    while taken < steps and ((elements.count and active.any()) or remaining > ROUNDING):
-        if not together and elements.count and active[unknown_part].mean() < FEW:
+    while taken < steps and ((elements.count and active.any()) or remaining > RELATIVE_ROUNDING):
+        if not together and elements.count and active[unknown_part].mean() < MIN_ACTIVE_SHARE:
             done += float(here[~active].sum())
             elements, of_chosen = elements.of_parts(active)
             unknowns, here, least = unknowns[of_chosen], here[active], least[active]
@@ -102,7 +102,7 @@ def descend(
             raise MetricError(f"relaxation found no finite step of {elements.count:,} unknowns")
         slope = np.bincount(unknown_part, gradient * step[:-1], parts)
         if not remaining:
-            active &= -slope > np.maximum(tolerance * (here - least), ROUNDING * here)
+            active &= -slope > np.maximum(tolerance * (here - least), RELATIVE_ROUNDING * here)
             step[:-1][~active[unknown_part]] = 0.0
             if not active.any():
                 break
@@ -130,8 +130,8 @@ def descend(
         here = sums(elements.energies(energy, maps))
         if remaining:
             remaining = 1.0 - float(total[-1])
-            remaining = remaining if remaining > ROUNDING else 0.0
-            if length[0] < STUCK:
+            remaining = remaining if remaining > RELATIVE_ROUNDING else 0.0
+            if length[0] < MIN_PROGRESS:
                 break
         if tell is not None and tell(taken, done + float(here.sum())):
             break

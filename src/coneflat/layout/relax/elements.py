@@ -23,7 +23,7 @@ from .motions import Motions
 # Part of the step to where a triangle would have no area that is taken at most (Smith and Schaefer 2015).
 SHORT_OF_FLAT = 0.9
 # Part of diagonal entries that is added to them: what nothing holds may turn and shift as a whole.
-RIDGE = 1e-10
+RELATIVE_RIDGE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Maps:
         return Maps(self.a + length * step.a, self.b + length * step.b)
 
     def singular_values(self) -> tuple[FloatArray, FloatArray]:
-        """Return (f,) the larger and the smaller one; the smaller is negative where the map is turned over."""
+        """Return (f,) the larger and the smaller one; the smaller is negative where the map is flipped."""
         one, two = np.abs(self.a), np.abs(self.b)
         return one + two, one - two
 
@@ -146,11 +146,11 @@ class Elements:
         return Maps(sums[0], sums[1])
 
     def energies(self, energy: Energy, maps: Maps) -> FloatArray:
-        """Return (f,) the energy of each triangle; infinite where it is turned over."""
+        """Return (f,) the energy of each triangle; infinite where it is flipped."""
         one, two = maps.singular_values()
-        upright = two > 0
+        is_positive = two > 0
         values = np.full(len(one), np.inf)
-        values[upright] = energy.values(one[upright], two[upright]) * self.weight[upright]
+        values[is_positive] = energy.values(one[is_positive], two[is_positive]) * self.weight[is_positive]
         return values
 
     def newton_system(
@@ -212,7 +212,7 @@ class Elements:
             pull,
             values,
         )
-        values[self._diagonal] *= 1 + RIDGE
+        values[self._diagonal] *= 1 + RELATIVE_RIDGE
         self._matrix.data = values
         return gradient[: self.count], offset * pull[: self.count], self._matrix
 

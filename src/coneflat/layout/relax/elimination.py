@@ -12,13 +12,13 @@ from ...base.arrays import FloatArray, IntArray
 from ...mesh.connectivity import label_components
 
 # Relative size below which what elimination leaves of an equation, or of a coefficient of integers, is rounding.
-ROUNDING = 1e-10
+RELATIVE_ROUNDING = 1e-10
 # Coefficients of an orthogonal basis below this are none; what is taken for none is missed by the sides of seams.
-TINY = 1e-15
+ZERO_COEFFICIENT = 1e-15
 # Part of the largest coefficient of an equation that a pivot has at least.
-PIVOT = 0.5
+MIN_PIVOT_SHARE = 0.5
 # Columns that LAPACK turns together.
-PANEL = 32
+PANEL_COLUMNS = 32
 
 
 def sparse_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, FloatArray]:
@@ -41,14 +41,14 @@ def sparse_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, F
     is_open = np.ones(len(work), dtype=bool)
     solved: list[tuple[int, int]] = []
     while True:
-        filled = np.abs(work[:, :count]) > ROUNDING
+        filled = np.abs(work[:, :count]) > RELATIVE_ROUNDING
         sizes = np.where(is_open, filled.sum(axis=1), count + 1)
         sizes[is_open & (sizes == 0)] = count + 1
         row = int(np.argmin(sizes))
         if sizes[row] > count:
             break
         size = np.abs(work[row, :count])
-        columns = np.flatnonzero(size >= PIVOT * size.max())
+        columns = np.flatnonzero(size >= MIN_PIVOT_SHARE * size.max())
         column = int(columns[np.argmin(filled[:, columns].sum(axis=0))])
         work[row] /= work[row, column]
         others = np.flatnonzero(filled[:, column])
@@ -64,7 +64,7 @@ def sparse_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, F
     basis[free, np.arange(len(free))] = 1.0
     basis[pivots, :-1] = -work[np.ix_(at, free)]
     basis[pivots, -1] = work[at, count]
-    basis[np.abs(basis) < ROUNDING * max(1.0, float(np.abs(basis).max(initial=0.0)))] = 0.0
+    basis[np.abs(basis) < RELATIVE_ROUNDING * max(1.0, float(np.abs(basis).max(initial=0.0)))] = 0.0
     return csr_matrix(basis), work[is_open, count]
 
 
@@ -130,13 +130,13 @@ def _solutions_of_block(rows: FloatArray, right: FloatArray) -> tuple[FloatArray
     if not height:
         return np.eye(width), np.zeros(width), right
     # By LAPACK itself: there may be thousands of blocks, and SciPy's checks take longer than all of it.
-    r, pivots, scales, _, _ = lapack.dgeqp3(rows, lwork=(width + 1) * PANEL)
-    turned = lapack.dormqr("L", "T", r[:, : len(scales)], scales, right[:, None], PANEL)[0][:, 0]
+    r, pivots, scales, _, _ = lapack.dgeqp3(rows, lwork=(width + 1) * PANEL_COLUMNS)
+    turned = lapack.dormqr("L", "T", r[:, : len(scales)], scales, right[:, None], PANEL_COLUMNS)[0][:, 0]
     diagonal = np.abs(np.diag(r))
-    rank = int((diagonal > ROUNDING * max(diagonal[0], 1e-300)).sum())
+    rank = int((diagonal > RELATIVE_ROUNDING * max(diagonal[0], 1e-300)).sum())
     wanted = np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
     solved = lapack.dtrtrs(r[:rank, :rank], wanted)[0] if rank else wanted
-    solved = np.where(np.abs(solved) > TINY, solved, 0.0)
+    solved = np.where(np.abs(solved) > ZERO_COEFFICIENT, solved, 0.0)
     pivots -= 1  # LAPACK counts from 1
     basis, last = np.zeros((width, width - rank)), np.zeros(width)
     basis[pivots[:rank]], last[pivots[:rank]] = solved[:, :-1], solved[:, -1]

@@ -14,11 +14,11 @@ from ...geometry.planar import as_complex
 from ...mesh.charts import point_vertices
 from ...mesh.connectivity import TriangleMesh
 from .constraints import CheckedConstraints
-from .elimination import ROUNDING, orthogonal_solutions, sparse_solutions
+from .elimination import RELATIVE_ROUNDING, orthogonal_solutions, sparse_solutions
 from .seam_chains import SeamChains, constrained_chains
 
 # What rounding leaves between the sides of seams is looked at in units of this, in which it is not none.
-FINE = 2.0**-40
+CLOSING_UNIT = 2.0**-40
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Motions:
             return points
         motions = self.made_by.at(points).motions()
         step = np.zeros(motions.count + 1)
-        step[-1] = FINE
+        step[-1] = CLOSING_UNIT
         moved: ComplexArray = points + motions.shifts(step)
         return moved
 
@@ -92,7 +92,7 @@ def find_motions(
         constraints: what else points must do.
 
     Raises:
-        SeamError: the sides of a seam are no rigid copies of each other.
+        SeamError: the sides of a seam are not rigid copies of each other.
         OptionError: the constraints contradict each other.
     """
     vertex = point_vertices(mesh.faces, corners, len(points))
@@ -101,7 +101,7 @@ def find_motions(
 
 
 def _require_solved(missed: float, right: FloatArray) -> None:
-    if missed > ROUNDING * max(1.0, float(np.abs(right).max())):
+    if missed > RELATIVE_ROUNDING * max(1.0, float(np.abs(right).max())):
         raise OptionError(f"constraints contradict each other, or the seams: by {missed:.2g} at least")
 
 
@@ -149,7 +149,7 @@ class _Builder:
         ]
 
     def at(self, points: ComplexArray) -> _Builder:
-        """Return the same for points to which these were moved, whose offset in units of `FINE` closes all seams."""
+        """Return the same for points that these were moved to; its offset, in `CLOSING_UNIT`, closes all seams."""
         return _Builder(
             points, self.vertex, self.free_vertices, self.chains, self.constraints, is_closing=True
         )
@@ -185,7 +185,7 @@ class _Builder:
             return np.zeros(len(left), dtype=np.complex128)
         turned: ComplexArray = self.chains.rotation[chain] * self.points[left]
         missing: ComplexArray = turned + self.translation[chain] - self.points[right]
-        return missing / FINE if self.is_closing else missing
+        return missing / CLOSING_UNIT if self.is_closing else missing
 
     def motions(self) -> Motions:
         """Return the motions."""

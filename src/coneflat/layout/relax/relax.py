@@ -67,7 +67,7 @@ def relax(
     steps: int = STEPS,
     progress: Callable[[int, float], bool | None] | None = None,
 ) -> Relaxed:
-    """Return a layout of less distortion, in which no triangle is turned over and seams are what they were.
+    """Return a layout of less distortion, in which no triangle is flipped and seams are what they were.
 
     A seam is where the triangles on both sides have different points; the one side is a rigid copy of the other.
     Their rotations stay and their translations may change, so cones keep their angles and the two sides of every seam
@@ -75,7 +75,7 @@ def relax(
 
     Args:
         mesh: the mesh.
-        points: (u, 2) of the plane. Triangles that are turned over there, or have no area, stay as they are.
+        points: (u, 2) of the plane. Triangles that are flipped there, or have no area, stay as they are.
         corners: (m, 3) the point at each triangle corner, from 0.
         energy: what a triangle costs, per area; None: its distortion of angles, `StretchEnergy(0)`.
         constraints: what points must do; None for nothing.
@@ -90,16 +90,16 @@ def relax(
 
     Raises:
         ArrayShapeError, FaceIndexError, NonFiniteError: arrays do not fit the mesh, or are not finite.
-        LengthError: the lengths are no metric.
+        LengthError: the lengths are not a metric.
         OptionError: the constraints make no sense, or contradict each other.
-        SeamError: the two sides of a seam are no rigid copies of each other.
-        ConvergenceError: constraints cannot be reached without turning a triangle over, as far as is known.
+        SeamError: the two sides of a seam are not rigid copies of each other.
+        ConvergenceError: constraints cannot be reached without flipping a triangle, as far as is known.
         MetricError: the computation found no finite result.
 
     Notes:
         Newton's method with each triangle's Hessian made positive, in closed form (Smith, de Goes, Kim, "Analytic
-        eigensystems for isotropic distortion energies", 2019), by steps that turn no triangle over (Smith and Schaefer,
-        "Bijective parameterization with free boundaries", 2015). Seams are no constraints but eliminated, so the
+        eigensystems for isotropic distortion energies", 2019), by steps that flip no triangle (Smith and Schaefer,
+        "Bijective parameterization with free boundaries", 2015). Seams are not constraints but eliminated, so the
         system is symmetric positive definite, and of one pattern for all steps.
     """
     energy = StretchEnergy() if energy is None else energy
@@ -138,7 +138,7 @@ def relax(
     found = descend(z, motions, elements, energy, tolerance, steps, progress, stride)
     if found.remaining:
         raise ConvergenceError(
-            f"constraints cannot be met without turning triangles over: {1 - found.remaining:.1%} of the way to them "
+            f"constraints cannot be met without flipping triangles: {1 - found.remaining:.1%} of the way to them "
             f"in {plural(found.steps, 'step')}"
         )
     total = float(elements.weight.sum())
@@ -147,7 +147,7 @@ def relax(
 
 
 def rest_sides(lengths: FloatArray) -> ComplexArray:
-    """Return (m, 3) the sides of triangles with given lengths (m, 3), upright in the plane."""
+    """Return (m, 3) the sides of triangles with given lengths (m, 3), positively oriented in the plane."""
     sides = np.empty(lengths.size, dtype=np.complex128)
     place_triangles(np.ascontiguousarray(lengths).ravel(), sides)
     return sides.reshape(-1, 3)

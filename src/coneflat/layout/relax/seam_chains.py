@@ -14,10 +14,10 @@ from .constraints import CheckedConstraints
 
 # Radians by which the rotation between the sides of a seam may change at a vertex without it being a cone. Cones have
 # curvatures of 1e-4 at least; lengths of edges of the plane are good to 1e-9 where they are shortest.
-SAME_ROTATION = 1e-5
+ROTATION_TOLERANCE = 1e-5
 # By how much of an edge the sides of a seam may miss being copies of each other.
-RIGID = 1e-4
-QUARTERS = np.array([1, 1j, -1, -1j])
+RIGID_TOLERANCE = 1e-4
+QUARTER_TURNS = np.array([1, 1j, -1, -1j])
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ def find_chains(
         quarter_turns: rotations are the nearest quarter turns, whether the sides of seams are copies or not.
 
     Raises:
-        SeamError: the sides of a seam are no rigid copies of each other.
+        SeamError: the sides of a seam are not rigid copies of each other.
     """
     edges = point_seams(mesh, corners)
     h, t = mesh.edge_halfedges[edges].T
@@ -133,7 +133,7 @@ def _strands(vertices: IntArray, sides: IntArray, is_node: BoolArray) -> tuple[I
 
 def _nearest_quarter(turns: ComplexArray) -> ComplexArray:
     """Return the nearest of 1, i, -1 and -i."""
-    nearest: ComplexArray = QUARTERS[np.rint(np.angle(turns) / (np.pi / 2)).astype(np.int64) % 4]
+    nearest: ComplexArray = QUARTER_TURNS[np.rint(np.angle(turns) / (np.pi / 2)).astype(np.int64) % 4]
     return nearest
 
 
@@ -147,7 +147,7 @@ def _turning(vertices: IntArray, sides: IntArray, turns: ComplexArray, is_node: 
     edge, point = edge[order], point[order]
     # The first sides of both lie on the same hand if they meet at a point.
     other = np.where(point[:, 0] == point[:, 1], turns[edge[:, 1]], np.conj(turns[edge[:, 1]]))
-    turning: IntArray = ends[order[np.abs(other - turns[edge[:, 0]]) > SAME_ROTATION, 0]]
+    turning: IntArray = ends[order[np.abs(other - turns[edge[:, 0]]) > ROTATION_TOLERANCE, 0]]
     return turning
 
 
@@ -156,10 +156,10 @@ def _check_rigid(edges: IntArray, vertices: IntArray, one: ComplexArray, two: Co
     if not (lengths > 0).all():
         raise SeamError(f"{int((lengths <= 0).sum())} seam edges have no length in the plane")
     off = np.abs(np.abs(two) / lengths - 1)
-    if (off > RIGID).any():
+    if (off > RIGID_TOLERANCE).any():
         worst = int(off.argmax())
         pair = "-".join(str(v) for v in vertices[worst].tolist())
         raise SeamError(
-            f"the sides of {int((off > RIGID).sum())} of {len(edges)} seam edges are no copies of each other: those of "
-            f"{pair} differ by {off[worst]:.2g} of their length"
+            f"the sides of {int((off > RIGID_TOLERANCE).sum())} of {len(edges)} seam edges are not copies of each "
+            f"other: those of {pair} differ by {off[worst]:.2g} of their length"
         )

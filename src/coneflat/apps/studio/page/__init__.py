@@ -9,7 +9,7 @@ from importlib.resources import files
 
 from ....options import Options, declarations
 from ...view import page_around
-from ..choices import PLAIN
+from ..choices import PLAIN_OPTIONS
 
 #: What the page may do: draw, and talk to the server that it came from.
 POLICY = (
@@ -23,7 +23,7 @@ _SCRIPTS = ("server", "surface", "graph", "paint", "tools", "overlay", "sizes", 
 @cache
 def studio_page(formats: Sequence[str]) -> str:
     """Return the page as text; formats: the endings of meshes that can be dropped on it."""
-    defaults = {name: declarations(Options)[name].default for name in PLAIN}
+    defaults = {name: declarations(Options)[name].default for name in PLAIN_OPTIONS}
     scripts = [f"const DEFAULTS = {json.dumps(defaults)};", *(_read(f"{name}.js") for name in _SCRIPTS)]
     return page_around(
         POLICY,

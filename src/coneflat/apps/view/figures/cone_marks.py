@@ -130,6 +130,6 @@ def pixels_of(axes: Axes, dpi: float) -> tuple[int, int]:
 
 
 def check_dpi(dpi: float) -> None:
-    """Raise OptionError if this is no resolution."""
+    """Raise OptionError if this is not a resolution."""
     if not 10 <= dpi <= 2400:
         raise OptionError(f"the resolution must be between 10 and 2400 dots per inch, not {dpi:g}")

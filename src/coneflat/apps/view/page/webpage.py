@@ -60,7 +60,7 @@ def page_of(
         told: what it says; by default the key numbers and the report.
 
     Raises:
-        OptionError: `up` or `show` is none of these, or `most_triangles` is no whole number.
+        OptionError: `up` or `show` is none of these, or `most_triangles` is not an integer.
         ArrayShapeError: the result has no UVs.
         MeshError: it cannot be thinned to so few triangles.
         MeshFileError: the texture cannot be read.
@@ -71,7 +71,7 @@ def page_of(
         raise OptionError(f"unknown show {shown(show)}: choose from {', '.join(SHOWS)}")
     picture = None if texture is None else read_picture(texture)
     if isinstance(most_triangles, bool) or not isinstance(most_triangles, (int, np.integer)):
-        raise OptionError(f"most_triangles must be a whole number, not {shown(most_triangles)}")
+        raise OptionError(f"most_triangles must be an integer, not {shown(most_triangles)}")
     own = color if color is None or isinstance(color, Quantity) else own_quantity(result, color)
     content = content_of(result, most_triangles, own=own)
     if name is None:
