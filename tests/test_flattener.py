@@ -148,7 +148,7 @@ def test_a_first_layout_comes_early():
         told.append("shown")
 
     flattener = coneflat.Flattener(mesh)
-    result = flattener.flatten(early=show, stretch=0.3, progress=lambda stage, _: told.append(stage))
+    result = flattener.flatten(on_preview=show, stretch=0.3, progress=lambda stage, _: told.append(stage))
     assert_same(result, coneflat.flatten(mesh, stretch=0.3))
     (first,) = early
     assert told.index("shown") < told.index("relax")

@@ -32,8 +32,8 @@ from .source.copies import Copy, copied, find_copies
 from .source.parts import Part, Source
 from .stages import ConeSolution, ConeSpec, FlatMetric, Layout, MetricSpec, RelaxSpec, Surface
 
-#: Takes the first layout that there is.
-Early: TypeAlias = Callable[[Flattening], object]
+#: Receives the layout before triangles are relaxed and overlaps are separated.
+Preview: TypeAlias = Callable[[Flattening], object]
 #: Returns a connected mesh with the operators of its (m, 3) lengths, on flips of edges if a metric may make them.
 SurfaceOf: TypeAlias = Callable[[TriangleMesh, FloatArray, bool], Surface]
 #: Returns the flat metric of a connected mesh for its cones.
@@ -108,7 +108,7 @@ def flatten_source(
     o: Options,
     surface_of: SurfaceOf = Surface.of,
     find_metric: FindMetric = find_metric,
-    early: Early | None = None,
+    on_preview: Preview | None = None,
 ) -> Flattening:
     """Flatten a mesh by options that have been parsed; see `flatten`.
 
@@ -117,7 +117,7 @@ def flatten_source(
         o: the options.
         surface_of: returns a part with the operators of its metric; they may be cached.
         find_metric: returns the flat metric for the cones of a part.
-        early: called with the first layout: one chart for each part, before triangles are relaxed and overlaps are
+        on_preview: called with the first layout: one chart for each part, before triangles are relaxed and overlaps are
             separated; its overlaps are not measured.
     """
     watch = Stopwatch(o.progress)
@@ -127,15 +127,15 @@ def flatten_source(
     method = Method(relax, o.charts == "atlas", o.quantise, watch, surface_of, find_metric)
     with using_threads(o.threads):
         copies = find_copies(prepared.parts)
-        own = {i: part for i, part in enumerate(prepared.parts) if copies[i] is None}
-        first = lay_out_parts(own, method)
-        if early is not None:
-            every = _with_copies(first, prepared.parts, copies)
-            early(evaluate(prepared, every, replace(o, charts="one"), Stopwatch(), NOT_LOOKED_FOR))
-        finished = finish_parts(own, first, method)
-        # Notes may name vertices, so that copies need their own.
-        told = {i: prepared.parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
-        finished |= finish_parts(told, lay_out_parts(told, method), method)
+        originals = {i: part for i, part in enumerate(prepared.parts) if copies[i] is None}
+        layouts = lay_out_parts(originals, method)
+        if on_preview is not None:
+            preview = _with_copies(layouts, prepared.parts, copies)
+            on_preview(evaluate(prepared, preview, replace(o, charts="one"), Stopwatch(), NOT_LOOKED_FOR))
+        finished = finish_parts(originals, layouts, method)
+        # Notes name vertices, so that copies of parts with notes are laid out, too.
+        noted = {i: prepared.parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
+        finished |= finish_parts(noted, lay_out_parts(noted, method), method)
     return evaluate(prepared, _with_copies(finished, prepared.parts, copies), o, watch)
 
 
@@ -156,13 +156,13 @@ def lay_out_part(part: Part, method: Method) -> Layout:
     so that the best layout is taken.
     """
     with method.watch("cones", 0.1):
-        surface = method.surface_of(part.mesh, part.lengths, part.may_flip)
+        surface = method.surface_of(part.mesh, part.lengths, part.is_exact)
     best, wanted = None, part.cones
     for _ in range(MAX_SEARCHES):
         tried, was_searched = lay_out_once(surface, part, wanted, method)
         best = tried if best is None or _shortfall(tried) < _shortfall(best) else best
         infeasible = infeasible_cones(tried)
-        if not (was_searched and part.may_flip and len(infeasible)):
+        if not (was_searched and part.is_exact and len(infeasible)):
             break
         wanted = wanted.without(infeasible)
     close_search(surface)
@@ -211,7 +211,7 @@ def finish_parts(
 
 def finish_part(part: Part, layout: Layout, method: Method) -> Layout:
     """Return a relaxed layout without inverted triangles, and without overlaps if charts are to have none."""
-    if part.may_flip:
+    if part.is_exact:
         with method.watch("relax", 0.2):
             names, stretch = part.cones.names, method.relax.stretch
             layout = free_seams(layout, part.cones.weights, names, stretch, method.quantum)

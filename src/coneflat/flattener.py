@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from .base.arrays import FloatArray
 from .cones import close_search
-from .flatten import Early, flatten_source
+from .flatten import Preview, flatten_source
 from .io.packages import as_input
 from .mesh.connectivity import TriangleMesh
 from .options import Options, read_options
@@ -48,17 +48,17 @@ class Flattener:
         self._surfaces: dict[tuple[int, bool], Surface] = {}
         self._threads: int | None = None
 
-    def flatten(self, *, early: Early | None = None, **options: Any) -> Flattening:
+    def flatten(self, *, on_preview: Preview | None = None, **options: Any) -> Flattening:
         """Return the flattening by the options, and with the errors, of `coneflat.flatten`.
 
         Args:
-            early: called with the first layout: one chart for each part, before triangles are relaxed and overlaps are
-                separated; its own overlaps are not measured.
+            on_preview: called with the first layout: one chart for each part, before triangles are relaxed and
+                overlaps are separated; its own overlaps are not measured.
             options: those of `coneflat.flatten`.
         """
-        return self.flatten_as(read_options(options), early)
+        return self.flatten_as(read_options(options), on_preview)
 
-    def flatten_as(self, options: Options, early: Early | None = None) -> Flattening:
+    def flatten_as(self, options: Options, on_preview: Preview | None = None) -> Flattening:
         """Return the flattening by options that have been parsed; see `flatten`."""
         # The last digits depend on the number of threads.
         if options.threads != self._threads:
@@ -66,7 +66,7 @@ class Flattener:
         meshes = {id(part.mesh) for part in self._source.prepared(options).parts}
         self._surfaces = {key: surface for key, surface in self._surfaces.items() if key[0] in meshes}
         try:
-            return flatten_source(self._source, options, self._surface, early=early)
+            return flatten_source(self._source, options, self._surface, on_preview=on_preview)
         finally:
             for surface in self._surfaces.values():
                 close_search(surface)

@@ -55,7 +55,7 @@ class ConeSpec:
 
     Attributes:
         strategy: "auto", "sparse", "greedy", "none", or "given" for `given`.
-        has_wishes: something is asked for that only the sparse search heeds.
+        needs_sparse_search: something is asked for that only the sparse search heeds.
         distortion: largest area distortion of the linear model.
         count: number of cones instead of a distortion, or None.
         max_count: largest number of cones, or None.
@@ -69,12 +69,12 @@ class ConeSpec:
         absorbs_curvature: (n,) boundary vertices that take the curvature that the cones leave.
         prescribes_boundary: the boundary has a given shape.
         searches_corners: corners of a straight boundary are searched with the cones.
-        prescribes_scale: phi = 0 is prescribed at the cones, not their curvature.
+        scale_at_cones: phi = 0 is prescribed at the cones, not their curvature.
         names: (n,) the user's number of each vertex.
     """
 
     strategy: str
-    has_wishes: bool
+    needs_sparse_search: bool
     distortion: float
     count: int | None
     max_count: int | None
@@ -89,7 +89,7 @@ class ConeSpec:
     absorbs_curvature: BoolArray
     prescribes_boundary: bool
     searches_corners: bool
-    prescribes_scale: bool
+    scale_at_cones: bool
     names: IntArray
 
     def without(self, vertices: IntArray) -> ConeSpec:
@@ -109,7 +109,7 @@ class MetricSpec:
         corners: corners of a polygon, each with its curvature or NaN.
         keeps_length: (n,) boundary vertices between which lengths are kept.
         keeps_area: the metric is scaled to the area of the input.
-        prescribes_scale: phi = 0 is prescribed at the cones, not their curvature.
+        scale_at_cones: phi = 0 is prescribed at the cones, not their curvature.
         quantum: rotations along handles and around holes are corrected to multiples of it, radians; None for not.
         accepts_failure: return a metric that did not converge.
         names: (n,) the user's number of each vertex.
@@ -120,7 +120,7 @@ class MetricSpec:
     corners: VertexCurvatures
     keeps_length: BoolArray
     keeps_area: bool
-    prescribes_scale: bool
+    scale_at_cones: bool
     quantum: float | None
     names: IntArray
     accepts_failure: bool = False

@@ -72,7 +72,7 @@ def find_cones(
         solution = _fitted(surface, spec)
     else:  # "none", or none of the given ones is here
         solution = cones_at(*given, spec.given.vertices)
-    if spec.prescribes_scale:
+    if spec.scale_at_cones:
         check_enough(len(solution.cones), mesh)
     else:
         advice = "allow more of them (--max-cones)" if is_greedy else "add cones or move them"
@@ -89,7 +89,7 @@ def searches(surface: Surface, spec: ConeSpec) -> bool:
     """Whether the sparse search finds the cones of a mesh."""
     return spec.strategy == "sparse" or (
         spec.strategy == "auto"
-        and (spec.has_wishes or not (spec.prescribes_boundary or has_many_handles(surface, spec)))
+        and (spec.needs_sparse_search or not (spec.prescribes_boundary or has_many_handles(surface, spec)))
     )
 
 
@@ -98,7 +98,7 @@ def has_many_handles(surface: Surface, spec: ConeSpec) -> bool:
     from .sparse.limits import MOST_SEARCHED
 
     mesh = surface.mesh
-    if spec.strategy != "auto" or spec.has_wishes or mesh.is_boundary_vertex.any():
+    if spec.strategy != "auto" or spec.needs_sparse_search or mesh.is_boundary_vertex.any():
         return False
     # Each handle but one takes two cones of 4 pi.
     return -mesh.euler_characteristic > MOST_SEARCHED // 2
@@ -106,7 +106,7 @@ def has_many_handles(surface: Surface, spec: ConeSpec) -> bool:
 
 def polyhedron_corners(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
     """Return a polyhedron's corners as cones if they are few: it unfolds without any distortion. Else None."""
-    if spec.strategy != "auto" or spec.has_wishes or spec.searches_corners:
+    if spec.strategy != "auto" or spec.needs_sparse_search or spec.searches_corners:
         return None
     mesh, curvature = surface.mesh, surface.curvature
     corners = np.flatnonzero((np.abs(curvature) > TYPED_TOLERANCE) & ~mesh.is_boundary_vertex)

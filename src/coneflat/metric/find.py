@@ -91,7 +91,7 @@ def _exact_choices(surface: Surface, solution: ConeSolution, spec: MetricSpec) -
         corners = spec.corners.vertices, spec.corners.curvatures
         boundary = prescribed_boundary(mesh, surface.lengths, total, *corners, spec.names)
     return ExactChoices(
-        scale_at_cones=spec.prescribes_scale,
+        scale_at_cones=spec.scale_at_cones,
         boundary=boundary,
         kept=spec.keeps_length,
         keep_area=spec.keeps_area,

@@ -44,7 +44,7 @@ class Part:
     seams: SeamSpec
 
     @property
-    def may_flip(self) -> bool:
+    def is_exact(self) -> bool:
         """Whether the metric may flip edges."""
         return self.metric.method == "exact"
 
@@ -81,7 +81,7 @@ Piece: TypeAlias = tuple[TriangleMesh, IntArray, IntArray, FloatArray]
 Value = TypeVar("Value")
 
 
-class Last(Generic[Value]):
+class LatestCache(Generic[Value]):
     """The value that was computed last, with the key that it was asked for by."""
 
     def __init__(self) -> None:
@@ -100,8 +100,8 @@ class Last(Generic[Value]):
 class Source:
     """An input, and what follows from it whatever else is asked of it.
 
-    What was needed last is kept: another repair, other lengths or other marked seams take its place. As long as none
-    does, parts have the same meshes, the very objects.
+    The latest values are cached: another repair, other lengths or other marked seams replace them. Until then parts
+    have the same mesh objects.
 
     Attributes:
         given: the input, which must not change.
@@ -109,11 +109,11 @@ class Source:
 
     def __init__(self, given: InputMesh) -> None:
         self.given = given
-        self._checked: Last[tuple[CheckedMesh, BoolArray]] = Last()
-        self._lengths: Last[tuple[FloatArray, str | None]] = Last()
-        self._seen: Last[FloatArray] = Last()
-        self._fits: Last[None] = Last()
-        self._pieces: Last[tuple[Piece, ...]] = Last()
+        self._checked: LatestCache[tuple[CheckedMesh, BoolArray]] = LatestCache()
+        self._lengths: LatestCache[tuple[FloatArray, str | None]] = LatestCache()
+        self._seen: LatestCache[FloatArray] = LatestCache()
+        self._fits: LatestCache[None] = LatestCache()
+        self._pieces: LatestCache[tuple[Piece, ...]] = LatestCache()
 
     def prepared(self, options: Options) -> Prepared:
         """Check the input, and what the options say of its vertices.
@@ -236,7 +236,7 @@ def _part(
     on_marks = mesh.is_boundary_vertex & on_marks
     cones = ConeSpec(
         strategy=options.cone_choice,
-        has_wishes=options.asks_for_search,
+        needs_sparse_search=options.asks_for_search,
         distortion=options.distortion,
         count=options.cone_count,
         max_count=options.max_cones,
@@ -252,7 +252,7 @@ def _part(
         absorbs_curvature=on_marks if kind == "straight" else mesh.is_boundary_vertex,
         prescribes_boundary=kind in ("disk", "polygon"),
         searches_corners=kind == "straight",
-        prescribes_scale=options.scale_at_cones and options.method == "exact",
+        scale_at_cones=options.scale_at_cones and options.method == "exact",
         names=said.names,
     )
     metric = MetricSpec(
@@ -262,7 +262,7 @@ def _part(
         # On marked seams, so that both sides are equal.
         keeps_length=mesh.is_boundary_vertex if kind == "lengths" else on_marks,
         keeps_area=kind != "lengths" and not options.marks_seams,
-        prescribes_scale=options.scale_at_cones,
+        scale_at_cones=options.scale_at_cones,
         quantum=options.quantise if options.correct_handles else None,
         names=said.names,
     )

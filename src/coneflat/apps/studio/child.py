@@ -118,7 +118,7 @@ class Bench:
 
         chosen = Choices.from_plain(job["choices"])
         words, is_large = source.renamed(chosen.keywords()), len(source.mesh.offsets) - 1 >= self._early_from
-        result = flattener.flatten(early=show_first if is_large else None, progress=told_on, **words)
+        result = flattener.flatten(on_preview=show_first if is_large else None, progress=told_on, **words)
         result = noted(replace(result, notes=source.notes_of(result.notes)), chosen)
         told("picture", 1.0)
         head, body = self._coloured(job, result, name)
