@@ -1,10 +1,13 @@
-"""Atlases against those of others: `python benchmarks/atlas.py` prints a Markdown table.
+"""Compare atlases with those of other packages: `python benchmarks/atlas.py` prints two Markdown tables.
 
-Every model of `../shared/meshes` that is a manifold, and a bumpy sphere, by coneflat with its default cones and with
-more of them, and by what can be installed with pip: xatlas and uvunwrap with their defaults. All are measured by
-`coneflat.measure` on the UV points that come out; the seam length is over the square root of the area. With `--matched`
-areas vary as little in ours as in theirs: `stretch` is turned, with the fewest cones that get there; and with so many
-cones that nothing is stretched.
+The first table has a row for each model and package, the second one, that of the README, a row for each package. The
+models are those of `../shared/meshes` that are manifolds, and a bumpy sphere. The packages are coneflat with its default
+cones and with more of them, boundary first flattening (BFF) as `coneflat.peers` implements it, with the default cones and
+one chart, and xatlas and uvunwrap with their defaults, where they are installed. All results are measured by
+`coneflat.measure` on the UV points that the packages return; seam lengths are divided by the square root of the area.
+
+With `--matched`, ours have the area distortion of theirs, by `stretch` with the fewest cones that reach it, and by cones
+alone.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ import numpy as np
 from common import MODELS, shapes, with_cones_for
 
 from coneflat import Flattening, check_mesh, flatten, read_mesh
+from coneflat.apps.peers import flatten_by
 from coneflat.apps.peers.packages import installed_peers, run_peer
 from coneflat.errors import ConeflatError
 from coneflat.measure.distortion import Distortion
@@ -25,6 +29,7 @@ from coneflat.mesh.connectivity import TriangleMesh
 # Area distortions allowed, one after the other, and halvings of the interval in which the stretch is sought.
 ALLOWED = (0.2, 0.14, 0.1, 0.07, 0.05, 0.035, 0.025)
 ROUNDS = 4
+HEADINGS = "| package | flipped | overlapping models | QC distortion | area std | charts | seam length | packed | seconds |"
 
 
 def main() -> None:
@@ -47,14 +52,20 @@ def main() -> None:
             matched(mesh) if arguments.matched else flattened(mesh, arguments.more)
         ):
             found, packed = result.distortion, result.packing_efficiency
+            flipped = found.flipped + found.degenerate
             sums.setdefault(method, []).append(
-                (found.charts, found.seam_length, found.qc_mean, found.area_std, packed)
-            )
+                (found.charts, found.seam_length, found.qc_mean, found.area_std, packed,
+                 flipped, found.overlap > 0, seconds)
+            )  # fmt: skip
             print(row(name, mesh, method, found, packed, seconds), flush=True)
+    print(f"\n{HEADINGS}\n" + "| --- " * HEADINGS.count(" | ") + "| --- |")
     for method, values in sums.items():
-        charts, length, qc, std, packed = np.mean(values, axis=0)
-        means = f"{charts:.1f} | {length:.2f} | {qc:.4f} | {std:.3f} | | | {packed:.2f} | |"
-        print(f"| mean of {len(values)} | | {method} | {means}")
+        charts, length, qc, std, packed, *_ = np.mean(values, axis=0)
+        flipped, overlapping, seconds = np.sum(values, axis=0)[5:]
+        print(
+            f"| {method} | {flipped:.0f} | {overlapping:.0f} of {len(values)} | {qc:.3f} | {std:.3f} | {charts:.1f} | "
+            f"{length:.2f} | {packed:.2f} | {seconds:.1f} |"
+        )
 
 
 def models(names: list[str], largest: int) -> list[tuple[str, TriangleMesh]]:
@@ -86,6 +97,9 @@ def flattened(mesh: TriangleMesh, more: float) -> Iterator[tuple[str, Flattening
         start = time.perf_counter()
         ours = flatten(mesh.vertices, mesh.faces, charts="atlas", **options)
         yield method, ours, time.perf_counter() - start
+    start = time.perf_counter()
+    boundary_first = flatten_by("bff", mesh.vertices, mesh.faces, best_effort=True)
+    yield "BFF", boundary_first, time.perf_counter() - start
     for name in ("xatlas", "uvunwrap"):
         if name in installed_peers():
             yield name, *run_peer(name, ours)
