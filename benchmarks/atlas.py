@@ -1,13 +1,13 @@
 """Compare atlases with those of other packages: `python benchmarks/atlas.py` prints two Markdown tables.
 
 The first table has a row for each model and package, the second one, that of the README, a row for each package. The
-models are those of `../shared/meshes` that are manifolds, and a bumpy sphere. The packages are coneflat with its default
-cones and with more of them, boundary first flattening (BFF) as `coneflat.peers` implements it, with the default cones and
-one chart, and xatlas and uvunwrap with their defaults, where they are installed. All results are measured by
+models are those of `../shared/meshes` that are manifolds, and a bumpy sphere. The packages are coneflat with its
+default cones and with more of them; boundary first flattening (BFF) as `coneflat.peers` implements it, with the default
+cones and one chart; xatlas and uvunwrap with their defaults, where they are installed. All results are measured by
 `coneflat.measure` on the UV points that the packages return; seam lengths are divided by the square root of the area.
 
-With `--matched`, ours have the area distortion of theirs, by `stretch` with the fewest cones that reach it, and by cones
-alone.
+With `--matched`, ours have the area distortion of theirs, by `stretch` with the fewest cones that reach it, and by
+cones alone.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from coneflat.mesh.connectivity import TriangleMesh
 # Area distortions allowed, one after the other, and halvings of the interval in which the stretch is sought.
 ALLOWED = (0.2, 0.14, 0.1, 0.07, 0.05, 0.035, 0.025)
 ROUNDS = 4
-HEADINGS = "| package | flipped | overlapping models | QC distortion | area std | charts | seam length | packed | seconds |"
+HEADINGS = "| package | flipped | with overlaps | QC distortion | area std | charts | seam length | covered | seconds |"
 
 
 def main() -> None:

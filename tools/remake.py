@@ -1,6 +1,6 @@
 """Remake what the documentation shows of the program: `python tools/remake.py`.
 
-Its parts are the tables of options, the drawing of the structure, the numbers and the pictures;
+Its parts are the tables of options, the drawing of the structure, the list of messages, the numbers and the pictures;
 `--only options,structure` takes some of them. `--check` changes nothing, and fails where something is out of date.
 Times are those of a machine, and are measured by `benchmarks/`.
 """
@@ -40,6 +40,13 @@ def remake_structure(_: argparse.Namespace) -> Iterator[tuple[Path, str]]:
     yield DOCS / "images" / "structure.svg", draw_structure()
 
 
+def remake_messages(_: argparse.Namespace) -> Iterator[tuple[Path, str]]:
+    """Yield the list of the texts that users see."""
+    from messages import list_messages
+
+    yield ROOT / "tools" / "messages.txt", list_messages()
+
+
 def remake_numbers(arguments: argparse.Namespace) -> Iterator[tuple[Path, str]]:
     """Yield the pages with their numbers."""
     from measured import Measured
@@ -66,6 +73,7 @@ def remake_pictures(arguments: argparse.Namespace) -> Iterator[tuple[Path, str]]
 PARTS: dict[str, Callable[[argparse.Namespace], Iterator[tuple[Path, str]]]] = {
     "options": remake_options,
     "structure": remake_structure,
+    "messages": remake_messages,
     "numbers": remake_numbers,
     "pictures": remake_pictures,
 }

@@ -19,10 +19,6 @@ from coneflat.apps.peers import METHODS, Comparison
 from coneflat.apps.peers.paper import MODELS as PUBLISHED
 from coneflat.options import PAPER
 
-README = (
-    "sample", "fandisk", "rocker-arm", "hand", "bunny", "3holes", "face", "camelhead", "kitten", "horse",
-    "stanford-bunny",
-)  # fmt: skip
 GALLERY = (
     "3holes", "bunny", "camelhead", "elephant", "face", "fandisk", "hand", "horse", "kitten", "rocker-arm",
 )  # fmt: skip
@@ -69,33 +65,6 @@ def _each(models: tuple[str, ...], body: str, made: Mapping[str, list[str] | Non
         row = made[model] or was.get(model)
         if row is not None:
             yield row
-
-
-def quality_table(measured: Measured, body: str) -> str:
-    """Return how good the defaults are."""
-    made = dict[str, list[str] | None]()
-    for model in README:
-        report = measured.report(model)
-        made[model] = (
-            [
-                model,
-                f"{report['triangles']:,}",
-                f"{report['cones']}",
-                f"{report['charts']}",
-                f"{report['angle_sum_error']:.0e}",
-                f"{report['seam_mismatch_max']:.0e}",
-                f"{report['flipped']}",
-                f"{report['qc_mean']:.4f}",
-                f"{report['seam_length']:.2f}",
-            ]
-            if report
-            else None
-        )
-    headings = (
-        "model | triangles | cones | charts | angle sums | seam mismatch | flipped | QC distortion | "
-        "seam length, √area"
-    )
-    return _table(headings, list(_each(README, body, made)))
 
 
 #: Models that the paper's tables and we have alike, and what they are called there.
@@ -336,7 +305,6 @@ def quads_table(measured: Measured, body: str) -> str:
 
 #: What makes each table, from what there is of models, and from what stands there.
 TABLES: dict[str, Callable[[Measured, str], str]] = {
-    "quality": quality_table,
     "paper": paper_table,
     "gallery": gallery_table,
     "tradeoff": tradeoff_table,
