@@ -103,3 +103,41 @@ def test_modules_exist(page):
             value = getattr(value, name)
     for path in set(re.findall(r"`((?:\w+/)+(?:\w+\.py)?)`", text)):
         assert any((root / path).exists() for root in (ROOT, PACKAGE)), path
+
+
+#: Private words that were replaced by the field's terms, as regular expressions.
+REPLACED_WORDS = [
+    r"(?<!matching )\bpursuit\b",
+    r"\bun-?held\b",
+    r"\bevened out\b",
+    r"\bpolish",
+    r"\btakes_rest\b|\bgo_on\b|\bmeanwhile\b|\bshake|\b_with_all_means\b|\bLaidOut\b",
+    r"\b(FEW|MANY|HUGE|SMALL|TOGETHER|NEAR|DEARER|NOTHING|SAME|QUARTER|Last|Later)\b",
+    r"\bupside down\b|\bupright\b|\bturned over\b",
+    r"\bwhole (number|turn)s?\b",
+    r"\bdearer\b|\bnext to nothing\b",
+    r"\bcut all the same\b",
+    r"\bis no (requirement|mesh|vertex|number|integer)\b",
+    r"\btoo small for numbers\b",
+    r"\b(by|of) (itself|themselves)\b",
+    r"\bfalls? short\b",
+    r"\bgo on where\b",
+    r"\bhang(s|ing)? together\b",
+]
+
+
+def test_private_words_are_replaced():
+    pages = [*PAGES, ROOT / "CHANGELOG.md"]
+    pages += [path for kind in ("py", "js", "html") for path in (ROOT / "src").rglob(f"*.{kind}")]
+    found = [
+        f"{path.relative_to(ROOT)}:{number}: {match[0]}"
+        for path in pages
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        for match in re.finditer("|".join(REPLACED_WORDS), line)
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_documentation_is_short():
+    words = sum(len(path.read_text(encoding="utf-8").split()) for path in (ROOT / "docs").rglob("*.md"))
+    assert words <= 20_000
