@@ -32,21 +32,21 @@ CEILINGS = {
     "__main__": 3,
     "apps": 0,
     "apps.ahead": 38,
-    "apps.batch": 397,
-    "apps.cli": 1474,
+    "apps.batch": 400,
+    "apps.cli": 1497,
     "apps.peers": 1406,
     "apps.quads": 3199,
     "apps.studio": 1701,
     "apps.view": 1617,
     "atlas": 1500,
-    "base": 354,
+    "base": 356,
     "cone_curve": 108,
     "cones": 2104,
     "evaluate": 194,
     "flatten": 176,
     "flattener": 35,
     "geometry": 1594,
-    "io": 2803,
+    "io": 2806,
     "layout": 2247,
     "linalg": 468,
     "measure": 835,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 223,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_993, 233, 25_825
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_998, 233, 25_856
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

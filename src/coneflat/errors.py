@@ -24,6 +24,10 @@ class ConeflatError(Exception):
         1 face with a vertex index outside 0..2: 0; face 0 is (0, 1, 9)
     """
 
+    def __str__(self) -> str:
+        """Return the message in one line, also with file names that contain line breaks."""
+        return " ".join(super().__str__().splitlines())
+
 
 class MeshError(ConeflatError, ValueError):
     """The mesh is not one that can be flattened."""

@@ -69,6 +69,9 @@ def test_a_further_run_does_what_is_left(models, tmp_path):
     (out / "hill.obj").unlink()
     assert "1 of them before" in invoke("batch", models, "--out", out, "--distortion", 0.5).output
     assert "of them before" not in invoke("batch", models, "--out", out, "--distortion", 0.5, "--redo").output
+    # So is an incomplete result.
+    (out / "hill.obj").write_bytes((out / "hill.obj").read_bytes()[:1000])
+    assert "2 of them before" in invoke("batch", models, "--out", out, "--distortion", 0.5).output
 
 
 def test_a_mesh_that_hangs_is_ended(models, tmp_path):

@@ -15,7 +15,9 @@ import pytest
 import shapes
 from command import command as run
 
+import coneflat
 from coneflat import errors, flatten, read_mesh
+from coneflat.apps.cli.main import main
 from coneflat.apps.cli.values import parse_curvature
 
 #: A line of progress, which comes by the clock.
@@ -133,9 +135,36 @@ def test_what_is_no_curvature(text):
         parse_curvature(text, "here")
 
 
+@pytest.mark.skipif(os.name == "nt", reason="sh closes the streams")
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_closed_standard_streams_do_not_prevent_the_output(tmp_path, closed):
+    shapes.write_obj(tmp_path / "in.obj", *shapes.sphere(2))
+    command = f'"{sys.executable}" -m coneflat flatten in.obj -o out.obj {closed}'
+    assert subprocess.run(command, shell=True, cwd=tmp_path, check=False).returncode == 0
+    assert len(coneflat.measure_uv(tmp_path / "out.obj").mesh.faces) == 320
+
+
+def test_interrupts_in_compiled_functions_are_interrupts(monkeypatch, capsys):
+    def interrupted(**_):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr("coneflat.apps.cli.main.cli.main", interrupted)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 130
+    assert "interrupted" in capsys.readouterr().err
+
+
+def test_messages_are_one_line(tmp_path):
+    with pytest.raises(errors.MeshFileError) as error:
+        coneflat.read_mesh(tmp_path / "two\nlines.obj")
+    assert "\n" not in str(error.value)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other signals")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize("step", ["cones", "write"])
-def test_interrupt_leaves_nothing_half_written(tmp_path, step):
+def test_interrupt_leaves_no_incomplete_file(tmp_path, step, name):
     shapes.write_obj(tmp_path / "big.obj", *shapes.sphere(5))
     command = [sys.executable, "-m", "coneflat", "flatten", "-v", "big.obj", "-o", "out.obj"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
@@ -144,12 +173,12 @@ def test_interrupt_leaves_nothing_half_written(tmp_path, step):
         hanging.start()
         for line in process.stderr:
             if line.split()[-1:] == [step]:
-                process.send_signal(signal.SIGINT)
+                process.send_signal(getattr(signal, name))
                 break
         said = process.stderr.read()
         hanging.cancel()
-    assert process.returncode == 130
-    assert said.splitlines()[-1] == "coneflat: error: interrupted; nothing was left half-written"
+    assert process.returncode == 128 + getattr(signal, name)
+    assert said.splitlines()[-1] == "coneflat: error: interrupted; no incomplete file was left"
     assert [path.name for path in tmp_path.iterdir()] == ["big.obj"]
 
 

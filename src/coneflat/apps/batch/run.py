@@ -138,13 +138,14 @@ class Journal:
         self._is_cut_off = bool(text) and not text.endswith(b"\n")
 
     def is_done(self, job: Job) -> bool:
-        """Whether a mesh was flattened, as it is and with these options, and the result is still there."""
+        """Return whether a mesh was flattened with these options, and its result is still complete."""
         row = self.rows.get(job.output, {})
-        return row.get("mark") == job.mark and row.get("status") == "done" and os.path.exists(job.output)
+        expected = (job.mark, "done", _size(job.output))
+        return expected[2] is not None and (row.get("mark"), row.get("status"), row.get("size")) == expected
 
     def add(self, job: Job, row: Mapping[str, Any]) -> None:
         """Write a row down, before anything else is done."""
-        row = {**row, "mark": job.mark}
+        row = {**row, "mark": job.mark, "size": _size(job.output)}
         self.rows[job.output] = row
         try:
             with self._path.open("a", encoding="utf-8") as file:
@@ -152,6 +153,11 @@ class Journal:
         except OSError as error:
             raise MeshFileError(f"{self._path} cannot be written: {error.strerror or error}") from error
         self._is_cut_off = False
+
+
+def _size(path: str) -> int | None:
+    """Return the size of a file in bytes; None if it does not exist."""
+    return os.path.getsize(path) if os.path.exists(path) else None
 
 
 def _row(line: bytes) -> dict[str, Any] | None:

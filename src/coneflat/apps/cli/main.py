@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 import sys
+from types import FrameType
 from typing import NoReturn
 
 import click
@@ -21,7 +23,8 @@ from .view import studio, view
 
 USER_ERROR = 2
 INTERNAL_ERROR = 1
-INTERRUPTED = 130
+#: Added to the number of a signal, as shells do.
+SIGNALLED = 128
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -36,6 +39,11 @@ for command in (flatten, batch, quads, measure, cones, figure, view, studio, com
 
 def main() -> NoReturn:
     """Run the command; every failure is one line on stderr and a nonzero exit code."""
+    _open_closed_streams()
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)  # Windows has no SIGHUP.
+        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, _interrupt)
     # Imports make half a million objects and no garbage: looking for it at every 700th is a tenth of a short run.
     gc.set_threshold(100_000, 50, 50)
     # Starting threads that are never to be used takes OpenBLAS, of which numpy and SciPy have one each, as long.
@@ -49,8 +57,8 @@ def main() -> NoReturn:
         code = _fail(f"{error.format_message()}{_hint(error)}", USER_ERROR)
     except ConeflatError as error:
         code = _fail(str(error), USER_ERROR)
-    except (KeyboardInterrupt, click.exceptions.Abort):
-        code = _fail("interrupted; nothing was left half-written", INTERRUPTED)
+    except (KeyboardInterrupt, click.exceptions.Abort) as error:
+        code = _fail_interrupted(error)
     except BrokenPipeError:
         # The reader of our output is gone, as in `coneflat ... | head`; keep the shutdown quiet, too.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -63,14 +71,38 @@ def main() -> NoReturn:
     except Exception as error:
         if os.environ.get("CONEFLAT_DEBUG"):
             raise
-        code = _fail(
-            f"internal error, please report it: {type(error).__name__}: {error} "
-            "(CONEFLAT_DEBUG=1 shows where)",
-            INTERNAL_ERROR,
-        )
+        # An interrupt inside a compiled function arrives as a SystemError that it caused.
+        if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+            code = _fail_interrupted(error)
+        else:
+            code = _fail(
+                f"internal error, please report it: {type(error).__name__}: {error} "
+                "(CONEFLAT_DEBUG=1 shows where)",
+                INTERNAL_ERROR,
+            )
     # At its end, Python would look for garbage among all objects, three times: a tenth of a short run.
     gc.freeze()
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _open_closed_streams() -> None:
+    """Connect closed standard streams to the null device, so that no other file gets their descriptors."""
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(descriptor)
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+
+
+def _interrupt(number: int, _: FrameType | None) -> NoReturn:
+    raise KeyboardInterrupt(number)
+
+
+def _fail_interrupted(error: BaseException) -> int:
+    cause = error if isinstance(error, KeyboardInterrupt) else error.__cause__ or error.__context__ or error
+    number = cause.args[0] if isinstance(cause, KeyboardInterrupt) and cause.args else signal.SIGINT
+    return _fail("interrupted; no incomplete file was left", SIGNALLED + number)
 
 
 def _fail(message: str, code: int) -> int:

@@ -213,7 +213,11 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
         target.get("extensions", {}).pop(DRACO, None)
     _keep_the_rest(glb, data)
     _embed_images(glb, data, folder)
-    material = None if texture is None else glb.add_material(texture)
+    # Readers such as trimesh return the UVs of primitives that have a material only.
+    if texture is not None:
+        material = glb.add_material(texture)
+    elif not all("material" in target for target in targets):
+        material = glb.add("materials", MATERIAL)
     owned, first = _faces_of_parts(scene.parts, result.face_corners), 0
     for part, target, before, faces in zip(scene.parts, targets, old, owned, strict=True):
         vertices, points = part.corners[result.face_corners[faces] - first], result.uv_faces[faces]
@@ -222,7 +226,7 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
             vertices, points = vertices[:, ::-1], points[:, ::-1]
         if len(vertices):
             _fill(glb, data, target, before, vertices.reshape(-1), points.reshape(-1), result.uv)
-        if material is not None:
+        if texture is not None or "material" not in target:
             target["material"] = material
     _drop_empty(glb, targets)
     _forget_extensions(glb.tree)
