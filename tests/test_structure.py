@@ -33,7 +33,7 @@ CEILINGS = {
     "apps": 0,
     "apps.ahead": 38,
     "apps.batch": 400,
-    "apps.cli": 1497,
+    "apps.cli": 1498,
     "apps.peers": 1406,
     "apps.quads": 3199,
     "apps.studio": 1701,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 223,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_998, 233, 25_856
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_998, 233, 25_857
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

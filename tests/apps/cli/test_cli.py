@@ -144,6 +144,15 @@ def test_closed_standard_streams_do_not_prevent_the_output(tmp_path, closed):
     assert len(coneflat.measure_uv(tmp_path / "out.obj").mesh.faces) == 320
 
 
+def test_what_libraries_print_is_not_part_of_the_output():
+    code = """if True:
+        import os, coneflat.apps.cli.main as command
+        command.cli.main = lambda **_: os.write(1, b"CHOLMOD warning") and print("ours")
+        command.main()"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "ours\n"
+
+
 def test_interrupts_in_compiled_functions_are_interrupts(monkeypatch, capsys):
     def interrupted(**_):
         raise SystemError("returned a result with an exception set") from KeyboardInterrupt()

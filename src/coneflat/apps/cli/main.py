@@ -39,7 +39,7 @@ for command in (flatten, batch, quads, measure, cones, figure, view, studio, com
 
 def main() -> NoReturn:
     """Run the command; every failure is one line on stderr and a nonzero exit code."""
-    _open_closed_streams()
+    _open_streams()
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)  # Windows has no SIGHUP.
         if number is not None and signal.getsignal(number) == signal.SIG_DFL:
@@ -85,14 +85,21 @@ def main() -> NoReturn:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _open_closed_streams() -> None:
-    """Connect closed standard streams to the null device, so that no other file gets their descriptors."""
+def _open_streams() -> None:
+    """Connect closed standard streams to the null device, and what libraries print on standard output.
+
+    No other file gets the descriptors of closed streams then. CHOLMOD prints if a matrix is not positive definite.
+    """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(descriptor)
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+    if os.name != "nt" or not sys.stdout.isatty():
+        own = os.dup(1)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        sys.stdout = open(own, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)  # noqa: SIM115
 
 
 def _interrupt(number: int, _: FrameType | None) -> NoReturn:

@@ -201,10 +201,6 @@ def kept_apart(output: Path) -> Iterator[IO[bytes] | None]:
         yield None
         return
     stdout = sys.stdout.buffer
-    if stdout is getattr(sys.__stdout__, "buffer", None):
-        # Libraries that print of themselves write to the descriptor.
-        stdout = os.fdopen(os.dup(1), "wb")
-        os.dup2(2, 1)
     with redirect_stdout(sys.stderr):
         yield stdout
 
