@@ -41,11 +41,11 @@ class KernelLoader(CompileResultCacheImpl):  # type: ignore[misc]
         later: the libraries of loaded functions with their bitcode; None once something is compiled.
     """
 
-    later: ClassVar[list[tuple[Any, bytes]] | None] = []
+    deferred: ClassVar[list[tuple[Any, bytes]] | None] = []
 
     def rebuild(self, target_context: Any, payload: Any) -> Any:
         """Return the result of a compilation."""
-        if KernelLoader.later is None:
+        if KernelLoader.deferred is None:
             return super().rebuild(target_context, payload)
         (name, kind, (machine_code, bitcode)), description, *rest = payload
         # numba reads the names of symbols from the bitcode.
@@ -53,14 +53,14 @@ class KernelLoader(CompileResultCacheImpl):  # type: ignore[misc]
         loaded = super().rebuild(
             target_context, ((name, kind, (machine_code, _no_bitcode())), description, *rest)
         )
-        KernelLoader.later.append((loaded.library, bitcode))
+        KernelLoader.deferred.append((loaded.library, bitcode))
         return loaded
 
     @classmethod
-    def load_rest(cls) -> None:
+    def load_deferred(cls) -> None:
         """Load the bitcode that was left out, as a function is to be compiled."""
-        later, cls.later = cls.later or [], None
-        for library, bitcode in later:
+        deferred, cls.deferred = cls.deferred or [], None
+        for library, bitcode in deferred:
             library._shared_module = binding.parse_bitcode(bitcode)
             library.codegen._engine._load_defined_symbols(library._shared_module)
 
@@ -78,7 +78,7 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         """Return the result of compiling for types of arguments, None if there is none."""
         found = super().load_overload(sig, target_context)
         if found is None:
-            KernelLoader.load_rest()
+            KernelLoader.load_deferred()
         return found
 
 

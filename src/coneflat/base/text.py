@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from itertools import islice
 
 # Elements of an array, and characters of anything, that a message shows.
-FEW_SHOWN, MOST_SHOWN = 4, 80
-MOST_LISTED = 5
+MAX_SHOWN_ELEMENTS, MAX_SHOWN_CHARACTERS = 4, 80
+MAX_LISTED = 5
 
 
 def plural(count: int, noun: str, nouns: str | None = None) -> str:
@@ -18,9 +18,9 @@ def plural(count: int, noun: str, nouns: str | None = None) -> str:
 
 def list_some(items: Iterable[object], total: int | None = None) -> str:
     """Return the first few items, and dots if there are more."""
-    shown = list(islice(iter(items), MOST_LISTED + 1))
-    more = len(shown) > MOST_LISTED or (total is not None and total > MOST_LISTED)
-    return ", ".join(str(item) for item in shown[:MOST_LISTED]) + (", ..." if more else "")
+    shown = list(islice(iter(items), MAX_LISTED + 1))
+    more = len(shown) > MAX_LISTED or (total is not None and total > MAX_LISTED)
+    return ", ".join(str(item) for item in shown[:MAX_LISTED]) + (", ..." if more else "")
 
 
 def printable(text: str) -> str:
@@ -32,13 +32,13 @@ def shown(value: object) -> str:
     """Return what a message says of a value of any kind: one short line."""
     import numpy as np  # Commands that only print their help need none.
 
-    if isinstance(value, np.ndarray) and value.size > FEW_SHOWN:
+    if isinstance(value, np.ndarray) and value.size > MAX_SHOWN_ELEMENTS:
         return f"an array of shape {value.shape} and type {value.dtype}"
     try:
         text = " ".join(repr(value).split())
     except Exception:  # Whatever a foreign class does there.
         text = f"a {type(value).__name__}"
-    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
+    return text if len(text) <= MAX_SHOWN_CHARACTERS else f"{text[:MAX_SHOWN_CHARACTERS]}..."
 
 
 def off_by(residual: float, unit: str = " rad") -> str:

@@ -31,7 +31,7 @@ CONE_ANGLE_PER_TRIANGLE = 0.6 * np.pi
 # On meshes of so many vertices, a neighbour is as good a place: corners of cones there, all widened alike, must not
 # exceed this, or the straight sides of a triangle may have no room for one, and the search has to be repeated: 14% of
 # the time of a horse of 97,000 triangles.
-FINE_VERTICES, WIDEST_CORNER = 30_000, 0.95 * np.pi
+FINE_VERTICES, MAX_CORNER = 30_000, 0.95 * np.pi
 # Up to so many corners of a polyhedron are all made cones.
 MAX_POLYHEDRON_CORNERS = 24
 # The distortion asked for may be missed by so much, relatively, without a note.
@@ -59,9 +59,9 @@ def find_cones(
     """
     mesh = surface.mesh
     too_many_handles = has_many_handles(surface, spec)
-    if searches(surface, spec):
+    if uses_sparse_search(surface, spec):
         corners = polyhedron_corners(surface, spec)
-        return _searched(surface, spec, watch, holonomy) if corners is None else corners
+        return _search(surface, spec, watch, holonomy) if corners is None else corners
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     is_greedy = spec.strategy == "greedy" or too_many_handles
     if is_greedy:
@@ -69,7 +69,7 @@ def find_cones(
             *given, max_cones=spec.max_count, tie_key=mesh_tie_key(mesh), progress=watch.tell
         )
     elif len(spec.given):
-        solution = _fitted(surface, spec)
+        solution = _fit_given(surface, spec)
     else:  # "none", or none of the given ones is here
         solution = cones_at(*given, spec.given.vertices)
     if spec.scale_at_cones:
@@ -85,7 +85,7 @@ def find_cones(
     return solution
 
 
-def searches(surface: Surface, spec: ConeSpec) -> bool:
+def uses_sparse_search(surface: Surface, spec: ConeSpec) -> bool:
     """Whether the sparse search finds the cones of a mesh."""
     return spec.strategy == "sparse" or (
         spec.strategy == "auto"
@@ -95,13 +95,13 @@ def searches(surface: Surface, spec: ConeSpec) -> bool:
 
 def has_many_handles(surface: Surface, spec: ConeSpec) -> bool:
     """Whether a mesh has so many handles that the sparse search would take too long for the cones they need."""
-    from .sparse.limits import MOST_SEARCHED
+    from .sparse.limits import MAX_SEARCHED
 
     mesh = surface.mesh
     if spec.strategy != "auto" or spec.needs_sparse_search or mesh.is_boundary_vertex.any():
         return False
     # Each handle but one takes two cones of 4 pi.
-    return -mesh.euler_characteristic > MOST_SEARCHED // 2
+    return -mesh.euler_characteristic > MAX_SEARCHED // 2
 
 
 def polyhedron_corners(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
@@ -138,12 +138,12 @@ def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearc
     if search is not None:
         search.restrict(~search.is_boundary & spec.is_allowed)
         return search
-    room = (
+    max_angles = (
         CONE_ANGLE_PER_TRIANGLE * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
         + np.pi * mesh.is_boundary_vertex
     )
-    if len(room) >= FINE_VERTICES:
-        room = np.minimum(room, WIDEST_CORNER / surface.widest)
+    if len(max_angles) >= FINE_VERTICES:
+        max_angles = np.minimum(max_angles, MAX_CORNER / surface.widest)
     search = ConeSearch(
         surface.laplacian,
         surface.curvature,
@@ -157,7 +157,7 @@ def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearc
         weights=spec.weights,
         required=spec.required,
         allowed=spec.is_allowed,
-        room=room.astype(np.float64),
+        max_angles=max_angles.astype(np.float64),
         linear=linear_model(surface, spec),
     )
     search.tell = watch.tell
@@ -181,7 +181,7 @@ def linear_model(surface: Surface, spec: ConeSpec) -> LinearModel:
     share, absorbs = weighted_areas(surface.areas, spec.weights), spec.absorbs_curvature
     linear: LinearModel | None = surface.memo.get("linear")
     if linear is not None and np.array_equal(linear.is_boundary, absorbs):
-        linear = linear.weighing(share)
+        linear = linear.with_weights(share)
     else:
         key = mesh_tie_key(surface.mesh)
         linear = LinearModel.of(surface.laplacian, surface.curvature, share, absorbs, key)
@@ -190,7 +190,7 @@ def linear_model(surface: Surface, spec: ConeSpec) -> LinearModel:
     return linear
 
 
-def _fitted(surface: Surface, spec: ConeSpec) -> ConeSolution:
+def _fit_given(surface: Surface, spec: ConeSpec) -> ConeSolution:
     """Return the cones of which some or all have curvatures, the others with the best."""
     on_boundary = replace(spec, absorbs_curvature=surface.mesh.is_boundary_vertex)
     return fitted_cones(
@@ -203,7 +203,7 @@ def _fitted(surface: Surface, spec: ConeSpec) -> ConeSolution:
     )
 
 
-def _searched(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holonomy | None) -> ConeSolution:
+def _search(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holonomy | None) -> ConeSolution:
     """Return the fewest cones for the distortion allowed, or the best of the number asked for."""
     mesh = surface.mesh
     only = only_choice(surface, spec)
@@ -215,7 +215,7 @@ def _searched(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holo
     if spec.quantum is None:
         found = search.fewest(distortion, most) if count is None else search.best_of(count)
     else:
-        from ..geometry.handles import open_turning
+        from ..geometry.handles import loop_holonomy
         from .integer.search import align_handles, quantise_cones
 
         found = quantised = quantise_cones(
@@ -223,7 +223,7 @@ def _searched(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holo
         )
         if holonomy is not None:
             bound = max(quantised.distortion * HOLONOMY_FACTOR, distortion if count is None else 0.0)
-            by_scale = open_turning(mesh).by_log_scale(surface.lengths)
+            by_scale = loop_holonomy(mesh).by_log_scale(surface.lengths)
             found = align_handles(search, quantised, by_scale, holonomy, bound)
     solution = found.solution
     cones = solution.cones[~mesh.is_boundary_vertex[solution.cones]]

@@ -133,12 +133,12 @@ def fitted_cones(
     responses = operator.responses(unknown[cones])
     gram = _covariances(responses, responses, operator.areas)
     slope = _covariances(responses, linear.log_scale[None], operator.areas)[:, 0]
-    held = curvatures[~is_free]
-    total = np.nan if euler is None else 2 * np.pi * euler - held.sum()
+    prescribed = curvatures[~is_free]
+    total = np.nan if euler is None else 2 * np.pi * euler - prescribed.sum()
     count = int(is_free.sum())
     found, _, _ = fit_curvatures(
         np.ascontiguousarray(gram[np.ix_(is_free, is_free)]),
-        slope[is_free] + gram[np.ix_(is_free, ~is_free)] @ held,
+        slope[is_free] + gram[np.ix_(is_free, ~is_free)] @ prescribed,
         np.full(count, limits.least),
         np.full(count, limits.most),
         float(total),

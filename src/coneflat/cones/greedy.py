@@ -64,7 +64,7 @@ def greedy_cones(
 
 
 # Green's functions that are kept. More would cost more than the factorization that makes them needless.
-MOST_COLUMNS = 256
+MAX_COLUMNS = 256
 
 
 class _Search:
@@ -115,15 +115,15 @@ class _Search:
     def next_pair(self, epsilon: float) -> list[int]:
         """Return the vertices of largest and smallest phi, or nothing when the search is over."""
         top, bottom = argmax_tied(self.phi, self.tie_key), argmax_tied(-self.phi, self.tie_key)
-        room = self.limit - len(self.cones)
+        remaining = self.limit - len(self.cones)
         if self.floating:
             # On a torus one cone alone has curvature 0 and does nothing: two, or none.
-            return [top, bottom] if room >= 2 and self.phi[top] - self.phi[bottom] > epsilon else []
+            return [top, bottom] if remaining >= 2 and self.phi[top] - self.phi[bottom] > epsilon else []
         if self.phi[top] - self.phi[bottom] <= epsilon and self._is_feasible():
             return []
         pair = [v for v in (top, bottom) if not self.is_singular[v]]
         pair.sort(key=lambda v: -abs(self.phi[v]))
-        return pair[: max(room, 0)]
+        return pair[: max(remaining, 0)]
 
     def _is_feasible(self) -> bool:
         return bool((self._target()[self.cones] < FULL_TURN).all())
@@ -165,7 +165,7 @@ class _Search:
         self.phi -= g * (self.phi[vertex] / g[vertex])
         self._mark(vertex)
         self.phi[self.cones] = 0.0  # rounding left there would enter max - min
-        if len(self.anchors) == MOST_COLUMNS:
+        if len(self.anchors) == MAX_COLUMNS:
             self._ground_all()
             return
         if len(self.anchors) == self.columns.shape[1]:

@@ -14,12 +14,12 @@ from .orientation import counterclockwise
 
 # Crossings of horizontal lines with sides, about a minute: with more the areas are not computed. A hundredth of them is
 # sorted at a time, to bound the memory.
-MOST_CROSSINGS = 200_000_000
+MAX_CROSSINGS = 200_000_000
 # How many of them are held in memory at a time.
-AT_A_TIME = MOST_CROSSINGS // 100
+CROSSINGS_PER_BLOCK = MAX_CROSSINGS // 100
 
 
-def covered_twice(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
+def overlap_areas(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
     """Return the area inside at least two triangles, and that inside at least one.
 
     Args:
@@ -136,7 +136,7 @@ def _sweep(corners: FloatArray, steps: IntArray, crossings: FloatArray) -> tuple
     step, along = np.where(falls, step, -step), high - low
     heights = np.unique(np.concatenate([low[:, 1], high[:, 1], crossings]))
     first, last = np.searchsorted(heights, low[:, 1]), np.searchsorted(heights, high[:, 1])
-    if int((last - first).sum()) > MOST_CROSSINGS:
+    if int((last - first).sum()) > MAX_CROSSINGS:
         return float("nan"), float("nan")
     twice = more = 0.0
     for begin, stop in _blocks(first, last, len(heights)):
@@ -157,6 +157,6 @@ def _sweep(corners: FloatArray, steps: IntArray, crossings: FloatArray) -> tuple
 def _blocks(first: IntArray, last: IntArray, count: int) -> Iterator[tuple[int, int]]:
     """Yield ranges of strips between `count` heights that sides from `first` to `last` cross only so many times."""
     begun = np.bincount(first, minlength=count) - np.bincount(last, minlength=count)
-    crossed, block = np.cumsum(np.cumsum(begun)), AT_A_TIME
+    crossed, block = np.cumsum(np.cumsum(begun)), CROSSINGS_PER_BLOCK
     cuts = np.searchsorted(crossed, np.arange(block, crossed[-1], block))
     yield from pairwise(np.unique(np.concatenate([[0], cuts, [count - 1]])).tolist())

@@ -37,8 +37,8 @@ class Fans:
         """Return an order of the triangles, but those of each fan one after the other as they lie around its point."""
         rank = np.empty(len(order))
         rank[order] = np.arange(len(order))
-        is_in_none = self.numbers < 0
-        along: IntArray = np.lexsort((np.where(is_in_none, rank, self.angles[:, 0]), self.numbers))
+        is_outside = self.numbers < 0
+        along: IntArray = np.lexsort((np.where(is_outside, rank, self.angles[:, 0]), self.numbers))
         return along
 
     def tree(self, order: IntArray, leaves: int) -> tuple[IntArray, FloatArray]:
@@ -95,7 +95,7 @@ def find_fans(corners: FloatArray) -> Fans | None:
 
 
 @compiled
-def lie_apart(numbers: IntArray, angles: FloatArray, i: int, j: int) -> bool:
+def are_disjoint(numbers: IntArray, angles: FloatArray, i: int, j: int) -> bool:
     """Return whether the triangles of two nodes are of one fan and of other angles: so no inner points are in both."""
     if numbers[i] < 0 or numbers[i] != numbers[j]:
         return False

@@ -102,7 +102,7 @@ def off_multiple(angles: FloatArray, quantum: float) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Turning:
+class Holonomy:
     """The turning of loops across the handles of a connected mesh, and around its holes.
 
     Attributes:
@@ -128,7 +128,7 @@ class Turning:
         return np.asarray((self.by_log_lengths(lengths) @ edge_means(self.mesh)).todense())
 
 
-def open_turning(mesh: TriangleMesh, holes: bool = False) -> Turning:
+def loop_holonomy(mesh: TriangleMesh, holes: bool = False) -> Holonomy:
     """Return the turning of the loops across a mesh's handles; with holes, of those around them, too."""
     loops = handle_loops(mesh, holes)
     twin = halfedge_twins(mesh)
@@ -136,7 +136,7 @@ def open_turning(mesh: TriangleMesh, holes: bool = False) -> Turning:
     rows = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
     columns = np.concatenate([part[0] for part in parts] or [np.empty(0, dtype=np.int64)])
     values = np.concatenate([part[1] for part in parts] or [np.empty(0)])
-    return Turning(mesh, loops, csr_matrix((values, (rows, columns)), shape=(len(loops), len(twin))))
+    return Holonomy(mesh, loops, csr_matrix((values, (rows, columns)), shape=(len(loops), len(twin))))
 
 
 def edge_means(mesh: TriangleMesh) -> csr_matrix:

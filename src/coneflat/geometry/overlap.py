@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.arrays import FloatArray, IntArray, as_faces, as_floats, require_finite, rows_of, unit_exponent
 from ..base.compiled import compiled
 from ..errors import ArrayShapeError, OptionError
-from .coverage import covered_twice
-from .fans import find_fans, lie_apart
+from .coverage import overlap_areas
+from .fans import are_disjoint, find_fans
 from .layers import may_overlap, open_sides
 from .orientation import fill_orientations, orientation
 
@@ -72,8 +72,8 @@ def find_overlaps(
     if limit is not None and limit < 1:
         raise OptionError(f"the limit must be 1 or more, not {limit}")
     corners, exponent = _at_unit_size(_corners(points, triangles))
-    turned, signs = _counterclockwise(corners)
-    return _overlaps(turned, exponent, np.flatnonzero(signs), limit)
+    oriented, signs = _counterclockwise(corners)
+    return _overlaps(oriented, exponent, np.flatnonzero(signs), limit)
 
 
 def overlaps_of_mesh(edge_halfedges: IntArray, corners: FloatArray) -> Overlaps:
@@ -86,20 +86,20 @@ def overlaps_of_mesh(edge_halfedges: IntArray, corners: FloatArray) -> Overlaps:
         corners: (m, 3, 2) of the triangles in the plane.
     """
     corners, exponent = _at_unit_size(_corners(corners, None))
-    turned, signs = _counterclockwise(corners)
+    oriented, signs = _counterclockwise(corners)
     # What is not counterclockwise has sides that add up with those beside them, or none that count.
     is_open = open_sides(edge_halfedges, corners, signs - 1)
-    return _overlaps(turned, exponent, may_overlap(corners, signs, is_open), None)
+    return _overlaps(oriented, exponent, may_overlap(corners, signs, is_open), None)
 
 
-def _overlaps(turned: FloatArray, exponent: int, chosen: IntArray, limit: int | None) -> Overlaps:
+def _overlaps(oriented: FloatArray, exponent: int, chosen: IntArray, limit: int | None) -> Overlaps:
     """Return the overlaps of chosen triangles, of those of all which may overlap; see `_find_pairs`."""
-    pairs, complete = _find_pairs(turned, chosen, limit)
+    pairs, complete = _find_pairs(oriented, chosen, limit)
     if not complete:
         return Overlaps(pairs, float("nan"), float("nan"), False)
     if not len(pairs):
         return Overlaps(pairs, 0.0, 0.0)
-    twice, once = covered_twice(turned, pairs)
+    twice, once = overlap_areas(oriented, pairs)
     return Overlaps(pairs, float(np.ldexp(twice, 2 * exponent)), 0.0 if once <= 0 else twice / once)
 
 
@@ -138,9 +138,9 @@ def _counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:
     clockwise = np.flatnonzero(signs < 0)
     if not len(clockwise):
         return corners, signs
-    turned = corners.copy()
-    turned[clockwise] = corners[clockwise][:, ::-1]
-    return turned, signs
+    oriented = corners.copy()
+    oriented[clockwise] = corners[clockwise][:, ::-1]
+    return oriented, signs
 
 
 def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tuple[IntArray, bool]:
@@ -151,7 +151,7 @@ def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tup
     if len(chosen) < 2:
         return np.empty((0, 2), dtype=np.int64), True
     places = rows_of(corners.reshape(-1, 6), chosen)
-    boxes = snug_boxes(places.reshape(-1, 3, 2))
+    boxes = bounding_boxes(places.reshape(-1, 3, 2))
     order = z_order(boxes)
     fans = find_fans(places.reshape(-1, 3, 2))
     if fans is not None:
@@ -163,14 +163,14 @@ def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tup
     chosen = chosen[order]
     arrays = tree, *around, rows_of(places, order), np.empty(12)
     stack, top = np.zeros((4 * len(tree).bit_length(), 2), dtype=np.int64), 1
-    keys, room, left = [], len(chosen), np.inf if limit is None else limit + 1
+    keys, capacity, left = [], len(chosen), np.inf if limit is None else limit + 1
     while top > 0 and left > 0:
-        found = np.empty((int(min(left, room)), 2), dtype=np.int64)
+        found = np.empty((int(min(left, capacity)), 2), dtype=np.int64)
         top, count = join(*arrays, stack, top, found)
         pairs = chosen[found[:count]]
         keys.append(pairs.min(axis=1) * len(corners) + pairs.max(axis=1))
         left -= count
-        room *= 2
+        capacity *= 2
     key = np.sort(np.concatenate(keys)[:limit])
     return np.stack(np.divmod(key, len(corners)), axis=1), left > 0
 
@@ -181,7 +181,7 @@ COORDINATE_ROUNDING = 2.0**-48
 MAX_BOX_SHARE = 0.5
 
 
-def snug_boxes(corners: FloatArray) -> FloatArray:
+def bounding_boxes(corners: FloatArray) -> FloatArray:
     """Return (m, 4) x0, y0, -x1, -y1 of triangles (m, 3, 2), none above 1: the box around several is their minimum.
 
     They are along the axes, or along the sides of long triangles askew to them; these are larger by what rounding may
@@ -191,8 +191,8 @@ def snug_boxes(corners: FloatArray) -> FloatArray:
     flat = np.ascontiguousarray(corners).reshape(-1, 6)
     area, x, y = fill_boxes(flat, 1.0, 0.0, 0.0, straight)
     turn = -math.atan2(y, x) / 2
-    turned_area, _, _ = fill_boxes(flat, math.cos(turn), math.sin(turn), COORDINATE_ROUNDING, askew)
-    return askew if turned_area < MAX_BOX_SHARE * area else straight
+    rotated_area, _, _ = fill_boxes(flat, math.cos(turn), math.sin(turn), COORDINATE_ROUNDING, askew)
+    return askew if rotated_area < MAX_BOX_SHARE * area else straight
 
 
 @compiled
@@ -334,7 +334,7 @@ def join(
         for a in range(2 * i + 1, 2 * i + 3):
             for b in range(2 * j + 1, 2 * j + 3):
                 if (a == b and a < first_leaf) or (
-                    a < b and _boxes_meet(tree, a, b) and not (len(fans) and lie_apart(fans, angles, a, b))
+                    a < b and _boxes_meet(tree, a, b) and not (len(fans) and are_disjoint(fans, angles, a, b))
                 ):
                     stack[top, 0] = a
                     stack[top, 1] = b

@@ -12,7 +12,7 @@ from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
 # coordinates are good to about 1e-12 of an edge.
 FLAT_HEIGHT = 1e-10
 # Areas below so much of the mean are taken as so much, where a logarithm is wanted.
-LEAST_AREA = 1e-12
+MIN_AREA = 1e-12
 
 
 def as_complex(places: FloatArray) -> ComplexArray:
@@ -106,7 +106,7 @@ def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) 
     ratio = []
     for areas in (before, after):
         around = np.bincount(mesh.faces.ravel(), np.repeat(areas, 3), minlength=len(mesh.vertices))
-        ratio.append(np.maximum(around, LEAST_AREA * around.mean()))
+        ratio.append(np.maximum(around, MIN_AREA * around.mean()))
     log_scale: FloatArray = np.log(ratio[1] / ratio[0]) / 2
     return log_scale
 

@@ -150,7 +150,7 @@ def mollify(
 
 
 @compiled
-def slack_beside(lengths: FloatArray, t: int, i: int) -> float:
+def side_slack(lengths: FloatArray, t: int, i: int) -> float:
     """Return by how much the two other sides of a triangle are longer than side i."""
     b, c = lengths[t, (i + 1) % 3], lengths[t, (i + 2) % 3]
     return float(min(b, c) - (lengths[t, i] - max(b, c)))
@@ -161,7 +161,7 @@ def fill_slacks(lengths: FloatArray, slack: FloatArray) -> None:
     """Fill (m, 3) b + c - a for every side a of triangles with sides (m, 3)."""
     for t in range(len(lengths)):
         for i in range(3):
-            slack[t, i] = slack_beside(lengths, t, i)
+            slack[t, i] = side_slack(lengths, t, i)
 
 
 @compiled
@@ -170,7 +170,7 @@ def fill_cotangents(lengths: FloatArray, cots: FloatArray) -> None:
     for t in range(len(lengths)):
         perimeter, product = lengths[t, 0] + lengths[t, 1] + lengths[t, 2], 1.0
         for i in range(3):
-            cots[t, i] = slack_beside(lengths, t, i)
+            cots[t, i] = side_slack(lengths, t, i)
             product *= 0.0 if cots[t, i] < 0.0 else cots[t, i]
         # Eight times the area, rounded as `fill_double_areas` rounds.
         eightfold = 4 * (math.sqrt(perimeter * product) / 2)
@@ -186,7 +186,7 @@ def fill_double_areas(lengths: FloatArray, areas: FloatArray) -> None:
     for t in range(len(lengths)):
         product = 1.0
         for i in range(3):
-            slack = slack_beside(lengths, t, i)
+            slack = side_slack(lengths, t, i)
             product *= 0.0 if slack < 0.0 else slack  # what is not a number stays so
         areas[t] = math.sqrt((lengths[t, 0] + lengths[t, 1] + lengths[t, 2]) * product) / 2
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..base.arrays import BoolArray, FloatArray, IntArray, dots
 from ..base.compiled import compiled
 from ..errors import OptionError
-from ..mesh.ties import own_axes
+from ..mesh.ties import shape_axes
 from .triangles import vertex_normals
 
 # Directions to look from, evenly spread, and pixels along the side of each picture.
@@ -29,22 +29,22 @@ def visible_share(vertices: FloatArray, faces: IntArray, up: FloatArray | None =
     Raises:
         OptionError: `up` is not a direction.
     """
-    axes = own_axes(vertices)
+    axes = shape_axes(vertices)
     if up is not None:
-        axes = _upright(axes, np.asarray(up, dtype=np.float64))
+        axes = _axes_with_up(axes, np.asarray(up, dtype=np.float64))
     centred = vertices - vertices.mean(axis=0)
     size = float(np.sqrt(dots(centred, centred).max()))
     points = centred * ((PIXELS / 2 - 1) / size if size > 0 else 1.0)
     normals = vertex_normals(vertices, faces)
-    seen, whole = np.zeros((2, 2, len(vertices)))
+    seen, total = np.zeros((2, 2, len(vertices)))
     for direction in _directions() @ axes:
         facing = normals @ direction
         side = (facing < 0).astype(np.int64), np.arange(len(vertices))
         amount = np.abs(facing)
-        whole[side] += amount
+        total[side] += amount
         weight = 1.0 if up is None else (1 + direction @ axes[2]) / 2
         seen[side] += weight * amount * _is_seen(points, faces, amount, direction, axes)
-    share = (seen / np.maximum(whole, np.finfo(float).tiny)).max(axis=0)
+    share = (seen / np.maximum(total, np.finfo(float).tiny)).max(axis=0)
     # The mean of (1 + z) / 2 over a hemisphere, where directions count by z.
     best = 1.0 if up is None else 5 / 6
     return np.minimum(share / best, 1.0)
@@ -77,7 +77,7 @@ def _directions() -> FloatArray:
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
 
 
-def _upright(axes: FloatArray, up: FloatArray) -> FloatArray:
+def _axes_with_up(axes: FloatArray, up: FloatArray) -> FloatArray:
     """Return axes of which the third is up."""
     length = np.linalg.norm(up) if up.shape == (3,) else np.nan
     if not (np.isfinite(length) and length > 0):

@@ -57,7 +57,7 @@ class Factor:
         """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
         return np.zeros_like(right)
 
-    def renewed(self, matrix: csc_matrix) -> Factor:
+    def refactorized(self, matrix: csc_matrix) -> Factor:
         """Return the factor of another matrix of the same size, and use this one up: its analysis may serve again.
 
         Raises:
@@ -140,7 +140,7 @@ def factorize(
     is_by_pardiso = max(size, whole) >= MIN_PARDISO_UNKNOWNS and has_pardiso()
     try:
         if used_up is not None:
-            return used_up.renewed(matrix)
+            return used_up.refactorized(matrix)
         if is_scattered and size < MAX_SUPERLU_UNKNOWNS:
             return SuperLUFactor(matrix)
         return _by_pardiso(matrix) if is_by_pardiso else CholespyFactor(matrix)

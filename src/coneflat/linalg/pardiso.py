@@ -42,7 +42,7 @@ class Phase(IntEnum):
     RELEASE = -1
 
 
-class Place(IntEnum):
+class Parameter(IntEnum):
     """Positions in PARDISO's table of parameters."""
 
     NO_DEFAULTS = 0
@@ -60,13 +60,13 @@ class Code(IntEnum):
 
 # Parallel nested dissection, and a factorization on two levels; a permutation, given or asked for, would silently turn
 # that off.
-SETTINGS = {Place.NO_DEFAULTS: 1, Place.ORDERING: 3, Place.SCHEDULE: 1, Place.FROM_ZERO: 1}
+SETTINGS = {Parameter.NO_DEFAULTS: 1, Parameter.ORDERING: 3, Parameter.SCHEDULE: 1, Parameter.FROM_ZERO: 1}
 # MKL's file on each system, and what tells pypardiso of another one.
 RUNTIMES = ("libmkl_rt.", "mkl_rt.")
-LIBRARY_GIVEN = "PYPARDISO_MKL_RT"
+LIBRARY_VARIABLE = "PYPARDISO_MKL_RT"
 # How long, in milliseconds, a thread of MKL that has nothing to do turns in circles on its core before it sleeps; by
 # default 200, which other stages or other processes need.
-WAITING_TIME = "KMP_BLOCKTIME"
+BLOCK_TIME_VARIABLE = "KMP_BLOCKTIME"
 
 
 class PardisoFactor(Factor):
@@ -115,7 +115,7 @@ class PardisoFactor(Factor):
         self._call(Phase.SOLVE, columns, solution)
         return solution.T
 
-    def renewed(self, matrix: csc_matrix) -> PardisoFactor:
+    def refactorized(self, matrix: csc_matrix) -> PardisoFactor:
         """Return the factor of another matrix of the same size."""
         if matrix.indices is not self._indices:
             # A second analysis by one handle would leave the memory of the first behind.
@@ -208,12 +208,12 @@ def _routines() -> tuple[Any, Any]:
 
 def _library() -> ctypes.CDLL:
     """Load MKL from the package that brings it; pypardiso, which knows more places, looks through all folders."""
-    os.environ.setdefault(WAITING_TIME, "0")
+    os.environ.setdefault(BLOCK_TIME_VARIABLE, "0")
     try:
         installed = metadata.files("mkl") or ()
     except metadata.PackageNotFoundError:
         installed = ()
-    for path in installed if LIBRARY_GIVEN not in os.environ else ():
+    for path in installed if LIBRARY_VARIABLE not in os.environ else ():
         if path.name.startswith(RUNTIMES):
             with suppress(OSError):
                 return ctypes.CDLL(str(path.locate()))

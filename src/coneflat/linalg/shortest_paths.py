@@ -55,7 +55,7 @@ class MultiGraph:
     beside: tuple[IntArray, IntArray] | None = None
 
     @cached_property
-    def _beside(self) -> tuple[IntArray, IntArray]:
+    def _incident(self) -> tuple[IntArray, IntArray]:
         return edges_at_nodes(self.ends, self.nodes) if self.beside is None else self.beside
 
     def shortest_paths(self, sources: IntArray, targets: IntArray | None = None) -> Paths:
@@ -71,7 +71,7 @@ class MultiGraph:
             is_target[targets] = True
         distance = np.full(self.nodes, np.inf)
         before, edge, source = np.full((3, self.nodes), -1)
-        find_paths(*self._beside, self.ends, self.costs, sources, is_target, distance, before, edge, source)
+        find_paths(*self._incident, self.ends, self.costs, sources, is_target, distance, before, edge, source)
         return Paths(distance, before, edge, source)
 
     def minimum_spanning_tree(self) -> IntArray:

@@ -219,8 +219,8 @@ class _Check:
             np.concatenate([first, first + count]),
             np.concatenate([second + crossing, second + count - crossing]),
         )
-        turn = half[:count] > half[count:]
-        conflict = same_way ^ turn[one] ^ turn[two]
+        flip = half[:count] > half[count:]
+        conflict = same_way ^ flip[one] ^ flip[two]
         if conflict.any():
             if not self.repair:
                 raise NonOrientableError(
@@ -232,23 +232,23 @@ class _Check:
             self.notes.append(f"Cut the one-sided surface at {plural(int(conflict.sum()), 'edge')}.")
         components, component = label_components(count, one[tree], two[tree])
         sizes = np.bincount(component, minlength=components)
-        turned = np.bincount(component, weights=turn, minlength=components)
-        turn ^= (turned > sizes / 2)[component]
-        self._turn(turn)
+        flipped = np.bincount(component, weights=flip, minlength=components)
+        flip ^= (flipped > sizes / 2)[component]
+        self._flip(flip)
 
     def _edge_name(self, pair: int) -> str:
         h = self.pairs[pair, 0]
         ends = sorted((int(self.faces[h // 3, NEXT[h % 3]]), int(self.faces[h // 3, PREVIOUS[h % 3]])))
         return f"{ends[0]}-{ends[1]}"
 
-    def _turn(self, turn: BoolArray) -> None:
-        self.faces = np.where(turn[:, None], self.faces[:, [0, 2, 1]], self.faces)
-        self.is_turned ^= turn
+    def _flip(self, flip: BoolArray) -> None:
+        self.faces = np.where(flip[:, None], self.faces[:, [0, 2, 1]], self.faces)
+        self.is_turned ^= flip
         corner = self.pairs % 3
         exchanged = np.where(corner == 0, 0, 3 - corner)
-        self.pairs = np.where(turn[self.pairs // 3], self.pairs - corner + exchanged, self.pairs)
-        if turn.any():
-            self.notes.append(f"Turned {plural(int(turn.sum()), 'face')} to agree with the rest.")
+        self.pairs = np.where(flip[self.pairs // 3], self.pairs - corner + exchanged, self.pairs)
+        if flip.any():
+            self.notes.append(f"Turned {plural(int(flip.sum()), 'face')} to agree with the rest.")
 
     def split_fans(self) -> None:
         """Refuse or split vertices with more than one fan of faces; leave out isolated vertices."""
@@ -295,8 +295,8 @@ def weld(vertices: FloatArray) -> tuple[IntArray, IntArray]:
     """
     rows = np.ascontiguousarray(vertices, dtype=np.float64) + 0.0
     # As one value of so many bytes each, rows are sorted several times as fast as by columns.
-    whole = rows.view(f"V{rows.itemsize * rows.shape[1]}").reshape(-1)
-    _, first, number = np.unique(whole, return_index=True, return_inverse=True)
+    rows_as_bytes = rows.view(f"V{rows.itemsize * rows.shape[1]}").reshape(-1)
+    _, first, number = np.unique(rows_as_bytes, return_index=True, return_inverse=True)
     order = np.argsort(first)
     place = np.empty_like(order)
     place[order] = np.arange(len(order))

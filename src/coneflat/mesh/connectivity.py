@@ -97,12 +97,12 @@ class TriangleMesh:
     @cached_property
     def tails(self) -> IntArray:
         """(3m,) vertex that each half-edge starts from."""
-        return _turned(self.faces, NEXT)
+        return _permuted(self.faces, NEXT)
 
     @cached_property
     def heads(self) -> IntArray:
         """(3m,) vertex that each half-edge ends at."""
-        return _turned(self.faces, PREVIOUS)
+        return _permuted(self.faces, PREVIOUS)
 
     def ends_of(self, halfedges: IntArray) -> tuple[IntArray, IntArray]:
         """Return the vertices that some half-edges start from and end at; those of all need not be listed for it."""
@@ -203,12 +203,12 @@ class TriangleMesh:
         return parts
 
 
-def _turned(faces: IntArray, columns: IntArray) -> IntArray:
+def _permuted(faces: IntArray, columns: IntArray) -> IntArray:
     """Return (3m,) other columns (3,) of faces (m, 3), one by one: NumPy is slow at picking several."""
-    turned = np.empty(faces.shape, dtype=np.int64)
+    permuted = np.empty(faces.shape, dtype=np.int64)
     for i, column in enumerate(columns):
-        turned[:, i] = faces[:, column]
-    return turned.ravel()
+        permuted[:, i] = faces[:, column]
+    return permuted.ravel()
 
 
 def corner_fans(faces: IntArray, one: IntArray, two: IntArray) -> tuple[int, IntArray]:
@@ -243,7 +243,7 @@ def end_corners(halfedges: IntArray) -> tuple[IntArray, IntArray]:
 
 
 # Sides of so many edges from one vertex are sorted by insertion, more by merging: quicksort takes n^2 around a hub.
-FEW_SIDES = 64
+MAX_INSERTION_SORT = 64
 
 
 @compiled
@@ -274,7 +274,7 @@ def pair_sides(faces: IntArray, count: int) -> tuple[IntArray, IntArray, IntArra
             place[low] += 1
     edges = 0
     for v in range(count):
-        sort_few(keys[starts[v] : starts[v + 1]])
+        sort_keys(keys[starts[v] : starts[v + 1]])
         last = -1
         for at in range(starts[v], starts[v + 1]):
             edges += keys[at] >> bits != last
@@ -299,9 +299,9 @@ def pair_sides(faces: IntArray, count: int) -> tuple[IntArray, IntArray, IntArra
 
 
 @compiled
-def sort_few(keys: IntArray) -> None:
+def sort_keys(keys: IntArray) -> None:
     """Sort different numbers, mostly few, in place."""
-    if len(keys) > FEW_SIDES:
+    if len(keys) > MAX_INSERTION_SORT:
         keys[:] = keys[np.argsort(keys, kind="mergesort")]
         return
     for at in range(1, len(keys)):

@@ -67,10 +67,10 @@ class Polygons:
         points: (c,) what `points` returns.
         """
         counts = np.bincount(self.owner, minlength=len(self.sizes))
-        whole: BoolArray = (counts == self.sizes - 2) & np.logical_and.reduceat(
+        complete: BoolArray = (counts == self.sizes - 2) & np.logical_and.reduceat(
             points >= 0, self.offsets[:-1]
         )
-        return whole
+        return complete
 
     def corner_triples(self, points: IntArray) -> tuple[IntArray, IntArray]:
         """Return (k, 3) the points before, at and after each corner of whole polygons of four corners and more.

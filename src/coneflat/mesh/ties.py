@@ -14,7 +14,7 @@ from .connectivity import TriangleMesh
 EQUAL_TOLERANCE = 1e-9
 
 
-def _own_vectors(centred: FloatArray) -> tuple[FloatArray | None, FloatArray | None]:
+def _shape_vectors(centred: FloatArray) -> tuple[FloatArray | None, FloatArray | None]:
     """Return two unit vectors that turn with the shape, None for those that it is too symmetric to have.
 
     Args:
@@ -38,13 +38,13 @@ def _centred(vertices: FloatArray) -> FloatArray:
     return centred / size if size > 0 else centred
 
 
-def own_axes(vertices: FloatArray) -> FloatArray:
+def shape_axes(vertices: FloatArray) -> FloatArray:
     """Return three orthonormal axes, rows, that turn with the shape.
 
     Those that it is too symmetric to have are taken from the coordinate axes.
     """
     axes: list[FloatArray] = []
-    for vector in (*_own_vectors(_centred(vertices)), *np.eye(3)):
+    for vector in (*_shape_vectors(_centred(vertices)), *np.eye(3)):
         if vector is not None and len(axes) < 2:
             rest = vector - sum(axis * (axis @ vector) for axis in axes)
             if np.linalg.norm(2 * rest) > 1:
@@ -59,7 +59,7 @@ def tie_key(vertices: FloatArray) -> FloatArray:
     plane of mirror symmetry, if it has one, and their cross product tells the sides of it.
     """
     centred = _centred(vertices)
-    one, across = _own_vectors(centred)
+    one, across = _shape_vectors(centred)
     key: FloatArray = dots(centred, centred)
     if one is not None:
         key += 0.3 * (centred @ one)

@@ -15,7 +15,7 @@ from ..geometry.delaunay import make_delaunay
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..linalg import Factor, factorize
 from ..linalg.newton import HALVINGS, Limits, Point, minimise
-from .hessian import HeldInverse, HessianPattern, Inverse, conjugate_gradients, corrected
+from .hessian import GroundedInverse, HessianPattern, Inverse, conjugate_gradients, corrected
 
 # Residual, radians, below which nothing is left to gain: the rounding of a sum of a few angles.
 GOAL_RESIDUAL = 1e-13
@@ -74,7 +74,7 @@ class ConformalProblem:
     """
 
     triangulation: IntrinsicTriangulation
-    flat_turn: FloatArray
+    flat_angle: FloatArray
     target: FloatArray
     fixed: BoolArray
     pinned: BoolArray
@@ -135,7 +135,7 @@ class ConformalProblem:
             if len(flipped):
                 self.record(flipped)
                 broken = self.sum_angles(log_scale, sums, cots)
-        curvature = self.flat_turn - sums
+        curvature = self.flat_angle - sums
         residual = np.where(self.fixed, 0.0, self.target - curvature)
         if not self.fixed.any() and np.count_nonzero(self.pinned) == 1:
             # Gauss-Bonnet holds but for the rounding of 2 pi at every vertex, which no scale can take away.
@@ -165,10 +165,10 @@ class ConformalProblem:
             step = conjugate_gradients(hessian, state.residual, inverse, accuracy)
             if step is not None:
                 return np.where(self.fixed, 0.0, step), False
-        held = self.fixed | self.pinned
-        hessian = self._pattern.matrix(state.cots, held)
+        grounded = self.fixed | self.pinned
+        hessian = self._pattern.matrix(state.cots, grounded)
         self._factor = factorize(hessian, self._factor)
-        self.preconditioner = HeldInverse(self._factor, hessian, held)
+        self.preconditioner = GroundedInverse(self._factor, hessian, grounded)
         return self.preconditioner.solve(state.residual), True
 
     def _corrected(self, inverse: Inverse, hessian: csc_matrix, log_scale: FloatArray) -> Inverse:

@@ -20,7 +20,7 @@ from .hessian import Inverse
 # How far, in radians, prescribed curvatures may miss Gauss-Bonnet; decimals typed by hand are good to more.
 SUM_TOLERANCE = 1e-8
 # A first guess of phi with a wider range than this makes lengths whose squares overflow.
-WIDEST_RANGE = 1000.0
+MAX_RANGE = 1000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +124,9 @@ def exact_metric(
         raise NonFiniteError(f"fixed_log_scale is NaN or infinite at {_at(bad)}")
 
     plain = np.where(fixed, log_scale, 0.0)
-    if not np.ptp(log_scale) <= WIDEST_RANGE:
+    if not np.ptp(log_scale) <= MAX_RANGE:
         log_scale = plain
-    flat_turn = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
+    flat_angle = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
     copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
     doubled = False
 
@@ -144,7 +144,7 @@ def exact_metric(
                 np.concatenate([pinned, np.zeros(len(original) - n, dtype=bool)]),
             )
         else:
-            problem = ConformalProblem(triangulation, flat_turn, target, fixed, pinned, preconditioner)
+            problem = ConformalProblem(triangulation, flat_angle, target, fixed, pinned, preconditioner)
         euclidean = problem.prepare(delaunay, None if known is None else known[1])
         state, steps = find_scale(problem, first[original], tolerance, max_steps)
         return problem, state, original, euclidean, steps

@@ -15,7 +15,7 @@ from scipy.sparse import csc_matrix
 from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..errors import ConvergenceError
 from ..geometry import corner_angles, double_areas
-from ..geometry.handles import Turning, curvature_by_log_lengths, edge_means, off_multiple, open_turning
+from ..geometry.handles import Holonomy, curvature_by_log_lengths, edge_means, loop_holonomy, off_multiple
 from ..geometry.straight import FlatTriangles
 from ..geometry.triangles import slacks
 from ..linalg import factorize
@@ -30,7 +30,7 @@ MAX_STEPS, TOLERANCE = 60, 1e-11
 # Largest change of the log of a length in one step: from there on, what is least is found anew.
 LARGEST_CHANGE = 0.2
 # A step of less than this part of the whole is too little: triangles are as flat as can be.
-LEAST_PART = 1e-3
+MIN_FRACTION = 1e-3
 # What scaling counts in the norm of a strain, relative to shear: next to nothing, for it can be undone conformally.
 SCALING_WEIGHT = 1e-3
 # Shear at cones turns loops best, for it amounts to moving the cones; but little room has to bear much of it then.
@@ -52,15 +52,15 @@ def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> F
     choices = _exact_choices(surface, solution, spec)
     if quantum is not None:
         if not choices.is_held(mesh).any():
-            turning = open_turning(mesh, holes=True)
+            holonomy = loop_holonomy(mesh, holes=True)
             try:
-                if len(turning.loops) > 2 * mesh.genus():
-                    return corrected_flat_metric(lengths, solution, choices, turning, quantum)
+                if len(holonomy.loops) > 2 * mesh.genus():
+                    return corrected_flat_metric(lengths, solution, choices, holonomy, quantum)
             except ConvergenceError:
                 # Triangles cannot turn as far; handles alone may.
                 pass
         if mesh.genus():
-            return corrected_flat_metric(lengths, solution, choices, open_turning(mesh), quantum)
+            return corrected_flat_metric(lengths, solution, choices, loop_holonomy(mesh), quantum)
     delaunay = surface.delaunay if surface.is_reused else surface.known_delaunay
     return exact_flat_metric(mesh, lengths, solution, choices, delaunay)
 
@@ -72,12 +72,12 @@ def loop_rotations(surface: Surface, spec: MetricSpec) -> Callable[[ConeSolution
     """
     if spec.method != "exact" or not surface.mesh.genus():
         return None
-    turning, plain = open_turning(surface.mesh), spec.plain()
+    holonomy, plain = loop_holonomy(surface.mesh), spec.plain()
 
     def rotations(solution: ConeSolution) -> FloatArray:
         triangles = find_metric(surface, solution, plain).triangles
         assert triangles is not None
-        return turning.of_flat(triangles)
+        return holonomy.of_flat(triangles)
 
     return rotations
 
@@ -93,7 +93,7 @@ def _exact_choices(surface: Surface, solution: ConeSolution, spec: MetricSpec) -
     return ExactChoices(
         scale_at_cones=spec.scale_at_cones,
         boundary=boundary,
-        kept=spec.keeps_length,
+        rigid=spec.keeps_length,
         keep_area=spec.keeps_area,
         accepts_failure=spec.accepts_failure,
         names=spec.names,
@@ -101,7 +101,7 @@ def _exact_choices(surface: Surface, solution: ConeSolution, spec: MetricSpec) -
 
 
 def corrected_flat_metric(
-    lengths: FloatArray, solution: ConeSolution, choices: ExactChoices, turning: Turning, quantum: float
+    lengths: FloatArray, solution: ConeSolution, choices: ExactChoices, holonomy: Holonomy, quantum: float
 ) -> FlatMetric:
     """Return a flat metric with the cones of a solution whose loops turn by multiples of a quantum.
 
@@ -117,10 +117,10 @@ def corrected_flat_metric(
     Raises:
         ConvergenceError: the rotations did not get there.
     """
-    mesh = turning.mesh
+    mesh = holonomy.mesh
     given = lengths
-    metric, triangles = _solved(mesh, lengths, solution, choices)
-    off = off_multiple(turning.of_flat(triangles), quantum)
+    metric, triangles = _solve_metric(mesh, lengths, solution, choices)
+    off = off_multiple(holonomy.of_flat(triangles), quantum)
     first = float(np.abs(off).max())
     fixed = choices.is_open(mesh)
     changes = None
@@ -134,21 +134,21 @@ def corrected_flat_metric(
             return replace(metric, notes=(*metric.notes, note))
         if changes is None:
             sides = np.abs(triangles.sides).reshape(-1, 3)
-            changes = least_changes(turning, sides, shear_norm(mesh, lengths, solution.cones), fixed)
+            changes = least_changes(holonomy, sides, shear_norm(mesh, lengths, solution.cones), fixed)
             inverse = np.eye(len(off))
         step = -inverse @ off
-        part = min(1.0, LARGEST_CHANGE / np.abs(changes @ step).max())
-        sheared = _sheared(mesh, lengths, part * (changes @ step))
-        while part > LEAST_PART and not slacks(sheared).min() > 0:
-            part /= 2
-            sheared = _sheared(mesh, lengths, part * (changes @ step))
-        if part <= LEAST_PART:
+        fraction = min(1.0, LARGEST_CHANGE / np.abs(changes @ step).max())
+        sheared = _sheared(mesh, lengths, fraction * (changes @ step))
+        while fraction > MIN_FRACTION and not slacks(sheared).min() > 0:
+            fraction /= 2
+            sheared = _sheared(mesh, lengths, fraction * (changes @ step))
+        if fraction <= MIN_FRACTION:
             break
         lengths = sheared
         solution = replace(solution, log_scale=metric.log_scale - np.log(metric.scale))
-        metric, triangles = _solved(mesh, lengths, solution, choices)
-        before, off = off, off_multiple(turning.of_flat(triangles), quantum)
-        if part < 1:
+        metric, triangles = _solve_metric(mesh, lengths, solution, choices)
+        before, off = off, off_multiple(holonomy.of_flat(triangles), quantum)
+        if fraction < 1:
             changes = None
             continue
         gained = inverse @ (off - before)
@@ -159,7 +159,7 @@ def corrected_flat_metric(
     )
 
 
-def _solved(
+def _solve_metric(
     mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, choices: ExactChoices
 ) -> tuple[FlatMetric, FlatTriangles]:
     metric = exact_flat_metric(mesh, lengths, solution, choices)
@@ -171,7 +171,7 @@ def _sheared(mesh: TriangleMesh, lengths: FloatArray, change: FloatArray) -> Flo
     return lengths * np.exp(change[mesh.halfedge_edges]).reshape(-1, 3)
 
 
-def least_changes(turning: Turning, sides: FloatArray, norm: csc_matrix, fixed: BoolArray) -> FloatArray:
+def least_changes(holonomy: Holonomy, sides: FloatArray, norm: csc_matrix, fixed: BoolArray) -> FloatArray:
     """Return (e, l) changes of the logs of edge lengths, each of which turns one loop by a radian at first.
 
     Args:
@@ -180,17 +180,17 @@ def least_changes(turning: Turning, sides: FloatArray, norm: csc_matrix, fixed: 
         norm: (e, e) of the changes.
         fixed: (n,) vertices where conformal scaling is held, the others compensating what changes of curvature.
     """
-    mesh = turning.mesh
+    mesh = holonomy.mesh
     fixed = fixed.copy()
     fixed[0] |= not fixed.any()
-    by_lengths = turning.by_log_lengths(sides)
+    by_lengths = holonomy.by_log_lengths(sides)
     means = edge_means(mesh)[:, ~fixed]
     curvature = curvature_by_log_lengths(mesh, sides)[~fixed]
     by_scale = np.asarray((by_lengths @ means).todense()).T
     answer = factorize(csc_matrix(curvature @ means)).solve(np.ascontiguousarray(by_scale))
     slopes = np.asarray(by_lengths.todense()).T - curvature.T @ answer
-    eased = factorize(norm).solve(slopes)
-    result: FloatArray = eased @ np.linalg.inv(slopes.T @ eased)
+    smoothed = factorize(norm).solve(slopes)
+    result: FloatArray = smoothed @ np.linalg.inv(slopes.T @ smoothed)
     return result
 
 
@@ -210,8 +210,8 @@ def shear_norm(mesh: TriangleMesh, lengths: FloatArray, cones: IntArray) -> csc_
     near[cones] = True
     for _ in range(CONE_RINGS - 1):
         near[mesh.edges[near[mesh.edges].any(axis=1)]] = True
-    is_spared = near[mesh.faces].any(axis=1)
-    norms = (double_areas(lengths) * np.where(is_spared, 1 / SCALING_WEIGHT, 1.0))[:, None] * [
+    is_stiff = near[mesh.faces].any(axis=1)
+    norms = (double_areas(lengths) * np.where(is_stiff, 1 / SCALING_WEIGHT, 1.0))[:, None] * [
         SCALING_WEIGHT,
         1.0,
         1.0,

@@ -15,7 +15,7 @@ from ..base.compiled import compiled
 from ..errors import MetricError
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..linalg import Factor, factorize
-from ..mesh.connectivity import sort_few
+from ..mesh.connectivity import sort_keys
 
 # Rows of the matrix are corrected for that have changed by more than this share of their diagonal, but so many of them
 # at most: those around cones and in coarse triangles. Conjugate gradients then take a quarter to a sixth of the
@@ -43,7 +43,7 @@ class HessianPattern:
         # SciPy looks at a new matrix for longer than a small one takes to be filled.
         self._matrix = csc_matrix((np.zeros(count), self._rows, self._starts), shape=(n, n))
 
-    def matrix(self, cots: FloatArray, held: BoolArray) -> csc_matrix:
+    def matrix(self, cots: FloatArray, fixed: BoolArray) -> csc_matrix:
         """Return the (n, n) Laplacian, with rows and columns of the identity at the held vertices.
 
         Args:
@@ -52,7 +52,7 @@ class HessianPattern:
         """
         values = np.empty(len(self._rows))
         fill_values(
-            self._tail, self._twin, cots, held, self._starts, self._rows, self._entry, self._diagonal, values
+            self._tail, self._twin, cots, fixed, self._starts, self._rows, self._entry, self._diagonal, values
         )
         matrix = copy(self._matrix)
         matrix.data = values
@@ -110,7 +110,7 @@ def number_entries(
     for v in range(len(starts) - 1):
         end = starts[v + 1]
         starts[v] = kept
-        sort_few(keys[begin:end])
+        sort_keys(keys[begin:end])
         last = -1
         for at in range(begin, end):
             row, h = keys[at] >> 32, (keys[at] & 0xFFFFFFFF) - 1
@@ -146,7 +146,7 @@ def fill_values(
     tail: IntArray,
     twin: IntArray,
     cots: FloatArray,
-    held: BoolArray,
+    fixed: BoolArray,
     starts: Int32Array,
     rows: Int32Array,
     entry: Int32Array,
@@ -165,13 +165,13 @@ def fill_values(
             values[diagonal[i]] += weight
             if t < 0:
                 values[diagonal[j]] += weight
-            if held[i] or held[j]:
+            if fixed[i] or fixed[j]:
                 continue
             values[entry[h]] -= weight
             if t < 0:
                 values[find_entry(starts, rows, i, j)] -= weight
-    for v in range(len(held)):
-        if held[v]:
+    for v in range(len(fixed)):
+        if fixed[v]:
             values[diagonal[v]] = 1.0
 
 
@@ -183,20 +183,20 @@ def changed_share(
     other_starts: Int32Array,
     other_rows: Int32Array,
     other_values: FloatArray,
-    held: BoolArray,
+    fixed: BoolArray,
 ) -> FloatArray:
     """Return (n,) by how much two symmetric matrices differ in each column, as a share of the other's diagonal.
 
     Both have sorted rows. Rows and columns that are held do not count.
     """
-    share = np.zeros(len(held))
-    for v in range(len(held)):
-        if held[v]:
+    share = np.zeros(len(fixed))
+    for v in range(len(fixed)):
+        if fixed[v]:
             continue
         change, diagonal = 0.0, 0.0
         at, other = starts[v], other_starts[v]
         while at < starts[v + 1] or other < other_starts[v + 1]:
-            row = rows[at] if at < starts[v + 1] else len(held)
+            row = rows[at] if at < starts[v + 1] else len(fixed)
             if other < other_starts[v + 1]:
                 row = min(row, other_rows[other])
             value = 0.0
@@ -208,7 +208,7 @@ def changed_share(
                 if row == v:
                     diagonal = other_values[other]
                 other += 1
-            if not held[row]:
+            if not fixed[row]:
                 change += abs(value)
         share[v] = change / diagonal if diagonal > 0 else np.inf
     return share
@@ -233,12 +233,12 @@ class Inverse(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class HeldInverse:
+class GroundedInverse:
     """A factorized Laplacian with rows and columns of the identity where the solution is held at 0."""
 
     factor: Factor
     laplacian: csc_matrix
-    held: BoolArray
+    fixed: BoolArray
 
     @property
     def break_even(self) -> int:
@@ -247,7 +247,7 @@ class HeldInverse:
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return (n,) the solution, 0 where it is held."""
-        return np.where(self.held, 0.0, self.factor.solve(np.where(self.held, 0.0, right)))
+        return np.where(self.fixed, 0.0, self.factor.solve(np.where(self.fixed, 0.0, right)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,14 +288,14 @@ class CorrectedInverse:
         return solution
 
 
-def corrected(inverse: Inverse, matrix: csc_matrix, held: BoolArray) -> Inverse:
+def corrected(inverse: Inverse, matrix: csc_matrix, fixed: BoolArray) -> Inverse:
     """Return an inverse that is closer to that of a matrix (n, n), with sorted indices.
 
     held: (n,) rows that are of no interest.
     """
 
     one, other = matrix, inverse.laplacian
-    share = changed_share(one.indptr, one.indices, one.data, other.indptr, other.indices, other.data, held)
+    share = changed_share(one.indptr, one.indices, one.data, other.indptr, other.indices, other.data, fixed)
     chosen = np.flatnonzero(share > max(CHANGED_SHARE, float(np.quantile(share, 1 - MAX_CORRECTED_SHARE))))
     if not len(chosen):
         return inverse
@@ -314,6 +314,6 @@ def conjugate_gradients(
 
     accuracy: what the residual comes down to, relatively.
     """
-    towards = LinearOperator(matrix.shape, matvec=inverse.solve, dtype=np.float64)
-    solution, failed = cg(matrix, right, rtol=accuracy, atol=0.0, maxiter=inverse.break_even, M=towards)
+    operator = LinearOperator(matrix.shape, matvec=inverse.solve, dtype=np.float64)
+    solution, failed = cg(matrix, right, rtol=accuracy, atol=0.0, maxiter=inverse.break_even, M=operator)
     return None if failed or not np.isfinite(solution).all() else np.asarray(solution)

@@ -11,7 +11,7 @@ from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
 from ..stages import ConeSolution, FlatMetric, SolveStatistics
 
 # Layouts square lengths: shorter ones are lost in double precision.
-LEAST_LENGTH = 1e-150
+MIN_LENGTH = 1e-150
 # |x| below which three terms of a series are sinh(x) / x to rounding.
 SERIES = 1e-3
 
@@ -34,7 +34,7 @@ def linear_flat_metric(
         scaled = scaled_lengths(lengths, mesh.faces, solution.log_scale, rule)
         shrink = float(np.sqrt(double_areas(lengths).sum() / double_areas(scaled).sum()))
         scaled *= shrink
-    if not (np.isfinite(scaled).all() and scaled.min() > LEAST_LENGTH):
+    if not (np.isfinite(scaled).all() and scaled.min() > MIN_LENGTH):
         raise MetricError(
             f"the scale would vary by a factor of e^{np.ptp(solution.log_scale):.4g} over the mesh, more than numbers "
             f"can hold: {len(solution.cones)} cones are too few, or their curvatures too extreme"

@@ -19,7 +19,7 @@ from .exact import ExactMetric, exact_metric
 
 # The curvature of a round boundary is found from the metric it leads to, over and over: rounds at most, and the
 # largest relative change at a vertex at which to stop. What is solved for in the end is exact in any case.
-ROUNDS, ROUND_CHANGE = 40, 1e-3
+MAX_ROUNDS, ROUND_TOLERANCE = 40, 1e-3
 # How much of the change is made in each round on holes. The m-th harmonic of the change answers with -1/m there, so
 # that the first would go back and forth for ever; on the outer loop the answer is 1/m.
 HOLE_STEP = 0.5
@@ -47,7 +47,7 @@ class ExactChoices:
 
     scale_at_cones: bool = True
     boundary: BoundaryCurvature | None = None
-    kept: BoolArray | None = None
+    rigid: BoolArray | None = None
     keep_area: bool = True
     accepts_failure: bool = False
     names: IntArray | None = None
@@ -56,13 +56,13 @@ class ExactChoices:
         """(n,) boundary vertices whose curvature comes out, as phi = 0 there."""
         if self.boundary is None:
             return mesh.is_boundary_vertex.copy()
-        return np.zeros(len(mesh.vertices), dtype=bool) if self.kept is None else self.kept.copy()
+        return np.zeros(len(mesh.vertices), dtype=bool) if self.rigid is None else self.rigid.copy()
 
     def is_held(self, mesh: TriangleMesh) -> BoolArray:
         """(n,) boundary vertices that must stay where the metric has them."""
         if self.boundary is not None:
             return mesh.is_boundary_vertex.copy()
-        return np.zeros(len(mesh.vertices), dtype=bool) if self.kept is None else self.kept.copy()
+        return np.zeros(len(mesh.vertices), dtype=bool) if self.rigid is None else self.rigid.copy()
 
 
 def exact_flat_metric(
@@ -107,7 +107,7 @@ def exact_flat_metric(
         is_open=is_open,
         is_held=choices.is_held(mesh),
         statistics=statistics_of(solved),
-        notes=_lengths_missed(mesh, lengths, solved, triangles, choices),
+        notes=_length_notes(mesh, lengths, solved, triangles, choices),
         triangles=triangles,
     ).scaled(area_factor(lengths, solved) if choices.keep_area else 1.0)
 
@@ -122,7 +122,7 @@ def statistics_of(solved: ExactMetric) -> SolveStatistics:
     )
 
 
-def _lengths_missed(
+def _length_notes(
     mesh: TriangleMesh,
     lengths: FloatArray,
     solved: ExactMetric,
@@ -130,9 +130,9 @@ def _lengths_missed(
     choices: ExactChoices,
 ) -> tuple[str, ...]:
     """Return how many lengths on the boundary could not be kept, if so: flipped edges are none of the metric."""
-    if choices.kept is None or not solved.doubled:
+    if choices.rigid is None or not solved.doubled:
         return ()
-    sides = mesh.edge_halfedges[mesh.is_boundary_edge & choices.kept[mesh.edges].all(axis=1), 0]
+    sides = mesh.edge_halfedges[mesh.is_boundary_edge & choices.rigid[mesh.edges].all(axis=1), 0]
     off = np.abs(np.abs(flat.sides[sides]) / lengths.ravel()[sides] - 1)
     missed = int(np.count_nonzero(off > LENGTH_TOLERANCE))
     if not missed:
@@ -180,9 +180,9 @@ def _solve(
         wanted = boundary.target(lengths, np.zeros_like(solution.log_scale))
     solved = solve(inside + wanted, solution.log_scale)
     step = np.where(wanted < 0, HOLE_STEP, 1.0)
-    for _ in range(ROUNDS if boundary.has_round_loops else 0):
+    for _ in range(MAX_ROUNDS if boundary.has_round_loops else 0):
         change = boundary.target(lengths, solved.log_scale) - wanted
-        if not solved.converged or not (np.abs(change) > ROUND_CHANGE * np.abs(wanted)).any():
+        if not solved.converged or not (np.abs(change) > ROUND_TOLERANCE * np.abs(wanted)).any():
             break
         rounder = wanted + step * change
         if _is_too_sharp(boundary, rounder):

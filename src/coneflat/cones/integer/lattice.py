@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
-from ..sparse.dense_model import MIN_RELATIVE_GAIN, BestSets, DenseModel, above_rounding
+from ..sparse.dense_model import MIN_RELATIVE_GAIN, BestSets, DenseModel, nonnegative
 from ..sparse.fit_curvatures import fit_curvatures
 from .moves import Quanta, best_merge, best_pair, best_split, descend, energy_of
 
@@ -67,7 +67,7 @@ class Lattice:
         energy = descend(
             model.gram, model.slope, model.constant, members, indices, fixed, self.quanta, model.usable
         )
-        return IndexedCones(above_rounding(energy), members, indices)
+        return IndexedCones(nonnegative(energy), members, indices)
 
     def grown(self, cones: IndexedCones) -> IndexedCones | None:
         """Return cones with one more (two more, of opposite sign, if there were none and the sum is 0)."""
@@ -94,24 +94,24 @@ class Lattice:
             return None
         return self.descended(np.append(cones.members, pair), np.append(cones.indices, [1, -1]))
 
-    def without(self, cones: IndexedCones, place: int) -> IndexedCones | None:
+    def merged(self, cones: IndexedCones, place: int) -> IndexedCones | None:
         """Return cones with the one at a place merged into the one that takes its quanta best."""
         model = self.model
-        can_go, heir = best_merge(model.gram, model.slope, cones.members, cones.indices, place, self.quanta)
+        can_go, taker = best_merge(model.gram, model.slope, cones.members, cones.indices, place, self.quanta)
         if not can_go:
             return None
         indices = cones.indices.copy()
-        if heir >= 0:
-            indices[heir] += indices[place]
+        if taker >= 0:
+            indices[taker] += indices[place]
         members, indices = np.delete(cones.members, place), np.delete(indices, place)
         energy = energy_of(model.gram, model.slope, model.constant, members, indices, self.quanta.quantum)
-        return IndexedCones(above_rounding(energy), members, indices)
+        return IndexedCones(nonnegative(energy), members, indices)
 
     def shrunk(self, cones: IndexedCones) -> IndexedCones | None:
         """Return cones with one less, the best after moves."""
         found = None
         for place in range(len(self.model.fixed), len(cones)):
-            rest = self.without(cones, place)
+            rest = self.merged(cones, place)
             if rest is not None:
                 rest = self.descended(rest.members, rest.indices)
                 if found is None or rest.energy < found.energy:
@@ -125,7 +125,7 @@ class Lattice:
         for _ in range(MAX_EXCHANGES):
             if unchanged >= len(cones) - fixed:
                 break
-            rest = self.without(cones, place)
+            rest = self.merged(cones, place)
             again = None if rest is None or not len(rest) else self.grown(rest)
             if again is not None and again.energy < cones.energy * (1 - MIN_RELATIVE_GAIN):
                 cones, unchanged = again, 0
@@ -155,8 +155,8 @@ class Lattice:
             if not feasible:
                 return None
             nearest = np.round(curvatures / quantum)
-            surest = int(np.argmin(np.abs(curvatures / quantum - nearest)))
-            place, value = places[surest], int(np.clip(nearest[surest], least, most))
+            closest = int(np.argmin(np.abs(curvatures / quantum - nearest)))
+            place, value = places[closest], int(np.clip(nearest[closest], least, most))
             is_open[place] = False
             indices[place] = value if value or place >= len(model.fixed) else 1
         if self.total is not None and indices.sum() != self.total:
@@ -164,7 +164,7 @@ class Lattice:
         keep = indices != 0
         return self.descended(members[keep], indices[keep]) if keep.any() or self.total in (0, None) else None
 
-    def any_of(self, count: int) -> IndexedCones | None:
+    def initial_cones(self, count: int) -> IndexedCones | None:
         """Return so many cones that keep sum and bounds, to start from."""
         model, (_, least, most, _) = self.model, self.quanta
         steepest = np.flatnonzero(model.usable)[np.argsort(model.slope[model.usable], kind="stable")]

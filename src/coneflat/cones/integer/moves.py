@@ -13,7 +13,7 @@ import numpy as np
 from ...base.arrays import BoolArray, FloatArray, IntArray
 from ...base.compiled import compiled
 from ..solution import TIE_TOLERANCE
-from ..sparse.dense_model import first_least
+from ..sparse.dense_model import argmin_tied
 
 # Transfers of up to so many quanta at once, either way: of the quarter turns there is room for no more in a cone.
 MAX_QUANTA = 3
@@ -192,7 +192,7 @@ def best_pair(
     norms = gram.diagonal()[:, None] + gram.diagonal() - 2 * gram
     changes = (2 * (gradient - gradient[:, None]) + quantum * norms) * quantum
     np.fill_diagonal(changes, np.inf)
-    giver, taker = divmod(first_least(changes.ravel()), len(free))
+    giver, taker = divmod(argmin_tied(changes.ravel()), len(free))
     return int(free[taker]), int(free[giver])
 
 

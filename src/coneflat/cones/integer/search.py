@@ -88,13 +88,13 @@ def moved_cones(
     operator = search.operator
     places = search.unknowns_of(quantised.solution.cones)
     curvatures = quantised.quantum * quantised.indices.astype(np.float64)
-    before, caution = (places, off), 1.0
+    before, penalty = (places, off), 1.0
     for _ in range(MAX_MOVES):
         here = search.solution_of(places, curvatures).log_scale[operator.vertices]
         slack = bound**2 - float(here @ operator.weighted(here))
         if slack < 0 and places is not before[0]:
             # The coarse model promised more than there was.
-            (places, off), caution = before, 2 * caution
+            (places, off), penalty = before, 2 * penalty
             continue
         score = operator.solve(operator.weighted(here))
         cones, targets = _moves(search, places)
@@ -102,10 +102,10 @@ def moved_cones(
             break
         k, old = curvatures[cones], places[cones]
         turned = k[:, None] * (by_curvature[targets] - by_curvature[old])
-        bending = np.concatenate(
+        distances = np.concatenate(
             [search.exact.squared_distances(places[c], targets[cones == c]) for c in np.unique(cones)]
         )
-        costlier = 2 * k * (score[targets] - score[old]) + caution * k**2 * bending
+        costlier = 2 * k * (score[targets] - score[old]) + penalty * k**2 * distances
         # The last stands for no move.
         cones, turned, costlier = np.append(cones, -1), np.vstack([turned, 0 * off]), np.append(costlier, 0.0)
         missing = ((off + turned) ** 2).sum(axis=1)
@@ -174,12 +174,12 @@ def quantise_cones(
         OptionError: the quantum makes no sense.
         CurvatureError: no multiples within the bounds sum to 2 pi chi.
     """
-    lattice = open_lattice(search, quantum)
+    lattice = make_lattice(search, quantum)
     goal = 0.0 if count is not None else distortion * distortion
     if not goal >= 0 or (count is None and not 0 < distortion < math.inf):
         raise OptionError(f"the distortion allowed must be a positive number, not {distortion:g}")
     most = min(search.most_cones, *(limit for limit in (count, most) if limit is not None), search.most_cones)
-    survey(search, lattice, goal, most)
+    search_coarse(search, lattice, goal, most)
     exact = Lattice(search.exact, lattice.quanta, lattice.total)
     sizes = [size for size in lattice.best.sizes if size <= most]
     if not sizes:
@@ -192,11 +192,11 @@ def quantise_cones(
         (size for size in sizes if lattice.best.energy(size) <= goal), min(sizes, key=lattice.best.energy)
     )
     for size in sizes[sizes.index(first) :]:
-        if polish(search, lattice, exact, size) <= goal:
+        if refine(search, lattice, exact, size) <= goal:
             break
     for size in reversed(sizes[: sizes.index(first)]):
         near = lattice.best.energy(size) <= goal * COARSE_MODEL_ERROR
-        if not near or not polish(search, lattice, exact, size) <= goal:
+        if not near or not refine(search, lattice, exact, size) <= goal:
             break
     found = exact.best.fewest(goal)
     order = _order_to_round_in(search, found.members)
@@ -205,7 +205,7 @@ def quantise_cones(
     return QuantisedCones(solution, found.indices[order], lattice.quanta.quantum, math.sqrt(found.energy))
 
 
-def open_lattice(search: ConeSearch, quantum: float) -> Lattice:
+def make_lattice(search: ConeSearch, quantum: float) -> Lattice:
     """Return the lattice of multiples of a quantum that a search's limits allow, without cones yet."""
     if not LEAST_QUANTUM <= quantum <= FULL_TURN * (1 + TYPED_TOLERANCE):
         raise OptionError(f"quantum must be from {LEAST_QUANTUM:g} radians to 2 pi, not {quantum:g}")
@@ -248,7 +248,7 @@ def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
     return np.append(order[:required], order[required:][np.argsort(-steps, kind="stable")])
 
 
-def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None:
+def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None:
     """Find good cones of all numbers up to the one that is needed, and a little on, on the coarse model."""
     model, best = search.coarse, lattice.best
     fewest = max(lattice.fewest, len(model.fixed))
@@ -257,7 +257,7 @@ def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None
     for found in model.best:
         _offer(lattice, lattice.rounded(found.members))
     if not best.sizes:
-        start = lattice.any_of(fewest)
+        start = lattice.initial_cones(fewest)
         if start is None:
             return
         best.offer(lattice.exchanged(start))
@@ -284,7 +284,7 @@ def _offer(lattice: Lattice, cones: IndexedCones | None, most: float = math.inf)
         lattice.best.offer(lattice.exchanged(cones))
 
 
-def polish(search: ConeSearch, lattice: Lattice, exact: Lattice, size: int) -> float:
+def refine(search: ConeSearch, lattice: Lattice, exact: Lattice, size: int) -> float:
     """Move the coarse model's cones of a number over the mesh until E comes to rest; return E^2."""
     model, start = search.exact, lattice.best[size]
     members = model.insert(search.places[start.members])

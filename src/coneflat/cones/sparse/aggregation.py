@@ -62,13 +62,13 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
         ratio = level.shape[0] / size
         steps = max(1, round(np.log(ratio) / np.log(LARGEST_AGGREGATE)))
         most = size if steps == 1 else None
-        for weak in (MIN_COUPLING, 0.0):  # all couplings may be weak, as on slivers
-            part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most, weak)
+        for min_coupling in (MIN_COUPLING, 0.0):  # all couplings may be weak, as on slivers
+            part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most, min_coupling)
             if part.shape[1] <= MAX_LEVEL_SHARE * level.shape[0]:
                 break
         else:
             # Hardly anything is coupled, as on a strip between two boundaries: whatever is next in order.
-            part = _pieces(np.argsort(order, kind="stable") * size // len(order), size)
+            part = _indicators(np.argsort(order, kind="stable") * size // len(order), size)
         transposed = csr_matrix(part.T)
         level = csr_matrix(transposed @ (level @ part))
         weighted = mass @ part if mass is not None else _with_scaled_rows(part, areas)
@@ -83,14 +83,14 @@ def _with_scaled_rows(matrix: csr_matrix, factors: FloatArray) -> csr_matrix:
     return csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
-def _pieces(labels: IntArray, number: int) -> csr_matrix:
+def _indicators(labels: IntArray, number: int) -> csr_matrix:
     """Return (n, number) the functions that are 1 on the unknowns of one label each."""
     count = len(labels)
     return csr_matrix((np.ones(count), (np.arange(count), labels)), shape=(count, number))
 
 
 def _smoothed_aggregates(
-    level: csr_matrix, order: IntArray, size: float, most: int | None, weak: float
+    level: csr_matrix, order: IntArray, size: float, most: int | None, min_coupling: float
 ) -> csr_matrix:
     """Return basis functions made of about `size` vertices each, `most` of them if that can be had.
 
@@ -99,14 +99,14 @@ def _smoothed_aggregates(
     count = level.shape[0]
     diagonal = np.maximum(level.diagonal(), 1e-300)
     rows = level.indptr.astype(np.int64), level.indices.astype(np.int64), level.data, diagonal, order
-    labels, number = aggregate(*rows, size, weak)
+    labels, number = aggregate(*rows, size, min_coupling)
     before = count + 1
     while most is not None and most * MAX_SIZE_RATIO < number < before:
         # Vertices left over make aggregates smaller than wished, and another level for that little makes all dense.
         size *= number / most
         before = number
-        labels, number = aggregate(*rows, size, weak)
-    pieces = _pieces(labels, number)
+        labels, number = aggregate(*rows, size, min_coupling)
+    pieces = _indicators(labels, number)
     image = csr_matrix(level @ pieces)
     damping = np.where(np.diff(image.indptr) > MAX_MEETING_FUNCTIONS, 0.0, DAMPING / diagonal)
     smoothed = csr_matrix(pieces - diags(damping) @ image)
@@ -133,7 +133,7 @@ def aggregate(
     diagonal: FloatArray,
     order: IntArray,
     size: float,
-    weak: float,
+    min_coupling: float,
 ) -> tuple[IntArray, int]:
     """Return (n,) the aggregate of each vertex, and their number.
 
@@ -150,7 +150,7 @@ def aggregate(
         taken = 0
         for e in range(indptr[vertex], indptr[vertex + 1]):
             other = indices[e]
-            if other != vertex and -weights[e] > weak * np.sqrt(diagonal[vertex] * diagonal[other]):
+            if other != vertex and -weights[e] > min_coupling * np.sqrt(diagonal[vertex] * diagonal[other]):
                 if labels[other] < 0:
                     free += 1
                 else:
@@ -158,11 +158,11 @@ def aggregate(
         if free + 1 < 0.6 * size and taken > 0:
             continue
         labels[vertex] = number
-        room = size - 1 if free + 1 > size else free
+        space = size - 1 if free + 1 > size else free
         # A fractional size is met on average: the remainder decides for every so many aggregates.
-        room = np.floor((number + 1) * room) - np.floor(number * room) if room != free else free
-        while room >= 1:
-            strongest, best = -1, weak
+        space = np.floor((number + 1) * space) - np.floor(number * space) if space != free else free
+        while space >= 1:
+            strongest, best = -1, min_coupling
             for e in range(indptr[vertex], indptr[vertex + 1]):
                 other = indices[e]
                 if other != vertex and labels[other] < 0:
@@ -172,7 +172,7 @@ def aggregate(
             if strongest < 0:
                 break
             labels[strongest] = number
-            room -= 1
+            space -= 1
         number += 1
     joined = labels.copy()
     for vertex in order:

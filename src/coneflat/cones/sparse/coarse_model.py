@@ -58,8 +58,8 @@ class CoarseModel:
         """Return (p,) the squared norm of the difference of two Green's functions, for each of the others."""
         basis, kernel = self.basis, self.kernel
         if basis is None:
-            apart = kernel[one, one] - 2.0 * kernel[one, others] + kernel[others, others]
-            return np.maximum(apart, 0.0)
+            squares = kernel[one, one] - 2.0 * kernel[one, others] + kernel[others, others]
+            return np.maximum(squares, 0.0)
         return squared_distances(basis.indptr, basis.indices, basis.data, kernel, one, others)
 
 

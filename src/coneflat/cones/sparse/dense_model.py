@@ -95,7 +95,7 @@ class BestSets(Generic[SetT]):
         return min(good, key=len) if good else min(known, key=lambda found: (found.energy, len(found)))
 
 
-def above_rounding(energy: float) -> float:
+def nonnegative(energy: float) -> float:
     """Return E^2, which rounding may have made less than nothing: gains are shares of it, and must not be losses."""
     return max(float(energy), 0.0)
 
@@ -117,12 +117,12 @@ class Fit:
     energy: float
 
 
-def first_least(values: FloatArray) -> int:
+def argmin_tied(values: FloatArray) -> int:
     """Return the first index whose value is the least but for rounding."""
-    return int(firsts_least(values[None])[0])
+    return int(row_argmins(values[None])[0])
 
 
-def firsts_least(values: FloatArray) -> IntArray:
+def row_argmins(values: FloatArray) -> IntArray:
     """Return (r,) the first column of each row (r, c) whose value is the least but for rounding."""
     least = values.min(axis=1)
     finite = np.where(np.isfinite(least), least, 0.0)
@@ -159,7 +159,7 @@ class DenseModel:
         fitted = fit_curvatures(gram, slope, self.least[members], most, self.limits.total)
         curvatures, _, feasible = fitted
         energy = float(self.constant + (2 * slope + gram @ curvatures) @ curvatures) if feasible else math.inf
-        return Fit(*fitted, above_rounding(energy))
+        return Fit(*fitted, nonnegative(energy))
 
     def energy(self, members: IntArray) -> float:
         """Return E^2 of a set, infinite where bounds leave no curvatures."""
@@ -172,16 +172,16 @@ class DenseModel:
             return (2 * self.slope + diagonal * limits.total) * limits.total
         fitted = self.fit(members)
         # Where the bounds do not allow the sum, none is at one.
-        free = members[self._inside(members, fitted)] if fitted.feasible else members
+        free = members[self._between_bounds(members, fitted)] if fitted.feasible else members
         if limits.has_sum and not len(free):
             free = members[:1]
         remain, _, _ = self._project(free)
-        is_apart = remain > TIE_TOLERANCE * diagonal
+        is_independent = remain > TIE_TOLERANCE * diagonal
         gradient = self._gradient(members, fitted)
-        x = -gradient / np.where(is_apart, remain, 1.0)
+        x = -gradient / np.where(is_independent, remain, 1.0)
         if fitted.feasible:
             x = np.clip(x, self.least, limits.most)
-        return np.where(is_apart, (2 * gradient + remain * x) * x, 0.0)
+        return np.where(is_independent, (2 * gradient + remain * x) * x, 0.0)
 
     def swaps(self, members: IntArray, fitted: Fit) -> tuple[FloatArray, IntArray]:
         """Return (s,) the change of E^2 by each member's best replacement, and which that is; infinite if not known.
@@ -190,7 +190,7 @@ class DenseModel:
         than scoring the candidates once. Members at a bound, and the required, are left out.
         """
         change, which = np.full(len(members), np.inf), np.full(len(members), -1)
-        diagonal, places = self.gram.diagonal(), np.flatnonzero(self._inside(members, fitted))
+        diagonal, places = self.gram.diagonal(), np.flatnonzero(self._between_bounds(members, fitted))
         remain, rows, kept = self._project(members[places])
         is_moved = (places >= len(self.fixed)) & (kept * diagonal[members[places]] > MIN_INDEPENDENT_SHARE)
         is_open = self.usable.copy()
@@ -203,14 +203,14 @@ class DenseModel:
         k = fitted.curvatures[places, None]
         h = remain[candidates] + w * w * share
         g = self._gradient(members, fitted)[candidates] - w * k * share
-        is_apart = h > TIE_TOLERANCE * diagonal[candidates]
-        x = np.clip(-g / np.where(is_apart, h, 1.0), self.least[candidates], self.limits.most)
-        values = np.where(is_apart, k * k * share + (2 * g + h * x) * x, np.inf)
-        best = firsts_least(values)
+        is_independent = h > TIE_TOLERANCE * diagonal[candidates]
+        x = np.clip(-g / np.where(is_independent, h, 1.0), self.least[candidates], self.limits.most)
+        values = np.where(is_independent, k * k * share + (2 * g + h * x) * x, np.inf)
+        best = row_argmins(values)
         change[places], which[places] = values[np.arange(len(places)), best], candidates[best]
         return change, which
 
-    def _inside(self, members: IntArray, fitted: Fit) -> BoolArray:
+    def _between_bounds(self, members: IntArray, fitted: Fit) -> BoolArray:
         """Return (s,) which members' curvatures no bound holds."""
         k = fitted.curvatures
         span = TIE_TOLERANCE * (1.0 + np.abs(k))
@@ -251,7 +251,7 @@ class DenseModel:
                     is_open = can_carry
                     break
         candidates = np.flatnonzero(is_open)
-        return np.append(members, candidates[first_least(self.additions(members)[candidates])])
+        return np.append(members, candidates[argmin_tied(self.additions(members)[candidates])])
 
     def shrunk(self, members: IntArray) -> IntArray | None:
         """Return the members without the one that is missed least; None if none can go.
@@ -263,7 +263,7 @@ class DenseModel:
             return None
         _, _, kept = self._project(members)
         loss = self.fit(members).curvatures ** 2 / np.maximum(kept, 1e-300)
-        rest = np.delete(members, fixed + first_least(loss[fixed:]))
+        rest = np.delete(members, fixed + argmin_tied(loss[fixed:]))
         return rest if self.energy(rest) < math.inf else None
 
     def exchanged(self, members: IntArray) -> ConeSet:
@@ -274,7 +274,7 @@ class DenseModel:
             improved = False
             change, which = self.swaps(members, fitted)
             for _ in range(len(members)):
-                place = first_least(change)
+                place = argmin_tied(change)
                 if not change[place] <= -MIN_RELATIVE_GAIN * fitted.energy:
                     break
                 change[place] = np.inf

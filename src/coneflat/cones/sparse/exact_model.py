@@ -6,7 +6,7 @@ import numpy as np
 
 from ...base.arrays import BoolArray, FloatArray, IntArray
 from ...base.compiled import compiled
-from .dense_model import BestSets, DenseModel, first_least
+from .dense_model import BestSets, DenseModel, argmin_tied
 from .limits import Limits
 from .linear_model import LinearModel
 
@@ -100,7 +100,7 @@ class ExactModel(DenseModel):
             ]
         )
 
-    def polish(self, members: IntArray) -> float:
+    def refine(self, members: IntArray) -> float:
         """Move cones over the mesh until E comes to rest; return E^2 of the best set of their number."""
         found = self.exchanged(members)
         self.best.offer(found)
@@ -134,7 +134,7 @@ class ExactModel(DenseModel):
             if not len(near) or k == 0:
                 continue
             change = 2 * k * (score[near] - score[s]) + k * k * self.squared_distances(s, near)
-            best = first_least(change)
+            best = argmin_tied(change)
             if change[best] < -MIN_PROMISED_GAIN * energy:
                 targets.append(int(near[best]))
         return np.unique(np.array(targets, dtype=np.int64))

@@ -120,10 +120,10 @@ class _Program:
         curvatures = np.clip(np.full(size, self.total / size if has_sum else 0.0), self.least, self.most)
         for _ in range(size if has_sum else 0):
             missing = self.total - float(curvatures.sum())
-            room = np.count_nonzero(curvatures < self.most if missing > 0 else curvatures > self.least)
-            if missing == 0.0 or room == 0:
+            movable = np.count_nonzero(curvatures < self.most if missing > 0 else curvatures > self.least)
+            if missing == 0.0 or movable == 0:
                 break
-            curvatures = np.clip(curvatures + missing / room, self.least, self.most)
+            curvatures = np.clip(curvatures + missing / movable, self.least, self.most)
         return curvatures
 
 

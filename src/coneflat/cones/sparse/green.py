@@ -39,7 +39,7 @@ class GreenOperator:
         self.is_closed = len(self.vertices) == len(order)
         self._share = areas
 
-    def weighing(self, areas: FloatArray) -> GreenOperator:
+    def with_weights(self, areas: FloatArray) -> GreenOperator:
         """Return the operator with other weights (n,); the factorization is the same."""
         if np.array_equal(areas, self._share):
             return self

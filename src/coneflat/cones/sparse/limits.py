@@ -13,7 +13,7 @@ from ...errors import CurvatureError, OptionError
 from ..solution import FULL_TURN, TIE_TOLERANCE
 
 # More cones than these, beside the required ones, are not searched for: a seam through them all is no use.
-MOST_SEARCHED = 200
+MAX_SEARCHED = 200
 
 
 @dataclass(frozen=True)
@@ -94,10 +94,10 @@ class Limits:
 
     def check_available(self, usable: BoolArray, required: IntArray) -> None:
         """Raise CurvatureError if cones at (n,) usable vertices and the required ones cannot carry the curvature."""
-        if self.fewest > MOST_SEARCHED + len(required):
+        if self.fewest > MAX_SEARCHED + len(required):
             raise CurvatureError(
                 f"a total curvature of {self.total / np.pi:.4g} pi needs {self.fewest:,} cones or more within these "
-                f"bounds, and the sparse search finds {MOST_SEARCHED} at most: allow other angles, or choose the "
+                f"bounds, and the sparse search finds {MAX_SEARCHED} at most: allow other angles, or choose the "
                 "greedy search (--cones greedy), which has no bounds"
             )
         available = np.count_nonzero(usable) + np.count_nonzero(~usable[required])

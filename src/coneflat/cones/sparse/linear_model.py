@@ -16,7 +16,7 @@ from .green import GreenOperator
 
 # Unknowns of the coarse model: one for so many vertices, within bounds that keep its dense inverse cheaper than the
 # factorization of the mesh's own Laplacian.
-VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 12, 600, 1200
+VERTICES_PER_UNKNOWN, MIN_SIZE, MAX_SIZE = 12, 600, 1200
 
 
 class LinearModel:
@@ -54,9 +54,9 @@ class LinearModel:
         order = np.lexsort((curvature, share)) if tie_key is None else np.argsort(tie_key, kind="stable")
         return cls(laplacian, curvature, is_boundary, GreenOperator(laplacian, share, is_boundary, order))
 
-    def weighing(self, share: FloatArray) -> LinearModel:
+    def with_weights(self, share: FloatArray) -> LinearModel:
         """Return the model of the same mesh whose vertices (n,) count otherwise; the factorization serves both."""
-        operator = self.operator.weighing(share)
+        operator = self.operator.with_weights(share)
         if operator is self.operator:
             return self
         return LinearModel(self.laplacian, self.curvature, self.is_boundary, operator)
@@ -80,7 +80,7 @@ class LinearModel:
     def coarse(self) -> CoarseModel:
         """The kernel of E on a coarse basis."""
         operator = self.operator
-        size = min(max(len(operator.vertices) // VERTICES_PER_UNKNOWN, LEAST_SIZE), MOST_SIZE)
+        size = min(max(len(operator.vertices) // VERTICES_PER_UNKNOWN, MIN_SIZE), MAX_SIZE)
         modelled = partial(coarse_model, operator, self.inner, size)
         # Beside the factorization: 10 to 13% of the time of 29,000 to 97,000 triangles on two threads.
         with concurrently(modelled, 2 * len(operator.vertices)) as modelling:

@@ -33,7 +33,7 @@ from ..solution import FULL_TURN, TIE_TOLERANCE
 from .coarse_model import candidates
 from .dense_model import ConeSet, DenseModel
 from .exact_model import ExactModel
-from .limits import MOST_SEARCHED, Limits
+from .limits import MAX_SEARCHED, Limits
 from .linear_model import LinearModel
 
 # How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself.
@@ -103,7 +103,7 @@ class ConeSearch:
         weights: FloatArray | None = None,
         required: Iterable[int] = (),
         allowed: BoolArray | None = None,
-        room: FloatArray | None = None,
+        max_angles: FloatArray | None = None,
         linear: LinearModel | None = None,
     ) -> None:
         chi = None if is_boundary.any() else euler_characteristic
@@ -119,8 +119,8 @@ class ConeSearch:
         self._linear, self.operator, self._coarse_model = linear, linear.operator, linear.coarse
         vertices = self.operator.vertices
         self._least = np.full(len(vertices), limits.least)
-        if room is not None:
-            self._least = np.maximum(self._least, np.minimum(FULL_TURN - room[vertices], 0.0))
+        if max_angles is not None:
+            self._least = np.maximum(self._least, np.minimum(FULL_TURN - max_angles[vertices], 0.0))
         self._required = self.unknowns_of(cones)
         self.exact = ExactModel(linear, self._required, limits, self._least)
         # The exact model needs the score next, the coarse one does not.
@@ -164,8 +164,8 @@ class ConeSearch:
         is_usable = usable[operator.vertices]
         is_usable[required] = False
         # Of vertices side by side, those with room for wide cones represent the others on the coarse model.
-        room = np.maximum(-self._least, 0.0)
-        fitness = 0.5 + 0.5 * room / room.max() if 0 < room.max(initial=0.0) < math.inf else 1.0
+        excess = np.maximum(-self._least, 0.0)
+        fitness = 0.5 + 0.5 * excess / excess.max() if 0 < excess.max(initial=0.0) < math.inf else 1.0
         self.places = np.concatenate([required, candidates(self._coarse_model, is_usable * fitness)])
         kernel, slope = self._coarse_model.at(self.places)
         mask = np.arange(len(self.places)) >= len(required)
@@ -183,7 +183,7 @@ class ConeSearch:
     @property
     def most_cones(self) -> int:
         """The largest number of cones searched for."""
-        most = min(MOST_SEARCHED + len(self._required), len(self.places))
+        most = min(MAX_SEARCHED + len(self._required), len(self.places))
         return most if self.limits.largest is None else min(most, self.limits.largest)
 
     def fewest(self, distortion: float = DISTORTION, most: int | None = None) -> SparseCones:
@@ -199,8 +199,8 @@ class ConeSearch:
             self.limits.check_count(most, len(self._required))
         most = self.most_cones if most is None else min(most, self.most_cones)
         goal = distortion * distortion
-        count = self._survey(goal, most)
-        count = self._reach(count, goal, most)
+        count = self._search_coarse(goal, most)
+        count = self._find_sufficient(count, goal, most)
         self._reduce(count, goal, most)
         return self._cones(self.exact.best.fewest(goal, most))
 
@@ -216,7 +216,7 @@ class ConeSearch:
         self._climb(0.0, count + 1, count)
         self.coarse.descend(count - 2, count + 1)
         for size in [size for size in self.coarse.best.sizes if size <= count][-2:]:
-            self._on_mesh(size)
+            self._refine(size)
         return self._cones(self.exact.best.fewest(-1.0, count))
 
     def curve(self, most: int) -> list[SparseCones]:
@@ -226,7 +226,7 @@ class ConeSearch:
         self.coarse.descend(1, most)
         # Upwards and once more down: a set may be best without one of the cones of the next larger.
         for count in (*range(most + 1), *range(most, -1, -1)):
-            self._on_mesh(count)
+            self._refine(count)
         found: list[SparseCones] = []
         for count in self.exact.best.sizes:
             cones = self._cones(self.exact.best[count])
@@ -234,21 +234,21 @@ class ConeSearch:
                 found.append(cones)
         return found
 
-    def _survey(self, goal: float, most: int) -> int:
+    def _search_coarse(self, goal: float, most: int) -> int:
         """Find good sets of all sizes up to the one that is needed, and a little on, on the coarse model; return it."""
         self._climb(goal / COARSE_MODEL_ERROR, most, most)
         count = len(self.coarse.best.fewest(goal, most))
         self.coarse.descend(count - 3, count + 1)
         return len(self.coarse.best.fewest(goal, most))
 
-    def _reach(self, count: int, goal: float, most: int) -> int:
+    def _find_sufficient(self, count: int, goal: float, most: int) -> int:
         """Return a number of cones, from one on, with which E^2 <= goal on the mesh; or beyond which there is no gain.
 
         Where the coarse model is off, it is off by nearly the same factor for more cones: straight to where that goes.
         """
         coarse = self.coarse.best
         # Where there is nothing left on the coarse model, more cones bring nothing.
-        while self._on_mesh(count) > goal and count < most and coarse.energy(count) > 0:
+        while self._refine(count) > goal and count < most and coarse.energy(count) > 0:
             off = max(self.exact.best.energy(count) / coarse.energy(count), 1.0)
             self.coarse.climb(goal / off, most, count)
             larger = [size for size in coarse.sizes if size > count]
@@ -264,11 +264,11 @@ class ConeSearch:
         most = min(most, max(self.coarse.best.sizes))
         while self.exact.best.energy(count) > goal and count < most:
             count += 1
-            self._on_mesh(count)
-        while self._may_do(count - 1, goal) and self._on_mesh(count - 1) <= goal:
+            self._refine(count)
+        while self._may_suffice(count - 1, goal) and self._refine(count - 1) <= goal:
             count -= 1
 
-    def _may_do(self, count: int, goal: float) -> bool:
+    def _may_suffice(self, count: int, goal: float) -> bool:
         """Whether so many cones may do, by the sets tried, or as the coarse model is off by what it is for one more."""
         if count < max(self.limits.fewest, len(self._required)):
             return False
@@ -288,7 +288,7 @@ class ConeSearch:
                 "(--cones greedy), which has no bounds"
             )
 
-    def _on_mesh(self, count: int) -> float:
+    def _refine(self, count: int) -> float:
         """Return E^2 of the best set of a size on the mesh, infinite if there is none.
 
         It starts from the coarse model's set, or from the next larger without a cone if that is better.
@@ -301,7 +301,7 @@ class ConeSearch:
             shrunk = exact.shrunk(exact.best[count + 1].members)
             starts += [] if shrunk is None else [shrunk]
         if starts:
-            exact.polish(min(starts, key=exact.energy))
+            exact.refine(min(starts, key=exact.energy))
         return exact.best.energy(count)
 
     def _cones(self, found: ConeSet) -> SparseCones:
