@@ -1,7 +1,8 @@
-"""The flat metric of a connected mesh; exact metrics whose rotations along loops are multiples of a quantum.
+"""The flat metric of a connected mesh, and exact metrics whose holonomy along loops is a multiple of a quantum.
 
-With the cones given, an exactly conformal metric has no freedom left, and its rotations along the handles are what
-they are (Abel and Jacobi). For a quantum the conformal structure is changed: edge lengths, as little as can be.
+For given cones, an exactly conformal metric has no degree of freedom left, so its holonomy along the handles is
+determined (Abel and Jacobi). To make it a multiple of a quantum, the conformal structure is changed: the edge lengths
+are modified as little as possible.
 """
 
 from __future__ import annotations
@@ -25,21 +26,27 @@ from .boundary import prescribed_boundary, straight_boundary
 from .linear import linear_flat_metric
 from .solve import ExactChoices, exact_flat_metric
 
-# Steps at most, and radians at which to stop; it takes six or so if the cones are well placed.
+# Largest number of steps, and largest error in radians at the end; about six steps are needed for well-placed cones.
 MAX_STEPS, TOLERANCE = 60, 1e-11
-# Largest change of the log of a length in one step: from there on, what is least is found anew.
+# Largest change of the log of a length in one step. After a larger change, the derivatives are computed again.
 LARGEST_CHANGE = 0.2
-# A step of less than this part of the whole is too little: triangles are as flat as can be.
+# Smallest fraction of a step that is taken. Below it, triangles are close to degenerate and the search fails.
 MIN_FRACTION = 1e-3
-# What scaling counts in the norm of a strain, relative to shear: next to nothing, for it can be undone conformally.
+# Weight of scaling in the norm of a strain, relative to shear: nearly zero, as scaling can be undone conformally.
 SCALING_WEIGHT = 1e-3
-# Shear at cones turns loops best, for it amounts to moving the cones; but little room has to bear much of it then.
-# In so many rings around them shear counts more by the factor by which scaling counts less.
+# Shear near cones changes the holonomy of loops most, as it has the effect of moving the cones; but it would be
+# concentrated on few triangles. In this number of rings around cones, the weight of shear is divided by the weight
+# of scaling.
 CONE_RINGS = 3
 
 
 def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> FlatMetric:
     """Return the flat metric of a connected mesh for its cones.
+
+    Args:
+        surface: the mesh with its side lengths.
+        solution: cones, target curvatures and the linear log scale.
+        spec: the options of the metric.
 
     Raises:
         ConvergenceError: the exact metric was not found.
@@ -57,7 +64,7 @@ def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> F
                 if len(holonomy.loops) > 2 * mesh.genus():
                     return corrected_flat_metric(lengths, solution, choices, holonomy, quantum)
             except ConvergenceError:
-                # Triangles cannot turn as far; handles alone may.
+                # Triangles cannot be sheared enough; correcting the handles alone may succeed.
                 pass
         if mesh.genus():
             return corrected_flat_metric(lengths, solution, choices, loop_holonomy(mesh), quantum)
@@ -66,9 +73,9 @@ def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> F
 
 
 def loop_rotations(surface: Surface, spec: MetricSpec) -> Callable[[ConeSolution], FloatArray] | None:
-    """Return a function of cones: the rotations of loops across the handles in their metric, radians.
+    """Return a function from cones to the holonomy of loops across the handles in their metric, (2 genus,) radians.
 
-    None for a linear metric, and on a mesh without handles.
+    None for a linear metric, and for a mesh without handles.
     """
     if spec.method != "exact" or not surface.mesh.genus():
         return None
@@ -103,19 +110,19 @@ def _exact_choices(surface: Surface, solution: ConeSolution, spec: MetricSpec) -
 def corrected_flat_metric(
     lengths: FloatArray, solution: ConeSolution, choices: ExactChoices, holonomy: Holonomy, quantum: float
 ) -> FlatMetric:
-    """Return a flat metric with the cones of a solution whose loops turn by multiples of a quantum.
+    """Return a flat metric with the cones of a solution whose holonomy along loops is a multiple of a quantum.
 
-    For each loop there is a change of edge lengths that turns it and no other, with the least shear. Large changes are
-    made in steps; the last ones, on the few rotations, are Broyden's.
+    For each loop there is a change of edge lengths of least shear that rotates this loop and no other. Large changes
+    are made in steps. Broyden's method is used for the last steps, on the few rotation angles.
 
     Args:
         lengths: (m, 3) side lengths.
         solution, choices: as for `exact_flat_metric`.
-        turning: of the mesh's handles, and around its holes where the boundary is free.
+        holonomy: of loops along the handles, and around the holes if the boundary is free.
         quantum: radians.
 
     Raises:
-        ConvergenceError: the rotations did not get there.
+        ConvergenceError: the rotations did not converge to multiples of the quantum.
     """
     mesh = holonomy.mesh
     given = lengths
@@ -154,7 +161,7 @@ def corrected_flat_metric(
         gained = inverse @ (off - before)
         inverse += np.outer(step - gained, step @ inverse) / (step @ gained)
     raise ConvergenceError(
-        f"rotations around holes and along handles did not get to multiples of {quantum / np.pi:.4g} pi: they are off "
+        f"rotations around holes and along handles did not reach multiples of {quantum / np.pi:.4g} pi: they are off "
         f"by {np.abs(off).max():.2g} rad; other cones (--distortion, --cone-count) may help"
     )
 
@@ -172,13 +179,13 @@ def _sheared(mesh: TriangleMesh, lengths: FloatArray, change: FloatArray) -> Flo
 
 
 def least_changes(holonomy: Holonomy, sides: FloatArray, norm: csc_matrix, fixed: BoolArray) -> FloatArray:
-    """Return (e, l) changes of the logs of edge lengths, each of which turns one loop by a radian at first.
+    """Return (e, l) changes of the logs of edge lengths; each rotates one loop by one radian, to first order.
 
     Args:
-        turning: of the loops.
-        sides: (m, 3) lengths in the present flat metric.
-        norm: (e, e) of the changes.
-        fixed: (n,) vertices where conformal scaling is held, the others compensating what changes of curvature.
+        holonomy: of the l loops.
+        sides: (m, 3) lengths in the current flat metric.
+        norm: (e, e) matrix of the norm that is minimised.
+        fixed: (n,) vertices with fixed conformal scale. The scale of the others compensates the change of curvature.
     """
     mesh = holonomy.mesh
     fixed = fixed.copy()
@@ -195,12 +202,12 @@ def least_changes(holonomy: Holonomy, sides: FloatArray, norm: csc_matrix, fixed
 
 
 def shear_norm(mesh: TriangleMesh, lengths: FloatArray, cones: IntArray) -> csc_matrix:
-    """Return (e, e) the matrix of the area integral of the squared shear by the changes of the logs of edge lengths.
+    """Return (e, e) the matrix of the area integral of squared shear, for changes of the logs of edge lengths.
 
-    In each triangle, sides of directions t change by m + a cos 2t + b sin 2t; (a, b) is the shear.
+    In each triangle, the log of a side of direction t changes by m + a cos 2t + b sin 2t, where (a, b) is the shear.
     """
     angles = corner_angles(lengths)
-    # Directions of sides 0, 1, 2, walking around: each turns by the outer angle between them.
+    # Directions of sides 0, 1, 2 around the triangle; consecutive sides differ by the exterior angle.
     directions = np.stack(
         [np.zeros(len(angles)), np.pi - angles[:, 2], 2 * np.pi - angles[:, 2] - angles[:, 0]], axis=1
     )
