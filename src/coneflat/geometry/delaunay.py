@@ -20,8 +20,8 @@ from ..linalg.shortest_paths import drop_first, push
 from ..mesh.connectivity import TriangleMesh
 from .intrinsic import IntrinsicTriangulation, intrinsic_triangulation
 
-# Largest number of flips per edge. The number is finite in theory; in floating point, this limit ends the cycles that the
-# tolerance of the test does not prevent.
+# Largest number of flips per edge. The number is finite in theory; in floating point, this limit ends the cycles that
+# the tolerance of the test does not prevent.
 FLIPS_PER_EDGE = 50
 
 
@@ -72,7 +72,7 @@ def intrinsic_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> tuple[Intrins
 
 
 # Bound of the rounding error of a slack relative to the perimeter: a few ulps of lengths that are products of three
-# factors, with a wide margin, since an edge that is flipped because of rounding could be flipped back and forth forever.
+# factors, with a wide margin, since an edge that is flipped because of rounding could flip back and forth forever.
 SLACK_ROUNDING = 1e-14
 
 
@@ -206,7 +206,9 @@ def flip_until_delaunay(
     while size > 0 and count < most:
         key, h = keys[0], items[0]
         size = drop_first(keys, items, size)
-        if key == 0.0 or -violation(twin, tail, length, scale, h) != key:  # an outdated entry: the quad has changed
+        if (
+            key == 0.0 or -violation(twin, tail, length, scale, h) != key
+        ):  # an outdated entry: the quad has changed
             continue
         t = twin[h]
         h1 = h - h % 3 + (h + 1) % 3
