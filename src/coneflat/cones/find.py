@@ -155,7 +155,7 @@ def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearc
         weights=spec.weights,
         required=spec.required,
         allowed=spec.is_allowed,
-        max_angles=max_angles.astype(np.float64),
+        room=max_angles.astype(np.float64),
         linear=linear_model(surface, spec),
     )
     search.tell = watch.tell

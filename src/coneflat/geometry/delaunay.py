@@ -206,9 +206,7 @@ def flip_until_delaunay(
     while size > 0 and count < most:
         key, h = keys[0], items[0]
         size = drop_first(keys, items, size)
-        if (
-            key == 0.0 or -violation(twin, tail, length, scale, h) != key
-        ):  # an outdated entry: the quad has changed
+        if key == 0.0 or -violation(twin, tail, length, scale, h) != key:  # outdated: the quad has changed
             continue
         t = twin[h]
         h1 = h - h % 3 + (h + 1) % 3

@@ -77,7 +77,7 @@ class ConeSearch:
         weights: (n,) importance of each vertex; None: 1.
         required: vertices that are always cones.
         allowed: (n,) mask of the other vertices that may be cones; None: all.
-        max_angles: (n,) largest cone angle at each vertex, radians, in addition to `max_cone_angle`; None: no further
+        room: (n,) largest cone angle at each vertex, radians, in addition to `max_cone_angle`; None: no further
             bound.
         linear: the linear model of these arrays, with these weights, if it is known.
 
@@ -104,7 +104,7 @@ class ConeSearch:
         weights: FloatArray | None = None,
         required: Iterable[int] = (),
         allowed: BoolArray | None = None,
-        max_angles: FloatArray | None = None,
+        room: FloatArray | None = None,
         linear: LinearModel | None = None,
     ) -> None:
         chi = None if is_boundary.any() else euler_characteristic
@@ -120,8 +120,8 @@ class ConeSearch:
         self._linear, self.operator, self._coarse_model = linear, linear.operator, linear.coarse
         vertices = self.operator.vertices
         self._least = np.full(len(vertices), limits.least)
-        if max_angles is not None:
-            self._least = np.maximum(self._least, np.minimum(FULL_TURN - max_angles[vertices], 0.0))
+        if room is not None:
+            self._least = np.maximum(self._least, np.minimum(FULL_TURN - room[vertices], 0.0))
         self._required = self.unknowns_of(cones)
         self.exact = ExactModel(linear, self._required, limits, self._least)
         # The exact model will need the score; it is computed while the coarse model is set up.
@@ -293,8 +293,8 @@ class ConeSearch:
         if min(self.coarse.best.sizes, default=count + 1) > count:
             raise CurvatureError(
                 f"no set of {count} cones was found that carries a total curvature of "
-                f"{self.limits.total / np.pi:.4g} pi within their bounds: allow more cones or other angles, or choose the "
-                "greedy search (--cones greedy), which has no bounds"
+                f"{self.limits.total / np.pi:.4g} pi within their bounds: allow more cones or other angles, or choose "
+                "the greedy search (--cones greedy), which has no bounds"
             )
 
     def _refine(self, count: int) -> float:
