@@ -54,22 +54,22 @@ def variants() -> dict[str, list[Patch]]:
         (exact, "MAX_ROUNDS", (4, 100)),
         (exact, "MIN_PROMISED_GAIN", (1e-2, 1e-4)),
         (linear_model, "VERTICES_PER_UNKNOWN", (8, 15, 30)),
-        (linear_model, "LEAST_SIZE", (200, 400, 800)),
-        (linear_model, "MOST_SIZE", (600, 2000)),
+        (linear_model, "MIN_SIZE", (200, 400, 800)),
+        (linear_model, "MAX_SIZE", (600, 2000)),
         (aggregation, "LARGEST_AGGREGATE", (4.0, 12.0)),
         (aggregation, "MAX_SIZE_RATIO", (1.0, 2.0)),
     ):
         found |= {f"{name} {value}": [(module, name, value)] for value in values}
     model = dense.DenseModel
     found["no descent"] = [(model, "descend", lambda *_: None)]
-    found["no shrunk start"] = [(search.ConeSearch, "_on_mesh", on_mesh_from_coarse)]
-    found["both starts"] = [(search.ConeSearch, "_on_mesh", on_mesh_both)]
+    found["no shrunk start"] = [(search.ConeSearch, "_refine", on_mesh_from_coarse)]
+    found["both starts"] = [(search.ConeSearch, "_refine", on_mesh_both)]
     return found
 
 
 def on_mesh_from_coarse(self: Any, count: int) -> float:
     if count in self.coarse.best:
-        self.exact.polish(self.exact.insert(self.places[self.coarse.best[count].members]))
+        self.exact.refine(self.exact.insert(self.places[self.coarse.best[count].members]))
     return float(self.exact.best.energy(count))
 
 
@@ -81,7 +81,7 @@ def on_mesh_both(self: Any, count: int) -> float:
         shrunk = exact.shrunk(exact.best[count + 1].members)
         starts += [] if shrunk is None else [shrunk]
     for start in starts:
-        exact.polish(start)
+        exact.refine(start)
     return float(exact.best.energy(count))
 
 
@@ -97,7 +97,7 @@ def patched(patches: list[Patch]) -> Iterator[None]:
             setattr(owner, name, value)
 
 
-OPENING = ("VERTICES", "LEAST_SIZE", "MOST_SIZE", "MIN_COUPLING", "LARGEST_AGGREGATE", "TRIES")
+OPENING = ("VERTICES", "MIN_SIZE", "MAX_SIZE", "MIN_COUPLING", "LARGEST_AGGREGATE", "TRIES")
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ import shapes
 
 from coneflat import check_mesh, errors, flatten
 from coneflat.geometry import corner_angles, edge_lengths
-from coneflat.geometry.handles import handle_loops, off_multiple, open_turning
+from coneflat.geometry.handles import handle_loops, loop_holonomy, off_multiple
 from coneflat.measure.seam_data import measure_rotations
 
 QUARTER = np.pi / 2
@@ -16,7 +16,7 @@ QUARTER = np.pi / 2
 
 def turning_of(vertices, faces):
     mesh = check_mesh(vertices, faces).mesh
-    return open_turning(mesh), edge_lengths(mesh.vertices, mesh.faces)
+    return loop_holonomy(mesh), edge_lengths(mesh.vertices, mesh.faces)
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_a_flat_torus_does_not_turn():
     angles = corner_angles(
         np.concatenate([flat, flat[:, [0, 2, 1]]])[check_mesh(mesh.vertices, faces).face_origin]
     )
-    turned = open_turning(mesh).signs @ angles.ravel()
+    turned = loop_holonomy(mesh).signs @ angles.ravel()
     np.testing.assert_allclose(off_multiple(turned, 2 * np.pi), 0, atol=1e-9)
 
 

@@ -12,7 +12,7 @@ from coneflat import errors
 from coneflat.atlas import part_touching
 from coneflat.geometry import coverage
 from coneflat.geometry.orientation import fill_orientations
-from coneflat.geometry.overlap import find_overlaps, snug_boxes
+from coneflat.geometry.overlap import bounding_boxes, find_overlaps
 
 UNIT = [[0, 0], [1, 0], [0, 1]]
 ULP = 2.0**-53
@@ -204,7 +204,7 @@ def test_layers_that_coincide_but_for_rounding(turns, share):
 def test_areas_do_not_depend_on_the_blocks_of_the_sweep(monkeypatch):
     points, faces = spiral(3.3, 0.4)
     whole = find_overlaps(points, faces)
-    monkeypatch.setattr(coverage, "AT_A_TIME", 100)
+    monkeypatch.setattr(coverage, "CROSSINGS_PER_BLOCK", 100)
     parts = find_overlaps(points, faces)
     assert parts.area == pytest.approx(whole.area, rel=1e-12)
     assert parts.fraction == pytest.approx(whole.fraction, rel=1e-12)
@@ -296,7 +296,7 @@ def test_long_triangles_askew(angle):
     start = np.arange(count)[:, None] * [-way[1], way[0]] / count
     wide = np.where(np.arange(count) % 10 == 5, 1.5, 0.9)[:, None] * [-way[1], way[0]] / count
     corners = np.stack([start, start + 2 * way, start + way + wide], axis=1)
-    boxes = snug_boxes(corners / 4)
+    boxes = bounding_boxes(corners / 4)
     assert (-boxes[:, 3] - boxes[:, 1]).max() < 0.01
     expected = np.arange(5, count - 1, 10)
     np.testing.assert_array_equal(find_overlaps(corners).pairs, np.stack([expected, expected + 1], axis=1))

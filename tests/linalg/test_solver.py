@@ -164,7 +164,7 @@ def test_a_factor_stays_on_the_threads_that_it_was_made_on(matrix, monkeypatch):
     with using_threads(3):
         factor = PardisoFactor(matrix)
     with using_threads(1):
-        factor = factor.renewed(2 * matrix)
+        factor = factor.refactorized(2 * matrix)
         factor.solve(np.ones(matrix.shape[0]))
     assert set(used) == {3}
     assert len(used) > 3
@@ -190,7 +190,7 @@ def test_another_pattern_leaves_no_memory_behind(matrix):
     kept = PardisoFactor(matrix)
     for _ in range(60):
         # Another array of indices may be of another pattern.
-        kept = kept.renewed(matrix.copy())
+        kept = kept.refactorized(matrix.copy())
         found.append(tell().in_use + tell().mapped)
     np.testing.assert_array_equal(kept.solve(right), PardisoFactor(matrix).solve(right))
     # An analysis takes more than the matrix does.

@@ -96,7 +96,7 @@ class TestVisibility:
 
     @pytest.mark.parametrize("up", [np.zeros(3), np.ones(2), np.array([0, np.nan, 1])])
     def test_up_must_be_a_direction(self, up):
-        with pytest.raises(errors.OptionError, match="up is a direction"):
+        with pytest.raises(errors.OptionError, match="up must be a direction"):
             visible_share(*shapes.sphere(1), up)
 
 

@@ -1,6 +1,6 @@
-"""Arrays, compiled loops, threads, progress and messages: what every package uses.
+"""Helpers that every package uses: arrays, compiled loops, threads, progress and messages.
 
-What needs NumPy or numba is imported on first use: the commands print their help without them.
+Modules that need NumPy or numba are imported on first use, so that the commands print their help without them.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ __all__ = [
 
 
 class _Package(ModuleType):
-    """The package: `coneflat.base.compiled` is the decorator also after the module of that name is imported."""
+    """The package module; `coneflat.base.compiled` stays the decorator when the module of that name is imported."""
 
     def __setattr__(self, name: str, value: object) -> None:
         if not (name == "compiled" and isinstance(value, ModuleType)):

@@ -1,23 +1,23 @@
-"""Defaults and bounds of options that stages have, too, each written once."""
+"""Defaults and bounds that the options and the stages share."""
 
 from __future__ import annotations
 
 import math
 
-#: The area distortion allowed.
+#: The allowed area distortion E.
 DISTORTION = 0.2
-#: Radians of the sharpest cone, and of the widest saddle.
+#: Smallest and largest cone angle, radians.
 MIN_CONE_ANGLE = math.pi / 2
 MAX_CONE_ANGLE = 4 * math.pi
-#: Cones at most, of a curve.
+#: Maximum number of cones of a cone curve.
 MOST_CONES = 30
-#: Texels along a side of a texture, and between charts.
+#: Texels along a side of a texture, and texels between charts.
 RESOLUTION = 1024
 PADDING = 2.0
-# A preference for hidden places of 1 makes seams ten times cheaper; with a factor of more than 1e10, the
-# lengths of seams are beneath the rounding of their costs.
+# A preference of 1 makes seams at hidden places ten times cheaper. With a factor above 1e10, the lengths of seams
+# would be smaller than the rounding errors of their costs.
 MOST_PREFERENCE = 10.0
-# Radians, or shares, by which a number typed with seven digits is off.
+# Error of a number that is typed with seven digits: radians, or relative.
 TYPED_TOLERANCE = 1e-6
-# Radians: finer quanta than this restrict nothing that could be told from none, as multiples are known to 1e-6.
+# Smallest quantum, radians. Multiples are known to 1e-6, so a smaller quantum would restrict nothing measurable.
 LEAST_QUANTUM = 1e-4

@@ -9,7 +9,7 @@ from contextvars import ContextVar
 
 from ..errors import OptionError
 
-#: Called with what is being done and the fraction of the whole that is done.
+#: Called with a text on the current step and the fraction of the total work that is done.
 Progress = Callable[[str, float], None]
 
 _ask: ContextVar[Callable[[], None] | None] = ContextVar("coneflat_ask", default=None)
@@ -17,7 +17,10 @@ _ask: ContextVar[Callable[[], None] | None] = ContextVar("coneflat_ask", default
 
 @contextmanager
 def asking(ask: Callable[[], None]) -> Iterator[None]:
-    """Have long work inside ask, every few milliseconds and from any thread, whether to go on: who asks may raise."""
+    """Call `ask` every few milliseconds during long computations in the block, from any thread.
+
+    `ask` cancels the computation by raising an exception.
+    """
     token = _ask.set(ask)
     try:
         yield
@@ -26,22 +29,22 @@ def asking(ask: Callable[[], None]) -> Iterator[None]:
 
 
 def check_cancelled() -> None:
-    """Ask whether to go on, within `asking`."""
+    """Call the function that `asking` has set, if any; it raises an exception to cancel the computation."""
     ask = _ask.get()
     if ask is not None:
         ask()
 
 
 class Stopwatch:
-    """A stopwatch per stage that tells a listener what begins.
+    """Timer of the stages, which also reports progress to a callback.
 
     Attributes:
         seconds: wall time of each stage so far, in order of first appearance.
-        done: fraction of the whole that is done before the part at hand.
-        share: fraction of the whole that the part at hand makes up.
+        done: fraction of the total work that was done before the current component.
+        share: fraction of the total work of the current component.
 
     Raises:
-        OptionError: the listener cannot be called.
+        OptionError: `progress` is not callable.
     """
 
     def __init__(self, progress: Progress | None = None) -> None:
@@ -58,9 +61,9 @@ class Stopwatch:
 
     @contextmanager
     def __call__(self, name: str, until: float = 0.0) -> Iterator[None]:
-        """Time the block as the named stage; stages of one name add up.
+        """Time the block as the named stage; the times of stages of the same name are added.
 
-        until: roughly the fraction of the part at hand that is done when the stage ends.
+        until: approximate fraction of the current component that is done when the stage ends.
         """
         self._name = name
         self.tell()
@@ -72,12 +75,12 @@ class Stopwatch:
         self._within = until
 
     def end_part(self) -> None:
-        """Count the part at hand as done."""
+        """Count the current component as done."""
         self.done += self.share
         self._within = 0.0
 
     def tell(self, detail: str = "") -> None:
-        """Tell the listener what is being done, with a detail about the stage."""
+        """Report the current stage and the fraction done to the callback, with an optional detail."""
         if self._progress is not None:
             text = f"{self._name}: {detail}" if detail else self._name
             self._progress(text, min(self.done + self.share * self._within, 1.0))

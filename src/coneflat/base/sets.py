@@ -1,4 +1,4 @@
-"""Graphs: the edges at each node, and sets of connected nodes, by union and find."""
+"""Graphs: incident edges of nodes, and connected components by union-find."""
 
 from __future__ import annotations
 
@@ -9,7 +9,15 @@ from .compiled import compiled
 
 
 def edges_at_nodes(ends: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
-    """Return where the edges at each node begin, (n + 1,), and these edges, (2e,), each at both of its ends."""
+    """Return the incident edges of each node in compressed form.
+
+    Args:
+        ends: (e, 2) the nodes that each edge connects.
+        nodes: number n of nodes.
+
+    Returns:
+        (n + 1,) where the edges of each node start, and (2e,) these edges; each edge is listed at both of its ends.
+    """
     flat = ends.reshape(-1)
     starts = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=nodes))])
     return starts, np.argsort(flat, kind="stable") // 2
@@ -17,7 +25,7 @@ def edges_at_nodes(ends: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
 
 @compiled
 def grow_forest(ends: IntArray, nodes: int) -> BoolArray:
-    """Return (e,) the edges, in their order, that join what those before them did not (J. B. Kruskal 1956)."""
+    """Return (e,) which edges are in the spanning forest that takes edges greedily in their order (Kruskal 1956)."""
     parent, in_tree = np.arange(nodes), np.zeros(len(ends), np.bool_)
     for e in range(len(ends)):
         in_tree[e] = unite(parent, ends[e, 0], ends[e, 1])
@@ -26,12 +34,12 @@ def grow_forest(ends: IntArray, nodes: int) -> BoolArray:
 
 @compiled
 def label_nodes(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
-    """Return the number of connected components of a graph and the component of each node, in the order of nodes."""
+    """Return the number of connected components and the (count,) component of each node, numbered by first node."""
     parent = np.arange(count)
     for e in range(len(tails)):
         unite(parent, tails[e], heads[e])
     number = 0
-    for v in range(count):  # a parent comes before its children
+    for v in range(count):  # a parent has a smaller index than its children
         if parent[v] == v:
             parent[v] = number
             number += 1
@@ -42,9 +50,9 @@ def label_nodes(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntA
 
 @compiled
 def unite(parent: IntArray, one: int, two: int) -> bool:
-    """Join the trees of two nodes, and return whether they were two.
+    """Join the union-find trees of two nodes; return whether the trees were different.
 
-    The root of larger index goes under the other; paths to roots are halved.
+    The root with the larger index becomes a child of the other. Paths to roots are halved.
     """
     while parent[one] != one:
         parent[one] = parent[parent[one]]
@@ -61,7 +69,7 @@ def unite(parent: IntArray, one: int, two: int) -> bool:
 
 @compiled
 def find_root(parent: IntArray, node: int) -> int:
-    """Return the root of a node's tree."""
+    """Return the root of the union-find tree of a node."""
     while parent[node] != node:
         node = parent[node]
     return node
@@ -69,9 +77,9 @@ def find_root(parent: IntArray, node: int) -> int:
 
 @compiled
 def number_sets(parent: IntArray) -> int:
-    """Write the number of its tree, in the order of nodes, over the parent of each; return how many there are."""
+    """Replace the parent of each node by the number of its tree, in place; return the number of trees."""
     number = 0
-    for v in range(len(parent)):  # a parent comes before its children
+    for v in range(len(parent)):  # a parent has a smaller index than its children
         if parent[v] == v:
             parent[v] = number
             number += 1

@@ -1,4 +1,4 @@
-"""Threads: how many the libraries below use, and one of our own where two stages can share the time."""
+"""Threads: the number that libraries may use, and a second thread where two stages can run at the same time."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 Result = TypeVar("Result")
 
-# Triangles from which on memory is what matters.
+# Number of triangles above which memory limits the computation.
 MEMORY_BOUND_TRIANGLES = 3_000_000
-# How many are used unless told otherwise, on any machine: the last digits depend on it.
+# Default number of threads. It is the same on every machine, because the last digits of results depend on it.
 THREADS = 2
 
 _threads: ContextVar[int] = ContextVar("coneflat_threads", default=THREADS)
@@ -24,11 +24,11 @@ _threads: ContextVar[int] = ContextVar("coneflat_threads", default=THREADS)
 
 @contextmanager
 def concurrently(call: Callable[[], Result], triangles: int) -> Iterator[Future[Result]]:
-    """Run a function on another thread while what is inside runs, and yield its future.
+    """Run a function on another thread during the block, and yield its future.
 
-    On a huge mesh, and where one thread is to be used, the function returns before the inside begins, as the memory of
-    both would be too much. They must not share data that either changes. Compiled loops, factorizations and most of
-    numpy release the interpreter lock.
+    If the mesh is huge, because both together would need too much memory, or if only one thread may be used, the
+    function finishes before the block starts. The function and the block must not share data that either modifies.
+    Compiled loops, factorizations and most of NumPy release the interpreter lock.
     """
     with ThreadPoolExecutor(1, thread_name_prefix="coneflat") as executor:
         future = executor.submit(copy_context().run, call)
@@ -38,16 +38,16 @@ def concurrently(call: Callable[[], Result], triangles: int) -> Iterator[Future[
 
 
 def threads() -> int:
-    """Return how many threads may be used here."""
+    """Return the number of threads that may be used."""
     return _threads.get()
 
 
 @contextmanager
 def using_threads(count: int = THREADS) -> Iterator[None]:
-    """Have everything inside use so many threads: PARDISO all, our own stages two at most, and OpenBLAS one.
+    """Set the number of threads in the block: PARDISO uses all, the stages at most two, and OpenBLAS one.
 
-    The dense matrices here are small: its threads gain nothing on them, and while they wait for more to do they take
-    the cores from everything else, which then takes a third longer.
+    The dense matrices here are so small that threads of OpenBLAS gain nothing. Idle, they would occupy the cores by
+    spinning, and everything else would take a third longer.
     """
     token = _threads.set(count)
     try:
@@ -59,8 +59,8 @@ def using_threads(count: int = THREADS) -> Iterator[None]:
 
 @cache
 def _openblas() -> ThreadpoolController:
-    """Return what sets the threads of OpenBLAS; to look for its libraries takes 6 ms."""
-    import scipy.linalg  # noqa: F401 - comes with a library of its own, which must be there to be told
+    """Return the controller of the threads of OpenBLAS; cached, because the search for its libraries takes 6 ms."""
+    import scipy.linalg  # noqa: F401 - loads its own OpenBLAS, which must be loaded to be controlled
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController().select(internal_api="openblas")

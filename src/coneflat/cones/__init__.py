@@ -1,4 +1,4 @@
-"""Where the curvature goes: cone placement and target curvatures, a file per strategy."""
+"""Cone placement and target curvatures, one file per strategy."""
 
 from .find import CONE_ANGLE_PER_TRIANGLE, close_search, find_cones, only_choice, open_search
 from .given import cones_at, cones_with_curvature

@@ -1,4 +1,4 @@
-"""Cones of a connected mesh by the strategy that is asked for."""
+"""Cones of a connected mesh by the requested strategy."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ if TYPE_CHECKING:
     from .sparse import ConeSearch, SparseCones
     from .sparse.linear_model import LinearModel
 
-# The angle of a cone for which each triangle around it has room on its straight sides: less than half a turn, as not
-# all of them can be spread alike.
+# Cone angle per triangle around a cone, radians, up to which the triangles can hold the angle with straight sides. It
+# is less than pi, since the angle cannot be distributed evenly over the triangles.
 CONE_ANGLE_PER_TRIANGLE = 0.6 * np.pi
-# On meshes of so many vertices, a neighbour is as good a place: corners of cones there, all widened alike, must not
-# exceed this, or the straight sides of a triangle may have no room for one, and the search has to be repeated: 14% of
-# the time of a horse of 97,000 triangles.
-FINE_VERTICES, WIDEST_CORNER = 30_000, 0.95 * np.pi
-# Up to so many corners of a polyhedron are all made cones.
+# On meshes with this number of vertices, a neighbouring vertex is as good for a cone. The corners at a cone, all
+# widened by the same factor, must then not exceed this angle. Otherwise a triangle with straight sides may be unable to
+# hold its corner, and the search has to be repeated, which takes 14% of the time on a horse of 97,000 triangles.
+FINE_VERTICES, MAX_CORNER = 30_000, 0.95 * np.pi
+# Largest number of corners of a polyhedron that all become cones.
 MAX_POLYHEDRON_CORNERS = 24
-# The distortion asked for may be missed by so much, relatively, without a note.
+# Relative excess of the distortion over the requested one up to which there is no note.
 RELATIVE_TOLERANCE = 1e-3
-# How much larger E may get for the sake of rotations along handles.
+# Largest factor by which E may grow when cones are moved to align the rotations along handles.
 HOLONOMY_FACTOR = 1.15
 
-#: Returns the rotations of loops across the handles in the metric that a solution leads to, radians.
+#: Function that returns the rotations of loops along the handles in the metric of a solution, (2 genus,) radians.
 Holonomy: TypeAlias = Callable[[ConeSolution], FloatArray]
 
 
@@ -50,18 +50,18 @@ def find_cones(
 
     Args:
         surface: the mesh.
-        spec: what is asked of the cones.
-        watch: told what is being done.
-        holonomy: measures rotations along handles; called where curvatures are quantised on a mesh with handles.
+        spec: the options of the cones.
+        watch: receives the progress.
+        holonomy: measures rotations along handles; used if curvatures are quantised on a mesh with handles.
 
     Raises:
-        CurvatureError: no metric has the curvatures.
+        CurvatureError: no metric has the required curvatures.
     """
     mesh = surface.mesh
     too_many_handles = has_many_handles(surface, spec)
-    if searches(surface, spec):
+    if uses_sparse_search(surface, spec):
         corners = polyhedron_corners(surface, spec)
-        return _searched(surface, spec, watch, holonomy) if corners is None else corners
+        return _search(surface, spec, watch, holonomy) if corners is None else corners
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     is_greedy = spec.strategy == "greedy" or too_many_handles
     if is_greedy:
@@ -69,8 +69,8 @@ def find_cones(
             *given, max_cones=spec.max_count, tie_key=mesh_tie_key(mesh), progress=watch.tell
         )
     elif len(spec.given):
-        solution = _fitted(surface, spec)
-    else:  # "none", or none of the given ones is here
+        solution = _fit_given(surface, spec)
+    else:  # "none", or no given cone is on this component
         solution = cones_at(*given, spec.given.vertices)
     if spec.scale_at_cones:
         check_enough(len(solution.cones), mesh)
@@ -78,15 +78,13 @@ def find_cones(
         advice = "allow more of them (--max-cones)" if is_greedy else "add cones or move them"
         check_feasible(solution.cones, solution.curvatures, spec.names, advice)
     if too_many_handles:
-        note = (
-            f"A surface with {mesh.genus():,} handles needs so many cones that the greedy search placed them."
-        )
+        note = f"The greedy search placed the cones, as a surface with {mesh.genus():,} handles needs so many of them."
         return replace(solution, notes=(note,))
     return solution
 
 
-def searches(surface: Surface, spec: ConeSpec) -> bool:
-    """Whether the sparse search finds the cones of a mesh."""
+def uses_sparse_search(surface: Surface, spec: ConeSpec) -> bool:
+    """Return whether the sparse search is used for the cones of a mesh."""
     return spec.strategy == "sparse" or (
         spec.strategy == "auto"
         and (spec.needs_sparse_search or not (spec.prescribes_boundary or has_many_handles(surface, spec)))
@@ -94,18 +92,18 @@ def searches(surface: Surface, spec: ConeSpec) -> bool:
 
 
 def has_many_handles(surface: Surface, spec: ConeSpec) -> bool:
-    """Whether a mesh has so many handles that the sparse search would take too long for the cones they need."""
-    from .sparse.limits import MOST_SEARCHED
+    """Return whether a mesh has so many handles that the sparse search would take too long for the required cones."""
+    from .sparse.limits import MAX_SEARCHED
 
     mesh = surface.mesh
     if spec.strategy != "auto" or spec.needs_sparse_search or mesh.is_boundary_vertex.any():
         return False
-    # Each handle but one takes two cones of 4 pi.
-    return -mesh.euler_characteristic > MOST_SEARCHED // 2
+    # Each handle except one needs two cones of angle 4 pi.
+    return -mesh.euler_characteristic > MAX_SEARCHED // 2
 
 
 def polyhedron_corners(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
-    """Return a polyhedron's corners as cones if they are few: it unfolds without any distortion. Else None."""
+    """Return the corners of a polyhedron as cones if there are few, as it unfolds without distortion; else None."""
     if spec.strategy != "auto" or spec.needs_sparse_search or spec.searches_corners:
         return None
     mesh, curvature = surface.mesh, surface.curvature
@@ -121,7 +119,7 @@ def polyhedron_corners(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
 
 
 def only_choice(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
-    """Return the solution without cones where no vertex may be one, and none need be; else None."""
+    """Return the solution without cones if no vertex may be a cone and no cone is needed; else None."""
     mesh, absorbs = surface.mesh, spec.absorbs_curvature
     if (spec.is_allowed & ~absorbs).any() or not (absorbs.any() or mesh.euler_characteristic == 0):
         return None
@@ -130,7 +128,7 @@ def only_choice(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
 
 
 def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearch:
-    """Return a search for cones; one that is open on the surface goes on where cones are still allowed."""
+    """Return a search for cones; a cached search of the surface is reused, restricted to the allowed vertices."""
     from .sparse import ConeSearch
 
     mesh = surface.mesh
@@ -138,50 +136,50 @@ def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearc
     if search is not None:
         search.restrict(~search.is_boundary & spec.is_allowed)
         return search
-    room = (
+    max_angles = (
         CONE_ANGLE_PER_TRIANGLE * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
         + np.pi * mesh.is_boundary_vertex
     )
-    if len(room) >= FINE_VERTICES:
-        room = np.minimum(room, WIDEST_CORNER / surface.widest)
+    if len(max_angles) >= FINE_VERTICES:
+        max_angles = np.minimum(max_angles, MAX_CORNER / surface.widest)
     search = ConeSearch(
         surface.laplacian,
         surface.curvature,
         surface.areas,
         spec.absorbs_curvature,
         mesh.euler_characteristic,
-        # A corner of angle a has a curvature of pi - a: cones inside keep to the same bound.
+        # A boundary corner of angle a has the curvature pi - a; inner cones use the same bound of curvature.
         min_cone_angle=spec.min_angle + (np.pi if spec.searches_corners else 0.0),
         max_cone_angle=spec.max_angle,
         positive_only=spec.positive_only,
         weights=spec.weights,
         required=spec.required,
         allowed=spec.is_allowed,
-        room=room.astype(np.float64),
+        room=max_angles.astype(np.float64),
         linear=linear_model(surface, spec),
     )
     search.tell = watch.tell
-    if len(mesh.faces) <= MEMORY_BOUND_TRIANGLES:  # else it holds too much memory
+    if len(mesh.faces) <= MEMORY_BOUND_TRIANGLES:  # else it would use too much memory
         surface.memo["search"] = search
     return search
 
 
 def close_search(surface: Surface) -> None:
-    """Forget the search for cones on a surface, which takes much memory."""
+    """Delete the cached search for cones of a surface, which uses much memory."""
     surface.memo.pop("search", None)
 
 
 def linear_model(surface: Surface, spec: ConeSpec) -> LinearModel:
-    """Return the linear model of cones off the vertices that absorb curvature, with the weights of the spec in E.
+    """Return the linear model of cones at vertices that do not absorb curvature, with the weights of `spec` in E.
 
-    The last one is stored, unless the mesh is huge: its factorization serves other weights, too.
+    The last model is cached, unless the mesh is huge: its factorization is valid for other weights, too.
     """
     from .sparse.linear_model import LinearModel
 
     share, absorbs = weighted_areas(surface.areas, spec.weights), spec.absorbs_curvature
     linear: LinearModel | None = surface.memo.get("linear")
     if linear is not None and np.array_equal(linear.is_boundary, absorbs):
-        linear = linear.weighing(share)
+        linear = linear.with_weights(share)
     else:
         key = mesh_tie_key(surface.mesh)
         linear = LinearModel.of(surface.laplacian, surface.curvature, share, absorbs, key)
@@ -190,8 +188,8 @@ def linear_model(surface: Surface, spec: ConeSpec) -> LinearModel:
     return linear
 
 
-def _fitted(surface: Surface, spec: ConeSpec) -> ConeSolution:
-    """Return the cones of which some or all have curvatures, the others with the best."""
+def _fit_given(surface: Surface, spec: ConeSpec) -> ConeSolution:
+    """Return the given cones; curvatures that are not given are fitted."""
     on_boundary = replace(spec, absorbs_curvature=surface.mesh.is_boundary_vertex)
     return fitted_cones(
         linear_model(surface, on_boundary),
@@ -203,8 +201,8 @@ def _fitted(surface: Surface, spec: ConeSpec) -> ConeSolution:
     )
 
 
-def _searched(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holonomy | None) -> ConeSolution:
-    """Return the fewest cones for the distortion allowed, or the best of the number asked for."""
+def _search(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holonomy | None) -> ConeSolution:
+    """Return the fewest cones for the allowed distortion, or the best cones of the requested number."""
     mesh = surface.mesh
     only = only_choice(surface, spec)
     if only is not None:
@@ -215,7 +213,7 @@ def _searched(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holo
     if spec.quantum is None:
         found = search.fewest(distortion, most) if count is None else search.best_of(count)
     else:
-        from ..geometry.handles import open_turning
+        from ..geometry.handles import loop_holonomy
         from .integer.search import align_handles, quantise_cones
 
         found = quantised = quantise_cones(
@@ -223,7 +221,7 @@ def _searched(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holo
         )
         if holonomy is not None:
             bound = max(quantised.distortion * HOLONOMY_FACTOR, distortion if count is None else 0.0)
-            by_scale = open_turning(mesh).by_log_scale(surface.lengths)
+            by_scale = loop_holonomy(mesh).by_log_scale(surface.lengths)
             found = align_handles(search, quantised, by_scale, holonomy, bound)
     solution = found.solution
     cones = solution.cones[~mesh.is_boundary_vertex[solution.cones]]
@@ -232,19 +230,19 @@ def _searched(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holo
 
 
 def _unmet(genus: int, cone_count: int, distortion: float, spec: ConeSpec) -> tuple[str, ...]:
-    """Return what is unmet of the number of cones or of the distortion, one sentence each."""
+    """Return notes if the requested number of cones or distortion is not met, one sentence each."""
     if spec.count is not None:
         if cone_count == spec.count:
             return ()
         return (
-            f"{plural(cone_count, 'cone')} instead of the {spec.count:,} asked for: more of them, within the "
-            "bounds given, would gain nothing or have no vertex inside to be at.",
+            f"{plural(cone_count, 'cone')} instead of the {spec.count:,} asked for: within the given bounds, more "
+            "cones would not reduce the distortion, or there is no inner vertex for them.",
         )
     if distortion <= spec.distortion * (1 + RELATIVE_TOLERANCE):
         return ()
-    why = "no better was found within the bounds given"
+    why = "no better cones were found within the given bounds"
     if spec.quantum is not None and genus and distortion <= spec.distortion * HOLONOMY_FACTOR:
-        why = "cones were moved a little for the sake of the rotations along handles"
+        why = "cones were moved a little to align the rotations along handles"
     return (
         f"The area distortion is {distortion:.3g} with {plural(cone_count, 'cone')}, above the "
         f"{spec.distortion:g} allowed: {why}.",

@@ -1,6 +1,6 @@
-"""Cones at given vertices: curvatures that phi = 0 there leads to, curvatures given, or the best of those left open.
+"""Cones at given vertices: with curvatures that follow from phi = 0, with given curvatures, or with fitted curvatures.
 
-What a user gives goes to `fitted_cones`, no cones at all to `cones_at`.
+Cones that a user gives are handled by `fitted_cones`, and the case of no cones by `cones_at`.
 """
 
 from __future__ import annotations
@@ -27,13 +27,20 @@ def cones_at(
     euler_characteristic: int,
     cones: IntArray,
 ) -> ConeSolution:
-    """Compute the curvatures of cones at given vertices (Section 3.1 of the paper) of a connected mesh.
+    """Return cones at given vertices of a connected mesh with curvatures that follow from phi = 0 (Section 3.1).
 
-    Target curvatures and log scale are one Dirichlet problem: phi = 0 on cones and boundary, L phi = -K
-    elsewhere; then the target is K + L phi.
+    The section is that of the paper. The log scale solves a Dirichlet problem: phi = 0 at cones and boundary, and
+    L phi = -K elsewhere. The target curvature is then K + L phi.
+
+    Args:
+        laplacian: (n, n) cotangent Laplacian L.
+        curvature: (n,) angle defect K, radians.
+        is_boundary: (n,) mask.
+        euler_characteristic: chi of the mesh.
+        cones: (s,) vertices.
 
     Raises:
-        CurvatureError: a closed surface that is not a torus has no cone to carry its curvature.
+        CurvatureError: a closed surface that is not a torus has no cones.
     """
     is_singular = is_boundary.copy()
     is_singular[cones] = True
@@ -58,9 +65,16 @@ def cones_with_curvature(
     cones: IntArray,
     curvatures: FloatArray,
 ) -> ConeSolution:
-    """Solve for the log scale of cones with given curvatures (Eq. 1 of the paper) on a connected mesh.
+    """Return the log scale of cones with given curvatures (Eq. 1 of the paper) on a connected mesh.
 
-    On a bounded mesh phi = 0 on the boundary, which takes what the cones leave.
+    On a mesh with boundary, phi = 0 on the boundary, which absorbs the remaining curvature.
+
+    Args:
+        laplacian: (n, n) cotangent Laplacian.
+        curvature: (n,) angle defect, radians.
+        is_boundary: (n,) mask.
+        euler_characteristic: chi of the mesh.
+        cones, curvatures: (s,) vertices and radians.
 
     Raises:
         CurvatureError: on a closed mesh, the curvatures do not sum to 2 pi chi.
@@ -77,12 +91,15 @@ def cones_with_curvature(
 
 
 def checked_sum(curvatures: FloatArray, euler_characteristic: int | None) -> FloatArray:
-    """Return the curvatures (s,) of a closed mesh's cones, radians, with the sum that they must have, to rounding.
+    """Return (s,) the curvatures of cones, corrected so that their sum is 2 pi chi up to rounding.
 
-    euler_characteristic: None where there is a boundary, which takes what they leave.
+    Args:
+        curvatures: (s,) radians.
+        euler_characteristic: chi of a closed mesh; None for a mesh with boundary, which absorbs the remaining
+            curvature.
 
     Raises:
-        CurvatureError: they do not sum to 2 pi chi.
+        CurvatureError: the curvatures do not sum to 2 pi chi.
     """
     if euler_characteristic is None:
         return curvatures
@@ -105,20 +122,20 @@ def fitted_cones(
     min_cone_angle: float,
     max_cone_angle: float | None,
 ) -> ConeSolution:
-    """Return cones with the curvatures given, the others with those that make E the least.
+    """Return cones with given curvatures; those that are not given minimise E.
 
-    With Green's functions g, the linear log scale is phi_0 + sum k_i g_i, and E its standard deviation by area: a
-    convex quadratic program in the curvatures that are not given.
+    With the Green's functions g_i of the cones, the linear log scale is phi_0 + sum k_i g_i, and E is its area-weighted
+    standard deviation. This is a convex quadratic program in the curvatures that are not given.
 
     Args:
-        linear: of the connected mesh.
-        euler_characteristic: of it.
-        cones, curvatures: (s,) vertices off the boundary and radians, NaN where it is to be computed.
-        min_cone_angle, max_cone_angle: bounds of what is computed, radians; left out where the sum that the surface
-            needs cannot be had within them.
+        linear: the linear model of the connected mesh.
+        euler_characteristic: chi of the mesh.
+        cones, curvatures: (s,) inner vertices and radians; NaN where the curvature is to be computed.
+        min_cone_angle, max_cone_angle: bounds of the computed cone angles, radians. They are ignored if they do not
+            allow the sum of curvatures that the surface needs.
 
     Raises:
-        CurvatureError: all are given, and on a closed mesh do not sum to 2 pi chi.
+        CurvatureError: all curvatures are given, and on a closed mesh they do not sum to 2 pi chi.
     """
     from .sparse.fit_curvatures import fit_curvatures
     from .sparse.limits import Limits
@@ -133,12 +150,12 @@ def fitted_cones(
     responses = operator.responses(unknown[cones])
     gram = _covariances(responses, responses, operator.areas)
     slope = _covariances(responses, linear.log_scale[None], operator.areas)[:, 0]
-    held = curvatures[~is_free]
-    total = np.nan if euler is None else 2 * np.pi * euler - held.sum()
+    prescribed = curvatures[~is_free]
+    total = np.nan if euler is None else 2 * np.pi * euler - prescribed.sum()
     count = int(is_free.sum())
     found, _, _ = fit_curvatures(
         np.ascontiguousarray(gram[np.ix_(is_free, is_free)]),
-        slope[is_free] + gram[np.ix_(is_free, ~is_free)] @ held,
+        slope[is_free] + gram[np.ix_(is_free, ~is_free)] @ prescribed,
         np.full(count, limits.least),
         np.full(count, limits.most),
         float(total),
@@ -149,6 +166,6 @@ def fitted_cones(
 
 
 def _covariances(one: FloatArray, other: FloatArray, areas: FloatArray) -> FloatArray:
-    """Return (k, l) the covariances by area of functions (k, f) and (l, f)."""
+    """Return (k, l) the area-weighted covariances of functions (k, f) and (l, f)."""
     products: FloatArray = (one * areas) @ other.T - np.outer(one @ areas, other @ areas)
     return products

@@ -14,7 +14,7 @@ from ..mesh.ties import argmax_tied
 from ..stages import ConeSolution
 from .solution import FULL_TURN, GroundedLaplacian, target_from_log_scale
 
-# Variation of the log of the scale that the published search ends at.
+# Range of the log scale at which the search of the paper ends.
 EPSILON = 1.0
 
 
@@ -29,10 +29,11 @@ def greedy_cones(
     tie_key: FloatArray | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> ConeSolution:
-    """Find cones for a connected mesh by the greedy search of the paper.
+    """Return cones of a connected mesh by the greedy search of the paper (Section 3.2).
 
-    The boundary, if there is one, is held at phi = 0 and absorbs curvature, as the cones do. Cones of
-    2 pi and more are split further whatever epsilon says; `check_feasible` tells if max_cones left any.
+    The boundary, if there is one, has phi = 0 and absorbs curvature, as the cones do. While a cone has a curvature of
+    2 pi or more, cones are added even if the range of phi is below epsilon. `check_feasible` detects such cones if
+    `max_cones` was reached before.
 
     Args:
         laplacian: (n, n) cotangent Laplacian.
@@ -40,13 +41,13 @@ def greedy_cones(
         is_boundary: (n,) mask.
         euler_characteristic: chi of the mesh.
         epsilon: stop when max(phi) - min(phi) is at most this.
-        max_cones: stop at this many cones; None for no limit.
-        tie_key: (n,) decides between vertices that are equal but for rounding, as on symmetric meshes.
-        progress: called with how far the search is, before each step.
+        max_cones: stop at this number of cones; None for no limit.
+        tie_key: (n,) decides between vertices whose values are equal up to rounding, as on symmetric meshes.
+        progress: called with a text on the progress before each step.
 
     Raises:
         OptionError: epsilon is not positive, or max_cones is negative.
-        CurvatureError: a closed surface that is not a torus is allowed no cone.
+        CurvatureError: `max_cones` is 0 for a closed surface that is not a torus.
     """
     if not epsilon > 0:
         raise OptionError(f"epsilon must be positive, not {epsilon:g}")
@@ -63,12 +64,12 @@ def greedy_cones(
     return search.solution()
 
 
-# Green's functions that are kept. More would cost more than the factorization that makes them needless.
-MOST_COLUMNS = 256
+# Largest number of cached Green's functions. Using more would cost more than a new factorization.
+MAX_COLUMNS = 256
 
 
 class _Search:
-    """The state of the search: phi, and Green's functions that vanish at every earlier cone."""
+    """The state of the search: phi, and for each cone a Green's function that vanishes at all earlier cones."""
 
     def __init__(
         self,
@@ -96,7 +97,7 @@ class _Search:
                 self._mark(pin)
         self.grounded = GroundedLaplacian(laplacian, grounded)
         self.phi = self.grounded.solve(-curvature)
-        # Columns span the Green's functions of the cones, the first ones excepted that ground them.
+        # Columns span the Green's functions of the cones, except those of the cones that are grounded.
         self.columns = np.empty((len(curvature), 16), order="F")
         self.anchors: list[int] = []
         self.reference: tuple[int, FloatArray] | None = None
@@ -113,17 +114,17 @@ class _Search:
         self.is_singular[vertex] = True
 
     def next_pair(self, epsilon: float) -> list[int]:
-        """Return the vertices of largest and smallest phi, or nothing when the search is over."""
+        """Return the vertices of largest and smallest phi; empty at the end of the search."""
         top, bottom = argmax_tied(self.phi, self.tie_key), argmax_tied(-self.phi, self.tie_key)
-        room = self.limit - len(self.cones)
+        remaining = self.limit - len(self.cones)
         if self.floating:
-            # On a torus one cone alone has curvature 0 and does nothing: two, or none.
-            return [top, bottom] if room >= 2 and self.phi[top] - self.phi[bottom] > epsilon else []
+            # On a torus, a single cone has curvature 0 and no effect, so two are added or none.
+            return [top, bottom] if remaining >= 2 and self.phi[top] - self.phi[bottom] > epsilon else []
         if self.phi[top] - self.phi[bottom] <= epsilon and self._is_feasible():
             return []
         pair = [v for v in (top, bottom) if not self.is_singular[v]]
         pair.sort(key=lambda v: -abs(self.phi[v]))
-        return pair[: max(room, 0)]
+        return pair[: max(remaining, 0)]
 
     def _is_feasible(self) -> bool:
         return bool((self._target()[self.cones] < FULL_TURN).all())
@@ -132,7 +133,7 @@ class _Search:
         return target_from_log_scale(self.laplacian, self.curvature, self.phi, self.is_singular)
 
     def add(self, vertices: list[int]) -> None:
-        """Make vertices cones, and phi zero on them."""
+        """Add vertices to the cones, and update phi so that it vanishes there."""
         if self.floating:
             self._ground_pair(*vertices)
             return
@@ -140,7 +141,7 @@ class _Search:
             self._append(vertex, self._green(vertex))
 
     def _ground_pair(self, one: int, two: int) -> None:
-        """Make the first two cones of a torus: they must agree in phi, at whatever value."""
+        """Add the first two cones of a torus: phi must have the same value at both."""
         self.floating = False
         self.reference = (one, self.grounded.green(one))
         self.phi -= self.phi[one]
@@ -148,14 +149,14 @@ class _Search:
         self._append(two, self._green(two))
 
     def _green(self, vertex: int) -> FloatArray:
-        """Return the Green's function of a vertex that vanishes at the ground and at all cones."""
+        """Return (n,) the Green's function of a vertex that vanishes at grounded vertices and at all cones."""
         g = self.grounded.green(vertex)
         if self.reference is not None:
-            # The ground moves from the pin to the first cone: L (g - h) = e_vertex - e_first.
+            # The grounded vertex is changed to the first cone: L (g - h) = e_vertex - e_first.
             first, h = self.reference
             g = g - h - (g[first] - h[first])
         if self.anchors:
-            # Column k vanishes at the cones before it, so the values at the cones are triangular.
+            # Column k vanishes at the earlier cones, so the matrix of values at the cones is triangular.
             columns = self.columns[:, : len(self.anchors)]
             coefficients = solve_triangular(columns[self.anchors], g[self.anchors], lower=True)
             g = g - columns @ coefficients
@@ -164,8 +165,8 @@ class _Search:
     def _append(self, vertex: int, g: FloatArray) -> None:
         self.phi -= g * (self.phi[vertex] / g[vertex])
         self._mark(vertex)
-        self.phi[self.cones] = 0.0  # rounding left there would enter max - min
-        if len(self.anchors) == MOST_COLUMNS:
+        self.phi[self.cones] = 0.0  # otherwise rounding errors there would enter max - min
+        if len(self.anchors) == MAX_COLUMNS:
             self._ground_all()
             return
         if len(self.anchors) == self.columns.shape[1]:
@@ -174,7 +175,7 @@ class _Search:
         self.anchors.append(vertex)
 
     def _ground_all(self) -> None:
-        """Start over from all cones so far: one more factorization, and the columns are free again."""
+        """Factorize the Laplacian grounded at all cones so far, which makes the cached columns unnecessary."""
         self.grounded = GroundedLaplacian(self.laplacian, self.is_singular)
         self.phi = self.grounded.solve(-self.curvature)
         self.anchors, self.reference = [], None

@@ -1,4 +1,4 @@
-"""Linear systems for the log scale of cones, and bounds of what curvature cones may have."""
+"""Linear systems for the log scale of cones, and checks of the curvatures of cones."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ..linalg import Factor, factorize
 from ..mesh.connectivity import TriangleMesh
 
 FULL_TURN = 2 * np.pi
-# Values that differ by this share or less, and radians, are equal: symmetric surfaces have many that differ by rounding
-# only, and the first in the order of vertices is taken.
+# Values with at most this relative difference, or difference in radians, are equal. Symmetric surfaces have many values
+# that differ by rounding only; the first in the order of vertices is then chosen.
 TIE_TOLERANCE = 1e-9
 
 
 class GroundedLaplacian:
-    """The Laplacian held at zero on a set of vertices, factorized once."""
+    """The Laplacian with zero Dirichlet conditions at a set of vertices, factorized once."""
 
     def __init__(self, laplacian: csc_matrix, grounded: BoolArray) -> None:
         self._free = np.flatnonzero(~grounded)
@@ -26,13 +26,13 @@ class GroundedLaplacian:
         self._count = len(grounded)
 
     def solve(self, source: FloatArray) -> FloatArray:
-        """Return (n,) phi, zero on the grounded vertices, with L phi = source elsewhere."""
+        """Return (n,) the solution phi of L phi = source (n,), with phi = 0 at the grounded vertices."""
         phi = np.zeros(self._count)
         phi[self._free] = self._factor.solve(source[self._free])
         return phi
 
     def green(self, vertex: int) -> FloatArray:
-        """Return (n,) the Green's function: L g = 1 at `vertex`, zero elsewhere off the ground."""
+        """Return (n,) the Green's function g of a vertex: L g is 1 there and 0 at all others that are not grounded."""
         source = np.zeros(self._count)
         source[vertex] = 1.0
         return self.solve(source)
@@ -41,21 +41,27 @@ class GroundedLaplacian:
 def target_from_log_scale(
     laplacian: csc_matrix, curvature: FloatArray, log_scale: FloatArray, is_singular: BoolArray
 ) -> FloatArray:
-    """Return (n,) the curvature absorbed by the singular vertices: K + L phi there, 0 elsewhere.
+    """Return (n,) the curvature that the singular vertices absorb: K + L phi there, 0 elsewhere.
 
-    This is Eq. 2-5 of the paper, the limit of its absorbing random walk, once L phi = -K off the set.
+    This is Eq. 2-5 of the paper, the limit of its absorbing random walk, if L phi = -K at the other vertices.
+
+    Args:
+        laplacian: (n, n) cotangent Laplacian L.
+        curvature: (n,) angle defect K, radians.
+        log_scale: (n,) phi.
+        is_singular: (n,) mask of the cones, and of the boundary.
     """
     target: FloatArray = np.where(is_singular, curvature + laplacian @ log_scale, 0.0)
     return target
 
 
 def check_feasible(cones: IntArray, curvatures: FloatArray, names: IntArray | None, advice: str) -> None:
-    """Raise CurvatureError if a cone has a curvature of 2 pi or more, which no metric has.
+    """Raise CurvatureError if a cone has a curvature of 2 pi or more, which is impossible in any metric.
 
     Args:
         cones, curvatures: (s,) vertices and radians.
-        names: (n,) what the user calls each vertex.
-        advice: what to do about it.
+        names: (n,) vertex numbers of the input, for the message; None if they are those of the mesh.
+        advice: the end of the message: what the user can do.
     """
     bad = np.flatnonzero(curvatures >= FULL_TURN * (1 - 1e-12))
     if len(bad):
@@ -68,7 +74,7 @@ def check_feasible(cones: IntArray, curvatures: FloatArray, names: IntArray | No
 
 
 def check_enough(count: int, mesh: TriangleMesh) -> None:
-    """Raise CurvatureError if so many cones, of less than 2 pi each, cannot carry the curvature of a closed mesh."""
+    """Raise CurvatureError if `count` cones of less than 2 pi each cannot carry the curvature of a closed mesh."""
     total = 2 * mesh.euler_characteristic
     if not mesh.is_boundary_vertex.any() and total >= 2 * max(count, 1):
         raise CurvatureError(

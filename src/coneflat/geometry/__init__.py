@@ -1,4 +1,4 @@
-"""Pure functions of edge lengths: angles, areas, curvature, Laplacian."""
+"""Geometry: lengths, angles, areas, Laplacian, intrinsic triangulations, exact predicates, overlaps, visibility."""
 
 from .delaunay import euclidean_diagonal, intrinsic_delaunay, make_delaunay, relink
 from .handles import handle_loops

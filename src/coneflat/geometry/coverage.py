@@ -1,4 +1,4 @@
-"""How much of the plane overlapping triangles cover."""
+"""The area of the plane that overlapping triangles cover."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from ..mesh.connectivity import NEXT
 from .layers import MAX_CELLS, trace_sides
 from .orientation import counterclockwise
 
-# Crossings of horizontal lines with sides, about a minute: with more the areas are not computed. A hundredth of them is
-# sorted at a time, to bound the memory.
-MOST_CROSSINGS = 200_000_000
-# How many of them are held in memory at a time.
-AT_A_TIME = MOST_CROSSINGS // 100
+# Largest number of crossings of horizontal lines with sides, which take about a minute. With more, the areas are not
+# computed.
+MAX_CROSSINGS = 200_000_000
+# Number of crossings that are sorted at a time, to bound the memory.
+CROSSINGS_PER_BLOCK = MAX_CROSSINGS // 100
 
 
-def covered_twice(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
-    """Return the area inside at least two triangles, and that inside at least one.
+def overlap_areas(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
+    """Return the area inside at least two triangles, and the area inside at least one.
 
     Args:
-        corners: (m, 3, 2) of the triangles, counterclockwise or without area.
-        pairs: (k, 2) all that overlap.
+        corners: (m, 3, 2) corners of the triangles, counterclockwise or without area.
+        pairs: (k, 2) all pairs of triangles that overlap.
 
     Returns:
-        Both NaN where it would take too long, as of long triangles in all directions.
+        The two areas; both NaN if they would take too long, as with many long triangles in all directions.
 
     Notes:
-        How many triangles cover a point is the winding number of their sides about it, where those that two
-        triangles share cancel. On a horizontal line it changes where it crosses a side, and between the heights
-        at which sides end or cross, the lengths of line that are covered once, twice, thrice are linear in the
-        height: their value in the middle, times the difference in height, is an area without error but for
-        rounding. Only triangles that overlap others count, the outline of what they cover is short, and its
-        sides cross in those pairs alone.
+        The number of triangles that cover a point is the winding number of their sides around it, in which the sides
+        that two triangles share cancel. Along a horizontal line, it changes where the line crosses a side. Between
+        the heights at which sides end or cross, the lengths of line that are covered once, twice or three times are
+        linear functions of the height. Their value in the middle times the difference in height is therefore an area
+        that is exact up to rounding. Only triangles that overlap others are needed. The outline of the region that
+        they cover is short, and its sides cross only in the given pairs.
     """
     total = float(_cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1]).sum()) / 2
     if not len(pairs):
@@ -49,15 +49,15 @@ def covered_twice(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
 
 
 def layers_of_raster(corners: FloatArray) -> tuple[float, float]:
-    """Return about the area inside at least two triangles, and that inside at least one, by counting pixels.
+    """Return approximate areas inside at least two triangles and inside at least one, by counting pixels.
 
-    corners: (m, 3, 2) of the triangles, in either order.
+    corners: (m, 3, 2) corners of the triangles, of any orientation.
     """
     low = corners.min(axis=(0, 1))
     size = corners.max(axis=(0, 1)) - low
     if not size.min() > 0:
         return 0.0, 0.0
-    # Half a pixel less, so that the last of the points is in the last pixel.
+    # Half a pixel less, so that the points of largest coordinates are in the last pixels.
     pixels = counterclockwise((corners - low) * ((MAX_CELLS - 0.5) / size))[0]
     marks, steps = np.zeros((2, MAX_CELLS + 1, MAX_CELLS + 1), dtype=np.int32)
     sides = np.stack([pixels, pixels[:, NEXT]], axis=2)
@@ -73,9 +73,9 @@ def _cross(one: FloatArray, two: FloatArray) -> FloatArray:
 
 
 def _outline(corners: FloatArray) -> IntArray:
-    """Return (m, 3) how often the side from each corner is in the outline, those with the same ends added up.
+    """Return (m, 3) the multiplicity of the side from each corner in the outline; sides with the same ends are summed.
 
-    The first of equal ones stands for all: positive as it runs, negative if it runs against it.
+    The first of sides with the same ends has the sum, positive in its own direction; the others have 0.
     """
     places = corners @ np.array([1, 1j])
     sides = np.stack([places, places[:, NEXT]], axis=2).reshape(-1, 2)
@@ -84,15 +84,15 @@ def _outline(corners: FloatArray) -> IntArray:
 
 
 def cancel_sides(sides: ComplexArray, chart: IntArray) -> tuple[IntArray, IntArray]:
-    """Return which sides of triangles have the same ends, and how often they run one direction more than the other.
+    """Return which sides of triangles have the same ends, and their sum with signs by direction.
 
     Args:
         sides: (s, 2) start and end of each.
-        chart: (s,) sides of different charts are different.
+        chart: (s,) chart of each side; sides of different charts are never equal.
 
     Returns:
-        (s,) the first side with the same ends, in either order; and (s,) of each such side how often it is there as
-        it runs less how often against it, 0 where they cancel.
+        (s,) the first side with the same ends, in either order; and (s,) for each such first side, the number of
+        sides in its direction minus the number in the opposite direction, 0 if they cancel.
     """
     number = np.unique(sides + 0.0, return_inverse=True)[1].reshape(sides.shape)
     keys = np.stack([chart, number.min(axis=1), number.max(axis=1)])
@@ -106,7 +106,7 @@ def cancel_sides(sides: ComplexArray, chart: IntArray) -> tuple[IntArray, IntArr
 
 
 def _crossings(corners: FloatArray, on_outline: BoolArray, pairs: IntArray) -> FloatArray:
-    """Return the heights at which sides on the outline of overlapping triangles cross."""
+    """Return the heights (y) at which sides on the outline of overlapping triangles cross."""
     heights = []
     for i in range(3):
         for j in range(3):
@@ -123,12 +123,12 @@ def _crossings(corners: FloatArray, on_outline: BoolArray, pairs: IntArray) -> F
 
 
 def _sweep(corners: FloatArray, steps: IntArray, crossings: FloatArray) -> tuple[float, float]:
-    """Return the area with winding number 2 and more, and the sum of the areas with 2, 3, 4 ... and more.
+    """Return the area of winding number 2 or more, and the sum of the areas of numbers at least 2, 3, 4 and so on.
 
     Args:
-        corners: (m, 3, 2).
-        steps: (m, 3) how often the side from each corner to the next counts.
-        crossings: heights at which sides that count cross.
+        corners: (m, 3, 2) corners of the triangles.
+        steps: (m, 3) multiplicity of the side from each corner to the next in the outline.
+        crossings: heights at which sides of the outline cross.
     """
     start, end, step = corners[steps != 0], corners[:, NEXT][steps != 0], steps[steps != 0]
     falls = end[:, 1] < start[:, 1]
@@ -136,7 +136,7 @@ def _sweep(corners: FloatArray, steps: IntArray, crossings: FloatArray) -> tuple
     step, along = np.where(falls, step, -step), high - low
     heights = np.unique(np.concatenate([low[:, 1], high[:, 1], crossings]))
     first, last = np.searchsorted(heights, low[:, 1]), np.searchsorted(heights, high[:, 1])
-    if int((last - first).sum()) > MOST_CROSSINGS:
+    if int((last - first).sum()) > MAX_CROSSINGS:
         return float("nan"), float("nan")
     twice = more = 0.0
     for begin, stop in _blocks(first, last, len(heights)):
@@ -155,8 +155,11 @@ def _sweep(corners: FloatArray, steps: IntArray, crossings: FloatArray) -> tuple
 
 
 def _blocks(first: IntArray, last: IntArray, count: int) -> Iterator[tuple[int, int]]:
-    """Yield ranges of strips between `count` heights that sides from `first` to `last` cross only so many times."""
+    """Yield ranges of strips between `count` heights with at most `CROSSINGS_PER_BLOCK` crossings, if possible.
+
+    first, last: (s,) the lowest and the highest height of each side.
+    """
     begun = np.bincount(first, minlength=count) - np.bincount(last, minlength=count)
-    crossed, block = np.cumsum(np.cumsum(begun)), AT_A_TIME
+    crossed, block = np.cumsum(np.cumsum(begun)), CROSSINGS_PER_BLOCK
     cuts = np.searchsorted(crossed, np.arange(block, crossed[-1], block))
     yield from pairwise(np.unique(np.concatenate([[0], cuts, [count - 1]])).tolist())

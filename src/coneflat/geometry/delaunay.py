@@ -1,11 +1,11 @@
-"""Intrinsic Delaunay triangulations by edge flips, with a record from which the flips can be undone.
+"""Intrinsic Delaunay triangulations by edge flips, with a record of the flips so that they can be undone.
 
 In a triangle with sides a, b, c let X = (c + a - b)(a + b - c) and Y = (a + b + c)(b + c - a). Then
 X + Y = 4 b c, the angle opposite a has the cosine (Y - X) / (Y + X), and the cosines opposite an edge sum to
-a negative number just if X X' > Y Y' (primes: the other triangle). For triangles this is the in-circle test;
-for lengths that break the triangle inequality it is still what decides (the ideal Delaunay condition of
-Springborn, "Ideal hyperbolic polyhedra and discrete uniformization", 2019), and through the slacks it keeps
-its digits in slivers, where the cosines have lost theirs.
+a negative number if and only if X X' > Y Y' (primes: the other triangle). For triangles this is the in-circle test.
+For lengths that break the triangle inequality it is the ideal Delaunay condition of Springborn, "Ideal hyperbolic
+polyhedra and discrete uniformization", 2019. As it is computed from slacks, it is accurate also for slivers, for which
+the cosines are not.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from ..linalg.shortest_paths import drop_first, push
 from ..mesh.connectivity import TriangleMesh
 from .intrinsic import IntrinsicTriangulation, intrinsic_triangulation
 
-# Flips per edge after which flipping stops. Finite by theory; in floating point this catches what the
-# tolerance of the test does not.
+# Largest number of flips per edge. The number is finite in theory; in floating point, this limit ends the cycles that
+# the tolerance of the test does not prevent.
 FLIPS_PER_EDGE = 50
 
 
@@ -30,23 +30,23 @@ def make_delaunay(
     log_scale: FloatArray | None = None,
     suspects: IntArray | None = None,
 ) -> IntArray:
-    """Flip a triangulation, in place, until it is Delaunay; return the half-edges flipped, in order.
+    """Flip a triangulation in place until it is Delaunay; return (k,) the flipped half-edges, in order.
 
     Args:
         triangulation: changed in place.
         log_scale: None for the triangulation's own metric and Euclidean flips. With (n,) log scale factors
             phi, the metric l_ij exp((phi_i + phi_j) / 2) is made Delaunay by Ptolemy flips of the lengths l,
-            which keep the discrete conformal class (Springborn 2019; Gillespie, Springborn, Crane 2021).
-        suspects: half-edges of the edges that may fail the condition at first; None: all.
+            which preserve the discrete conformal class (Springborn 2019; Gillespie, Springborn, Crane 2021).
+        suspects: half-edges of the edges that may violate the condition at first; None: all.
 
     Notes:
-        Where nothing fails the condition the cost is one pass over the edges. The condition is meaningful
-        also where scaled lengths break the triangle inequality.
+        If no edge violates the condition, the cost is one pass over the edges. The condition is also defined if
+        scaled lengths break the triangle inequality.
     """
     if log_scale is None:
         scale = np.ones(triangulation.vertex_count)
     else:
-        # Only ratios within a triangle matter, so the middle may go to 1, which keeps off overflow.
+        # Only ratios within a triangle matter; scaling the middle of the range to 1 avoids overflow.
         scale = np.exp((log_scale - (log_scale.max() + log_scale.min()) / 2) / 2)
     sides = len(triangulation.twin)
     return flip_until_delaunay(
@@ -61,18 +61,18 @@ def make_delaunay(
 
 
 def intrinsic_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> tuple[IntrinsicTriangulation, IntArray]:
-    """Return the intrinsic Delaunay triangulation of a mesh and the half-edges flipped, in order.
+    """Return the intrinsic Delaunay triangulation of a mesh, and (k,) the flipped half-edges, in order.
 
     Args:
         mesh: the mesh.
-        lengths: (m, 3) side lengths, model units, with the triangle inequality.
+        lengths: (m, 3) side lengths, model units, that satisfy the triangle inequality.
     """
     triangulation = intrinsic_triangulation(mesh, lengths)
     return triangulation, make_delaunay(triangulation)
 
 
-# Rounding of a slack relative to the perimeter: a few ulps of lengths that are products of three factors,
-# with a wide margin, since an edge flipped for the sake of rounding could be flipped back and forth forever.
+# Bound of the rounding error of a slack relative to the perimeter: a few ulps of lengths that are products of three
+# factors, with a wide margin, since an edge that is flipped because of rounding could flip back and forth forever.
 SLACK_ROUNDING = 1e-14
 
 
@@ -105,9 +105,9 @@ def incircle_terms(
 
 @compiled
 def violation(twin: IntArray, tail: IntArray, length: FloatArray, scale: FloatArray, h: int) -> float:
-    """Return by how much an edge between two triangles fails the Delaunay condition; 0 if it does not.
+    """Return by how much an edge violates the Delaunay condition: minus the sum of opposite cosines; 0 if satisfied.
 
-    That is minus the sum of the cosines opposite, which measures alike on all edges.
+    This measure is comparable between all edges.
     """
     t = twin[h]
     if t < 0 or t // 3 == h // 3:
@@ -120,9 +120,10 @@ def violation(twin: IntArray, tail: IntArray, length: FloatArray, scale: FloatAr
 
 @compiled
 def euclidean_diagonal(e: float, b: float, c: float, b2: float, c2: float) -> float:
-    """Return the other diagonal of the quad of two triangles on the edge e from u to v.
+    """Return the length of the other diagonal of the quad of two triangles on the edge of length e from u to v.
 
-    b, b2 are the distances of the apices from u; c, c2 from v. Heights add, so nothing cancels in slivers.
+    b, b2 are the distances of the apices from u, and c, c2 from v. Heights are added, so there is no cancellation in
+    slivers.
     """
     height = 0.0
     for s, t in ((b, c), (b2, c2)):
@@ -138,10 +139,10 @@ def euclidean_diagonal(e: float, b: float, c: float, b2: float, c2: float) -> fl
 def relink(
     twin: IntArray, tail: IntArray, length: FloatArray, h: int, diagonal: float
 ) -> tuple[int, int, int, int]:
-    """Turn the edge h counterclockwise in its quad; return the four slots of the quad's sides.
+    """Flip the edge h by a counterclockwise rotation in its quad; return the four half-edges of the sides of the quad.
 
-    Sides move between slots (h2 to h1, t1 to h2, t2 to t1, h1 to t2), and where the quad is glued to
-    itself their twins move with them. Four turns restore every slot.
+    Sides move between half-edge indices (h2 to h1, t1 to h2, t2 to t1, h1 to t2). If the quad is glued to itself, their
+    twins move with them. Four flips restore every index.
     """
     t = twin[h]
     h1 = h - h % 3 + (h + 1) % 3
@@ -179,21 +180,21 @@ def flip_until_delaunay(
     suspects: IntArray,
     most: int,
 ) -> IntArray:
-    """Flip edges that fail the condition, and those whose quads that changes if they do then, the worst first.
+    """Flip edges that violate the Delaunay condition, always the worst, until there is none; return them in order.
 
-    In another order the edges around a hub are flipped one after the other to the same far vertex, which becomes a
-    hub in its place: ten times as many flips for thousands of edges.
+    In another order, the edges around a vertex of high valence may all be flipped to the same far vertex, which then
+    has a high valence instead: this takes ten times as many flips for thousands of edges.
 
     Args:
         twin, tail, length, scale: the triangulation, see `make_delaunay`.
-        is_euclidean: whether flips keep the metric of the lengths, or the conformal class.
-        suspects: half-edges of the edges that may fail the condition, by one or both.
-        most: flips at most.
+        is_euclidean: whether flips preserve the metric of the lengths; else the conformal class.
+        suspects: half-edges of the edges that may violate the condition, one or both per edge.
+        most: largest number of flips.
 
     Returns:
-        The half-edges flipped, in order.
+        (k,) the flipped half-edges, in order.
     """
-    # A heap of edges; one is there again whenever its quad has changed.
+    # A heap of edges; an edge is inserted again whenever its quad has changed.
     keys, items, size = np.empty(64), np.empty(64, np.int64), 0
     for h in suspects:
         amount = violation(twin, tail, length, scale, h)
@@ -205,7 +206,7 @@ def flip_until_delaunay(
     while size > 0 and count < most:
         key, h = keys[0], items[0]
         size = drop_first(keys, items, size)
-        if key == 0.0 or -violation(twin, tail, length, scale, h) != key:  # of a quad that has changed
+        if key == 0.0 or -violation(twin, tail, length, scale, h) != key:  # outdated: the quad has changed
             continue
         t = twin[h]
         h1 = h - h % 3 + (h + 1) % 3
@@ -214,7 +215,7 @@ def flip_until_delaunay(
         t2 = t - t % 3 + (t + 2) % 3
         if is_euclidean:
             diagonal = euclidean_diagonal(length[h], length[h2], length[h1], length[t1], length[t2])
-        else:  # Ptolemy's relation, which keeps the conformal class
+        else:  # Ptolemy's relation, which preserves the conformal class
             diagonal = (length[h1] * length[t1] + length[h2] * length[t2]) / length[h]
         if count == len(record):
             record = np.concatenate((record, record))

@@ -1,6 +1,6 @@
-"""Thousands of triangles around one point: which of them have no inner point in common, by their angles around it.
+"""A test for disjoint triangles among thousands around one point, by their angles around it.
 
-The boxes of all in a quarter of the plane meet, and so tell nothing.
+The bounding boxes of all such triangles in a quadrant intersect, so boxes cannot separate them.
 """
 
 from __future__ import annotations
@@ -14,37 +14,44 @@ from ..base.arrays import FloatArray, IntArray
 from ..base.compiled import compiled
 from ..mesh.connectivity import NEXT, PREVIOUS
 
-# Corners at one point from which on it is worth it; fewer triangles meet in few enough pairs.
+# Number of corners at one point from which the angles are used; for fewer triangles, testing all pairs is fast enough.
 MIN_CORNERS = 500
-# By how much angles (radians) and turned coordinates may be off, computed of coordinates up to 1, and more.
+# Upper bound of the rounding error of angles (radians) and rotated coordinates, for coordinates of up to 1.
 ANGLE_ROUNDING = 2.0**-46
 
 
 @dataclass(frozen=True, eq=False)
 class Fans:
-    """Triangles around points that many of them meet in.
+    """Fans of triangles: the triangles around points where many of them meet.
 
     Attributes:
-        numbers: (m,) the fan of each triangle, -1 for most.
-        angles: (m, 2) where each begins and ends around the point of its fan, counterclockwise, radians; from
-            -pi to 2 pi. Of no meaning for those in none.
+        numbers: (m,) the fan of each triangle, -1 for triangles in no fan.
+        angles: (m, 2) the angles at which each triangle starts and ends around the point of its fan, counterclockwise,
+            radians, from -pi to 2 pi. Undefined for triangles in no fan.
     """
 
     numbers: IntArray
     angles: FloatArray
 
     def sorted(self, order: IntArray) -> IntArray:
-        """Return an order of the triangles, but those of each fan one after the other as they lie around its point."""
+        """Return an order of the triangles in which those of each fan are consecutive and sorted by angle."""
         rank = np.empty(len(order))
         rank[order] = np.arange(len(order))
-        is_in_none = self.numbers < 0
-        along: IntArray = np.lexsort((np.where(is_in_none, rank, self.angles[:, 0]), self.numbers))
+        is_outside = self.numbers < 0
+        along: IntArray = np.lexsort((np.where(is_outside, rank, self.angles[:, 0]), self.numbers))
         return along
 
     def tree(self, order: IntArray, leaves: int) -> tuple[IntArray, FloatArray]:
-        """Return, for each node of a binary tree above the triangles in an order, the fan of all and their angles.
+        """Return the fan and the range of angles of each node of a binary tree over the triangles in an order.
 
-        Nodes are numbered as of `box_tree`; those above triangles of several fans, or of none, have -1.
+        Nodes are numbered as in `box_tree`. Nodes with triangles of several fans, or of none, have the fan -1.
+
+        Args:
+            order: (m,) the triangles of the first leaves.
+            leaves: number of leaves, a power of two.
+
+        Returns:
+            (2 leaves - 1,) fans and (2 leaves - 1, 2) angles.
         """
         numbers = np.full(2 * leaves - 1, -1, dtype=np.int64)
         angles = np.zeros((2 * leaves - 1, 2))
@@ -62,12 +69,11 @@ class Fans:
 
 
 def find_fans(corners: FloatArray) -> Fans | None:
-    """Return the fans of many triangles (m, 3, 2), counterclockwise, coordinates up to 1; None if there is none."""
+    """Return the fans of counterclockwise triangles (m, 3, 2) with coordinates of up to 1; None if there is none."""
     if len(corners) < MIN_CORNERS:
         return None
-    places = corners.reshape(-1, 2) + 0.0  # a zero has one sign
-    # Points are counted by numbers that depend on all of their bits: they are the same for the same points, and seldom
-    # for others.
+    places = corners.reshape(-1, 2) + 0.0  # -0.0 becomes 0.0
+    # Points are counted by hash values of all of their bits: equal points have equal values, others seldom do.
     x, y = places.view(np.uint64).T
     mixed = x * np.uint64(0x9E3779B97F4A7C15) + y * np.uint64(0xC2B2AE3D27D4EB4F)
     mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -95,8 +101,8 @@ def find_fans(corners: FloatArray) -> Fans | None:
 
 
 @compiled
-def lie_apart(numbers: IntArray, angles: FloatArray, i: int, j: int) -> bool:
-    """Return whether the triangles of two nodes are of one fan and of other angles: so no inner points are in both."""
+def are_disjoint(numbers: IntArray, angles: FloatArray, i: int, j: int) -> bool:
+    """Return whether the triangles of two nodes are in one fan with disjoint angles, so that interiors are disjoint."""
     if numbers[i] < 0 or numbers[i] != numbers[j]:
         return False
     for turn in range(-1, 2):

@@ -1,4 +1,4 @@
-"""Loops across the handles of a connected mesh, by which the rotation along each is measured."""
+"""Loops along the handles and around the holes of a connected mesh, and the holonomy along them."""
 
 from __future__ import annotations
 
@@ -17,16 +17,19 @@ from .triangles import cotangents
 
 
 def handle_loops(mesh: TriangleMesh, holes: bool = False) -> list[IntArray]:
-    """Return 2 genus closed strips of triangles that no cut along one of them, or at a boundary, makes shorter.
+    """Return 2 genus closed strips of triangles that generate the loops along the handles of a mesh.
 
-    Each is given by the half-edges that it crosses, in order: out of the triangle of one, over it, into the triangle
-    of its twin, which is that of the next. A tree of shortest paths between triangles and a tree of edges that these
-    do not cross leave 2 genus edges (tree-cotree, D. Eppstein 2003); each closes a loop.
+    Each strip is given by the half-edges that it crosses, in order: it leaves the triangle of a half-edge and enters
+    the triangle of its twin, which is that of the next half-edge. A tree of shortest paths between triangles and a
+    tree of edges that these do not cross leave 2 genus edges (tree-cotree, D. Eppstein 2003); each closes a loop.
 
     Args:
         mesh: connected.
-        holes: have loops around all but one of the boundary's loops, too, so that any closed strip is a sum of
-            these and of those around inner vertices.
+        holes: add loops around all boundary loops but one, so that every closed strip is a sum of these loops and of
+            loops around inner vertices.
+
+    Returns:
+        For each loop, (k,) the half-edges that it crosses.
     """
     if not mesh.genus() and not (holes and mesh.boundary_loops[0] > 1):
         return []
@@ -50,7 +53,7 @@ def handle_loops(mesh: TriangleMesh, holes: bool = False) -> list[IntArray]:
 
 
 def _contract_loops(mesh: TriangleMesh, together: bool) -> IntArray:
-    """Return (n,) a node for each vertex, the same for all of a boundary loop, or of the boundary: its first."""
+    """Return (n,) a node for each vertex: on a boundary loop its first vertex, or that of all if `together`."""
     count, loop = mesh.boundary_loops
     if together:
         loop = np.minimum(loop, 0)
@@ -63,10 +66,10 @@ def _contract_loops(mesh: TriangleMesh, together: bool) -> IntArray:
 
 
 def _loop(paths: Paths, across: IntArray, edge: int) -> IntArray:
-    """Return the half-edges that the loop over an edge and back through the tree crosses."""
+    """Return (k,) the half-edges crossed by the loop that goes over an edge and returns through the tree."""
     start, end = across[edge] // 3
     there, back = _path_to_root(start, paths.before), _path_to_root(end, paths.before)
-    # What both paths to the root share is not walked to and fro.
+    # The common part of both paths to the root is removed.
     while len(there) > 1 and len(back) > 1 and there[-2] == back[-2]:
         there.pop(), back.pop()
     out, home = np.array(there[::-1]), np.array(back)
@@ -76,7 +79,7 @@ def _loop(paths: Paths, across: IntArray, edge: int) -> IntArray:
 
 
 def _path_to_root(face: int, before: IntArray) -> list[int]:
-    """Return the faces from one to the root of the tree."""
+    """Return the faces from a face to the root of the tree."""
     path = [int(face)]
     while before[path[-1]] >= 0:
         path.append(int(before[path[-1]]))
@@ -84,31 +87,31 @@ def _path_to_root(face: int, before: IntArray) -> list[int]:
 
 
 def corner_signs(loop: IntArray, twin: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return the corners (k,) that a loop turns about, one in each triangle, and +1 where it does so to the left.
+    """Return (k,) the corner that a loop passes in each triangle, and (k,) +1 if it is on the left, -1 on the right.
 
-    The turning of a loop is the sum of the angles there, with these signs.
+    The rotation along a loop is the sum of the angles at these corners, with these signs.
 
     Args:
-        loop: (k,) half-edges crossed.
-        twin: (3m,) the half-edge on the other side.
+        loop: (k,) half-edges that the loop crosses.
+        twin: (3m,) the half-edge on the other side of each half-edge.
     """
     entry, leave = twin[np.roll(loop, 1)] % 3, loop % 3
     return loop - leave + (3 - entry - leave), np.where(entry == (leave + 1) % 3, 1.0, -1.0)
 
 
 def off_multiple(angles: FloatArray, quantum: float) -> FloatArray:
-    """Return what angles are above the nearest multiple of a quantum, radians."""
+    """Return the signed difference of angles from the nearest multiple of a quantum, radians."""
     return angles - quantum * np.round(angles / quantum)
 
 
 @dataclass(frozen=True, eq=False)
-class Turning:
-    """The turning of loops across the handles of a connected mesh, and around its holes.
+class Holonomy:
+    """The holonomy of loops along the handles of a connected mesh, and around its holes: the rotation along each loop.
 
     Attributes:
         mesh: the mesh.
-        loops: the half-edges that each of the l loops crosses: two for each handle, and one for each hole.
-        signs: (l, 3m) of the corner angles in the sum.
+        loops: the half-edges that each of the l loops crosses: two loops for each handle, and one for each hole.
+        signs: (l, 3m) signs of the corner angles in the sum.
     """
 
     mesh: TriangleMesh
@@ -116,31 +119,31 @@ class Turning:
     signs: csr_matrix
 
     def of_flat(self, flat: FlatTriangles) -> FloatArray:
-        """Return (l,) the turning in a flat metric, up to full turns."""
+        """Return (l,) the rotation angles in a flat metric, radians, up to full turns."""
         return np.array([np.angle(np.prod(flat.turns[loop])) for loop in self.loops])
 
     def by_log_lengths(self, lengths: FloatArray) -> csr_matrix:
-        """Return (l, e) the derivative by the logs of edge lengths; lengths are (m, 3)."""
+        """Return (l, e) the derivative of the angles by the logs of edge lengths, at side lengths (m, 3)."""
         return csr_matrix(self.signs @ _angles_by_log_lengths(self.mesh, lengths))
 
     def by_log_scale(self, lengths: FloatArray) -> FloatArray:
-        """Return (l, n) the derivative by the log scale at the vertices."""
+        """Return (l, n) the derivative of the angles by the log scale at the vertices, at side lengths (m, 3)."""
         return np.asarray((self.by_log_lengths(lengths) @ edge_means(self.mesh)).todense())
 
 
-def open_turning(mesh: TriangleMesh, holes: bool = False) -> Turning:
-    """Return the turning of the loops across a mesh's handles; with holes, of those around them, too."""
+def loop_holonomy(mesh: TriangleMesh, holes: bool = False) -> Holonomy:
+    """Return the holonomy of the loops along the handles of a mesh, and around its holes if `holes`."""
     loops = handle_loops(mesh, holes)
     twin = halfedge_twins(mesh)
     parts = [corner_signs(loop, twin) for loop in loops]
     rows = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
     columns = np.concatenate([part[0] for part in parts] or [np.empty(0, dtype=np.int64)])
     values = np.concatenate([part[1] for part in parts] or [np.empty(0)])
-    return Turning(mesh, loops, csr_matrix((values, (rows, columns)), shape=(len(loops), len(twin))))
+    return Holonomy(mesh, loops, csr_matrix((values, (rows, columns)), shape=(len(loops), len(twin))))
 
 
 def edge_means(mesh: TriangleMesh) -> csr_matrix:
-    """Return (e, n) the means of values at the ends of edges, which scaling by them adds to the logs of lengths."""
+    """Return (e, n) the matrix of the means of the two end values of edges: from log scale to log length."""
     count = len(mesh.edges)
     rows = np.repeat(np.arange(count), 2)
     return csr_matrix(
@@ -149,7 +152,7 @@ def edge_means(mesh: TriangleMesh) -> csr_matrix:
 
 
 def curvature_by_log_lengths(mesh: TriangleMesh, lengths: FloatArray) -> csr_matrix:
-    """Return (n, e) the derivative of the angle defects by the logs of edge lengths."""
+    """Return (n, e) the derivative of the angle defects by the logs of edge lengths, at side lengths (m, 3)."""
     corners = np.arange(3 * len(mesh.faces))
     at = csr_matrix(
         (np.full(len(corners), -1.0), (mesh.faces.ravel(), corners)), (len(mesh.vertices), len(corners))
@@ -158,7 +161,10 @@ def curvature_by_log_lengths(mesh: TriangleMesh, lengths: FloatArray) -> csr_mat
 
 
 def _angles_by_log_lengths(mesh: TriangleMesh, lengths: FloatArray) -> csc_matrix:
-    """Return (3m, e) the derivative of corner angles: cot b + cot c by the opposite side, minus a cotangent else."""
+    """Return (3m, e) the derivative of corner angles by the logs of edge lengths.
+
+    It is cot b + cot c for the opposite side, and minus a cotangent for each of the other sides.
+    """
     cots = cotangents(lengths)
     edges = mesh.halfedge_edges.reshape(-1, 3)
     corners = np.arange(3 * len(mesh.faces)).reshape(-1, 3)

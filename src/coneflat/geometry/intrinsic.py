@@ -1,7 +1,7 @@
-"""Triangulations whose edges may be flipped: half-edge arrays instead of faces.
+"""Intrinsic triangulations, whose edges can be flipped: half-edge arrays instead of faces.
 
-After flips two vertices can share several edges, an edge can end where it starts, and a triangle can be glued
-to itself, so a triangle is known by its half-edges and not by its vertices. Slots are numbered as in
+After flips, two vertices can share several edges, an edge can end where it starts, and a triangle can be glued to
+itself. Therefore a triangle is identified by its half-edges and not by its vertices. Half-edges are numbered as in
 `coneflat.mesh.connectivity`: half-edge h = 3 f + i is the side of triangle f opposite corner i.
 """
 
@@ -18,10 +18,11 @@ from ..errors import ArrayShapeError, LengthError, NonFiniteError
 from ..mesh.connectivity import TriangleMesh
 from .triangles import double_areas, slacks
 
-# Relative: by how much the two sides of an edge may differ, and a side be longer than the two others together. Rounding
-# makes less of lengths that were computed from either side, and what is wrong is off by more.
+# Largest relative difference of the two lengths of an edge, and largest relative violation of the triangle inequality.
+# Rounding errors of lengths that are computed twice are smaller, real errors are larger.
 LENGTH_ROUNDING = 1e-9
-# The area of a triangle takes a product of four lengths: beyond this it overflows, below its inverse it underflows.
+# The area of a triangle needs a product of four lengths, which overflows beyond this length and underflows below its
+# inverse.
 MAX_LENGTH = 1e75
 
 
@@ -33,19 +34,19 @@ def check_lengths(
     face_names: IntArray | None = None,
     vertex_names: IntArray | None = None,
 ) -> FloatArray:
-    """Return (m, 3) lengths as numbers, the same bits on both sides of every edge, if they are those of triangles.
+    """Return checked (m, 3) side lengths, with the same bits on both sides of every edge.
 
     Args:
         mesh: the mesh.
         lengths: (m, 3) side lengths, column i opposite corner i.
         flat: accept triangles without area, which `mollify` opens.
-        face_names, vertex_names: (m,), (n,) what the user calls each; None if he has no other numbers.
+        face_names, vertex_names: (m,), (n,) numbers of the input, for messages; None if they are those of the mesh.
 
     Raises:
-        ArrayShapeError: they are not numbers, or not (m, 3), or the mesh is none.
-        NonFiniteError: some are NaN or infinite.
-        LengthError: some are not positive, too large or small for numbers, differ between the sides of an edge, or
-            break the triangle inequality.
+        ArrayShapeError: the lengths are not numbers or not (m, 3), or `mesh` is not a TriangleMesh.
+        NonFiniteError: a length is NaN or infinite.
+        LengthError: a length is not positive, is so large or small that products overflow or underflow, differs
+            between the two sides of an edge, or breaks the triangle inequality.
     """
     if not isinstance(mesh, TriangleMesh):
         raise ArrayShapeError(
@@ -53,7 +54,7 @@ def check_lengths(
         )
     values = as_lengths(lengths, len(mesh.faces))
     with np.errstate(all="ignore"):
-        areas = double_areas(values)  # 0 or not finite where anything is wrong with a triangle
+        areas = double_areas(values)  # 0 or not finite for every invalid triangle
     pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
     one, two = values.ravel()[pairs].T
     if not flat and np.array_equal(one, two) and (areas > 0).all() and np.isfinite(areas).all():
@@ -85,7 +86,7 @@ def check_lengths(
 
 
 def as_lengths(lengths: ArrayLike, count: int) -> FloatArray:
-    """Return (m, 3) an array of numbers for m triangles; raises ArrayShapeError if it is none."""
+    """Return lengths as an (m, 3) float array for m = `count` triangles; raise ArrayShapeError for other arrays."""
     array = as_floats("lengths", lengths)
     if array.shape != (count, 3):
         raise ArrayShapeError(
@@ -103,10 +104,10 @@ def _refuse_numbers(values: FloatArray, faces: IntArray, flat: bool) -> None:
         )
     _refuse_faces(values.min(axis=1) <= 0, "with lengths that are not positive", values, faces)
     least, largest = values.min(), values.max()
-    # What may be flat is solved for later, at a size of its own.
+    # If flat triangles are accepted, lengths are scaled later, so only their ratio matters.
     if least / largest < 1 / MAX_LENGTH or not (flat or 1 / MAX_LENGTH <= least <= largest <= MAX_LENGTH):
         raise LengthError(
-            f"lengths from {least:.3g} to {largest:.3g} are beyond numbers once they are multiplied: scale them"
+            f"lengths from {least:.3g} to {largest:.3g} overflow or underflow when they are multiplied: scale them"
         )
 
 
@@ -122,13 +123,13 @@ def _refuse_faces(is_bad: BoolArray, what: str, values: FloatArray, faces: IntAr
 
 @dataclass(eq=False)
 class IntrinsicTriangulation:
-    """A triangulated surface given by gluings and lengths. Flips change its arrays in place.
+    """A triangulated surface given by the gluing of triangles and edge lengths. Flips change its arrays in place.
 
     Attributes:
         twin: (3m,) the half-edge glued to each half-edge, -1 on the boundary.
-        tail: (3m,) the vertex each half-edge starts from.
+        tail: (3m,) the start vertex of each half-edge.
         length: (3m,) length of each half-edge, model units; the same bits on both sides of an edge.
-        vertex_count: n.
+        vertex_count: number n of vertices.
     """
 
     twin: IntArray
@@ -164,7 +165,7 @@ def halfedge_twins(mesh: TriangleMesh) -> IntArray:
 
 
 def intrinsic_triangulation(mesh: TriangleMesh, lengths: FloatArray) -> IntrinsicTriangulation:
-    """Return the mesh's own triangles as an intrinsic triangulation.
+    """Return the triangles of a mesh as an intrinsic triangulation.
 
     Args:
         mesh: the mesh.
@@ -178,11 +179,14 @@ def intrinsic_triangulation(mesh: TriangleMesh, lengths: FloatArray) -> Intrinsi
 
 
 def double(triangulation: IntrinsicTriangulation) -> tuple[IntrinsicTriangulation, IntArray]:
-    """Return the double of a bounded triangulation, and which vertex each of its vertices is a copy of.
+    """Return a triangulation with boundary glued to its mirror image, and the original of each of its vertices.
 
-    Triangles and vertices keep their numbers; triangle m + f mirrors triangle f, with its sides 1 and 2
-    exchanged; boundary vertices are their own images. Edges of the boundary become inner edges, which can be
-    flipped: no obtuse angle opposite a boundary edge is in the way of a Delaunay triangulation any more.
+    Triangles and vertices keep their numbers. Triangle m + f mirrors triangle f, with its sides 1 and 2 exchanged.
+    Boundary vertices are their own images. Boundary edges become inner edges, which can be flipped, so an obtuse angle
+    opposite a boundary edge no longer prevents a Delaunay triangulation.
+
+    Returns:
+        The double, and (n',) the vertex of the triangulation that each of its vertices is a copy of.
     """
     twin, tail, n = triangulation.twin, triangulation.tail, triangulation.vertex_count
     slots = np.arange(len(twin))

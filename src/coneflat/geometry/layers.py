@@ -1,7 +1,7 @@
-"""Which triangles in the plane may overlap others: those where cells of a grid are covered twice, or by an outline.
+"""A fast test for triangles that may overlap others: they touch grid cells that are covered twice or meet an outline.
 
-How many triangles cover a point is the winding number of their sides about it, and sides that run there and back
-between the same points cancel. In a cell of the grid that none of the others meets it is the same everywhere.
+The number of triangles that cover a point is the winding number of their sides around it. Sides of opposite directions
+between the same points cancel. In a grid cell that none of the remaining sides meets, the number is constant.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ import numpy as np
 from ..base.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..base.compiled import compiled
 
-# Cells along a side of the grid for the root of the number of triangles, and at most.
+# Number of cells along a side of the grid, divided by the square root of the number of triangles, and its maximum.
 CELLS_PER_ROOT, MAX_CELLS = 1.5, 2048
-# Fewer triangles are compared as they are; and so they are where sides cross more rows of cells, in the mean.
+# Number of triangles below which no grid is used, and mean number of rows that a side crosses above which none is used.
 MIN_TRIANGLES, MAX_ROWS_PER_SIDE = 2000, 20
 
 
 def open_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray) -> BoolArray:
-    """Return (3m,) which half-edges have no other that runs back between the very same points of the plane.
+    """Return (3m,) which half-edges are open: their twin does not connect exactly the same points of the plane.
 
     Args:
         edge_halfedges: (e, 2) the half-edges of each edge, see `TriangleMesh`.
-        corners: (m, 3, 2) of the triangles.
-        group: (m,) only sides of the same group, from 0 on, cancel; below, all are open.
+        corners: (m, 3, 2) corners of the triangles in the plane.
+        group: (m,) group of each triangle. Only sides of the same group cancel; all sides of negative groups are open.
     """
     is_open = np.ones(3 * len(corners), dtype=bool)
     close_sides(edge_halfedges, np.ascontiguousarray(corners), group, is_open)
@@ -34,12 +34,12 @@ def open_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray) -
 
 
 def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> IntArray:
-    """Return the triangles with area that may overlap others: all that do are among them.
+    """Return the triangles with area that may overlap others; all that do overlap are among them.
 
     Args:
-        corners: (m, 3, 2) of the triangles.
+        corners: (m, 3, 2) corners of the triangles.
         signs: (m,) 1 counterclockwise, -1 clockwise, 0 without area.
-        is_open: (3m,) half-edges, all but those that cancel in pairs; see `open_sides`.
+        is_open: (3m,) True for half-edges that do not cancel in pairs; see `open_sides`.
     """
     every = np.flatnonzero(signs)
     if len(every) < MIN_TRIANGLES:
@@ -52,7 +52,7 @@ def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> Int
     low, high = find_extent(flat)
     count = min(int(CELLS_PER_ROOT * math.sqrt(len(corners))), MAX_CELLS)
     extent = float((high - low).max())
-    # Half a cell wider than needed, so that the last of the points is in the last cell.
+    # The extent is half a cell less than the grid, so that the points of largest coordinates are in the last cells.
     scale = (count - 0.5) / extent if extent > 0 else 0.0
     if not 0 < scale < np.inf or np.abs(np.diff(ends[..., 1])).sum() * scale > MAX_ROWS_PER_SIDE * len(every):
         return every
@@ -64,7 +64,7 @@ def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> Int
 
 
 class Grid(NamedTuple):
-    """Square cells from a corner on, so many to a unit of length."""
+    """A grid of square cells: its corner (x, y), and the number of cells per unit of length."""
 
     x: float
     y: float
@@ -73,7 +73,7 @@ class Grid(NamedTuple):
 
 @compiled
 def close_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray, is_open: BoolArray) -> None:
-    """Write False for half-edges that run back between the same points as another of their group; see `open_sides`."""
+    """Write False to `is_open` for half-edges that cancel with their twin; see `open_sides`."""
     for e in range(len(edge_halfedges)):
         h, t = edge_halfedges[e]
         if t < 0:
@@ -92,7 +92,7 @@ def close_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray, 
 
 @compiled
 def find_extent(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (2,) the least and the largest coordinates of triangles (m, 6)."""
+    """Return (2,) the smallest and (2,) the largest coordinates of triangles (m, 6)."""
     low, high = corners[0, :2].copy(), corners[0, :2].copy()
     for t in range(len(corners)):
         for i in range(6):
@@ -105,10 +105,11 @@ def find_extent(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
 def trace_sides(
     sides: FloatArray, x: float, y: float, scale: float, marks: Int32Array, steps: Int32Array
 ) -> None:
-    """Mark the cells in the boxes around sides (k, 4), and count where sides cross the middles of rows.
+    """Mark the cells in the bounding boxes of sides (k, 4), and count where sides cross the middle lines of rows.
 
-    marks, steps: (c + 1, c + 1) zeros, by rows; differences from cell to cell on return, see `sum_cells`. The column in
-    which a crossing is may be off by rounding, but then both are among the side's own, which are marked.
+    The column of a crossing may be wrong by rounding; both columns are then in the box of the side, which is marked.
+
+    marks, steps: (c + 1, c + 1) zeros on entry; differences between consecutive cells on return, see `sum_cells`.
     """
     for i in range(len(sides)):
         x0, y0, x1, y1 = sides[i]
@@ -123,15 +124,15 @@ def trace_sides(
             if (y0 <= middle) != (y1 <= middle):
                 crossing = x0 + (middle - y0) / (y1 - y0) * (x1 - x0)
                 column = min(max(int((crossing - x) * scale), left), right)
-                # Right of a side that runs down is what it winds around.
+                # A side that runs downwards adds 1 to the winding number of all points to its right.
                 steps[row, column + 1] += 1 if y1 < y0 else -1
 
 
 @compiled
 def sum_cells(marks: Int32Array, steps: Int32Array) -> None:
-    """Sum the differences; on return `marks` has how many cells left of and below each one are suspected.
+    """Sum the differences; on return, `marks` has the number of suspected cells up to each row and column.
 
-    Those are: a side is in them, or they are covered twice.
+    A cell is suspected if it is in the box of a side or is covered more than once.
     """
     rows, columns = marks.shape
     for row in range(rows):
@@ -145,7 +146,7 @@ def sum_cells(marks: Int32Array, steps: Int32Array) -> None:
         along = 0
         for column in range(columns):
             along += 1 if marks[row, column] > 0 or abs(steps[row, column]) > 1 else 0
-            # From here on the row is summed up; the next one has its own marks yet.
+            # This cell now has a two-dimensional prefix sum; the rows that follow still have their marks.
             marks[row, column] = along + (marks[row - 1, column] if row else 0)
 
 
@@ -153,7 +154,7 @@ def sum_cells(marks: Int32Array, steps: Int32Array) -> None:
 def find_suspected(
     corners: FloatArray, signs: IntArray, x: float, y: float, scale: float, sums: Int32Array
 ) -> BoolArray:
-    """Return (m,) which triangles (m, 6) with area have suspected cells in the boxes around them."""
+    """Return (m,) which triangles (m, 6) with area have suspected cells in their bounding boxes."""
     found = np.zeros(len(corners), np.bool_)
     for t in range(len(corners)):
         c = corners[t]

@@ -1,4 +1,4 @@
-"""Areas at vertices, and the norm that goes with them."""
+"""Vertex areas and the area-weighted norm, angle defects, and the cotangent Laplacian."""
 
 from __future__ import annotations
 
@@ -10,31 +10,49 @@ from ..base.compiled import compiled
 from ..errors import ArrayShapeError, OptionError
 from .triangles import double_areas
 
-# Of the largest: weights below count as this. Without any, the norm would not tell apart what only lies there.
+# Smallest weight, relative to the largest; smaller weights are raised to it. With zero weights, the norm would be
+# degenerate.
 LEAST_WEIGHT = 1e-6
-# Numbers up to this, and down to its inverse, can be multiplied and summed up without a thought.
+# Products and sums of numbers up to this, and down to its inverse, neither overflow nor underflow.
 MAX_SAFE_NUMBER = 1e100
 
 
 def vertex_areas(faces: IntArray, lengths: FloatArray, vertex_count: int) -> FloatArray:
-    """Return (n,) a third of the area of the triangles at each vertex."""
+    """Return (n,) vertex areas: a third of the area of the triangles at each vertex.
+
+    Args:
+        faces: (m, 3) vertex indices.
+        lengths: (m, 3) side lengths, model units.
+        vertex_count: number n of vertices.
+    """
     thirds = np.repeat(double_areas(lengths) / 6, 3)
     return np.bincount(faces.ravel(), weights=thirds, minlength=vertex_count).astype(np.float64)
 
 
 def area_distortion(log_scale: FloatArray, areas: FloatArray) -> float:
-    """Return E, the standard deviation of the log scale by area: 0 for a map that scales all alike."""
+    """Return the area distortion E, the area-weighted standard deviation of the log scale; 0 for uniform scaling.
+
+    log_scale, areas: (n,).
+    """
     share = areas / areas.sum()
     mean = share @ log_scale
     return float(np.sqrt(share @ (log_scale - mean) ** 2))
 
 
 def weighted_areas(areas: FloatArray, weights: FloatArray | None) -> FloatArray:
-    """Return (n,) areas times weights, made to sum to 1."""
+    """Return (n,) areas times weights, normalised to the sum 1.
+
+    Args:
+        areas: (n,) vertex areas.
+        weights: (n,) importance weights, not negative; None for 1.
+
+    Raises:
+        OptionError: a weight is negative or not finite, or all weights are zero.
+    """
     if weights is None:
         return areas / areas.sum()
     if np.shape(weights) != areas.shape or not np.isfinite(weights).all() or (weights < 0).any():
-        raise OptionError(f"importance weights must be {len(areas)} numbers that are finite and not negative")
+        raise OptionError(f"importance weights must be {len(areas)} finite numbers that are not negative")
     if not weights.max() > 0:
         raise OptionError("importance weights are zero everywhere")
     share = areas * np.maximum(at_unit_scale(weights), LEAST_WEIGHT)
@@ -42,12 +60,12 @@ def weighted_areas(areas: FloatArray, weights: FloatArray | None) -> FloatArray:
 
 
 def at_unit_scale(values: FloatArray) -> FloatArray:
-    """Return values of 0 and more, not all 0, times the power of two that brings the largest to between 1/2 and 1."""
+    """Return nonnegative values, not all 0, times the power of two that scales the largest to between 1/2 and 1."""
     return np.ldexp(values, -unit_exponent(values))
 
 
 def at_safe_scale(values: FloatArray) -> FloatArray:
-    """Return values as they are where sums of their products with lengths are finite, else at unit scale."""
+    """Return the values unchanged if sums of their products with lengths are finite, else scaled to unit size."""
     return (
         values if 1 / MAX_SAFE_NUMBER < values.max(initial=1.0) < MAX_SAFE_NUMBER else at_unit_scale(values)
     )
@@ -56,7 +74,12 @@ def at_safe_scale(values: FloatArray) -> FloatArray:
 def angle_defect(faces: IntArray, angles: FloatArray, is_boundary_vertex: BoolArray) -> FloatArray:
     """Return (n,) curvature in radians: 2 pi (inside) or pi (boundary) minus the sum of the angles.
 
-    It sums to 2 pi times the Euler characteristic (Gauss-Bonnet).
+    Its sum is 2 pi times the Euler characteristic (Gauss-Bonnet).
+
+    Args:
+        faces: (m, 3) vertex indices.
+        angles: (m, 3) corner angles, radians.
+        is_boundary_vertex: (n,) mask.
     """
     full = np.where(is_boundary_vertex, np.pi, 2 * np.pi)
     defect: FloatArray = full - np.bincount(
@@ -68,19 +91,19 @@ def angle_defect(faces: IntArray, angles: FloatArray, is_boundary_vertex: BoolAr
 def cotangent_laplacian(faces: IntArray, cots: FloatArray, vertex_count: int) -> csc_matrix:
     """Return the (n, n) positive semidefinite Laplacian, w_ij = (cot a + cot b) / 2.
 
-    (L x)_i = sum_j w_ij (x_i - x_j); its kernel are the constants on each component.
+    (L x)_i = sum_j w_ij (x_i - x_j). Its kernel consists of the functions that are constant on each component.
 
     Args:
         faces: (m, 3) vertex indices.
         cots: (m, 3) cotangents of the corner angles.
-        vertex_count: n.
+        vertex_count: number n of vertices.
 
     Raises:
         ArrayShapeError, EmptyMeshError, FaceIndexError: the arrays do not fit each other.
     """
     triangles, given = as_faces(faces, vertex_count), as_floats("cots", cots)
     if given.shape != triangles.shape:
-        raise ArrayShapeError(f"cots must have the shape {triangles.shape}, as the faces, not {given.shape}")
+        raise ArrayShapeError(f"cots must have the shape {triangles.shape} of the faces, not {given.shape}")
     starts = np.zeros(vertex_count + 1, dtype=np.int32)
     rows = np.empty(6 * len(triangles) + vertex_count, dtype=np.int32)
     values = np.empty(len(rows))
@@ -93,9 +116,9 @@ def cotangent_laplacian(faces: IntArray, cots: FloatArray, vertex_count: int) ->
 def fill_laplacian(
     faces: IntArray, cots: FloatArray, starts: Int32Array, rows: Int32Array, values: FloatArray
 ) -> int:
-    """Write the Laplacian by columns of sorted rows, without entries that are zero; return how many are left.
+    """Write the Laplacian in CSC form with sorted rows and without zero entries; return the number of entries.
 
-    starts: (n + 1,) zeros on entry. rows, values: room for n + 6m entries.
+    starts: (n + 1,) zeros on entry. rows, values: buffers for n + 6m entries.
     """
     n = len(starts) - 1
     leaving, entering = np.zeros(n), np.zeros(n)
@@ -108,7 +131,7 @@ def fill_laplacian(
             entering[j] += w
     for v in range(n):
         starts[v + 1] += starts[v] + 1
-    # Behind the start of each column first the diagonal, then two entries for each side there.
+    # Each column has its diagonal entry first, then two entries for each side at its vertex.
     place = starts[:-1].copy()
     for v in range(n):
         rows[place[v]], values[place[v]] = v, leaving[v] + entering[v]
@@ -117,11 +140,11 @@ def fill_laplacian(
         for c in range(3):
             i, j, w = faces[f, (c + 1) % 3], faces[f, (c + 2) % 3], cots[f, c] / 2
             rows[place[i]], values[place[i]] = j, -w
-            # Before the next entry: an edge of an intrinsic triangulation may lead back to its vertex.
+            # Advanced before the next entry, since an edge of an intrinsic triangulation may be a loop (i == j).
             place[i] += 1
             rows[place[j]], values[place[j]] = i, -w
             place[j] += 1
-    # Its own transpose, made column after column, has sorted rows.
+    # The matrix is symmetric; its transpose, computed column by column, has sorted rows.
     of_column, of_value = rows.copy(), values.copy()
     place[:] = starts[:-1]
     for v in range(n):
@@ -134,7 +157,7 @@ def fill_laplacian(
 
 @compiled
 def sum_repeated(starts: Int32Array, rows: Int32Array, values: FloatArray) -> int:
-    """Sum up entries of equal row, which follow one another, in place, leave out zeros; return how many are left."""
+    """Sum consecutive entries of the same row and remove zeros, in place; return the number of entries left."""
     kept, begin = 0, 0
     for v in range(len(starts) - 1):
         at, end = begin, starts[v + 1]

@@ -1,8 +1,8 @@
-"""On which side of a line a point lies, without rounding.
+"""The exact orientation predicate: on which side of a line a point lies.
 
-A filter decides in nearly all cases; the others are summed exactly (J. R. Shewchuk, "Adaptive precision floating-point
-arithmetic and fast robust geometric predicates", 1997). Coordinates must be 0 or have magnitudes from 2^-420 to 2^420
-for this, so that nothing over- or underflows.
+A floating-point filter decides nearly all cases; the others are evaluated exactly (J. R. Shewchuk, "Adaptive precision
+floating-point arithmetic and fast robust geometric predicates", 1997). Coordinates must be 0 or have magnitudes from
+2^-420 to 2^420, so that nothing overflows or underflows.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from ..base.compiled import compiled
 
 # Rounding of the determinant, relative to the sum of the magnitudes of its two products (Shewchuk, Section 4.3).
 FILTER = (3 + 16 * 2.0**-53) * 2.0**-53
-# Multiplied by this, a number splits into two halves of 26 bits.
+# Factor that splits a number into two halves of 26 bits (Dekker 1971).
 SPLITTER = 2.0**27 + 1
 
 
 @compiled
 def orientation(px: float, py: float, qx: float, qy: float, rx: float, ry: float, parts: FloatArray) -> float:
-    """Return a number that is positive if r lies left of the line from p to q, negative right of it, 0 on it.
+    """Return a number that is positive if r is left of the line from p to q, negative if it is right, 0 if on it.
 
-    parts: (12,) room for exact sums.
+    parts: (12,) buffer for exact sums.
     """
     left = (px - rx) * (qy - ry)
     right = (py - ry) * (qx - rx)
@@ -40,10 +40,10 @@ def orientation(px: float, py: float, qx: float, qy: float, rx: float, ry: float
 
 @compiled
 def _add_product(parts: FloatArray, count: int, x: float, y: float) -> None:
-    """Add x y to a sum, without rounding (Dekker 1971).
+    """Add the product x y to a sum, exactly (Dekker 1971).
 
-    parts: of the sum, the first `count` in use; they do not overlap and grow, so the last that is not 0 has the
-    sign of the sum.
+    parts: the components of the sum, of which the first `count` are used. They do not overlap and have ascending
+    magnitudes, so the last one that is not 0 has the sign of the sum.
     """
     scaled = SPLITTER * x
     x_high = scaled - (scaled - x)
@@ -65,7 +65,7 @@ def _add_product(parts: FloatArray, count: int, x: float, y: float) -> None:
 
 @compiled
 def fill_orientations(corners: FloatArray, parts: FloatArray, signs: IntArray) -> None:
-    """Fill the orientations (m,) of triangles (m, 6): 1 counterclockwise, -1 clockwise, 0 without area."""
+    """Write the orientations (m,) of triangles (m, 6): 1 counterclockwise, -1 clockwise, 0 without area."""
     for t in range(len(corners)):
         c = corners[t]
         turn = orientation(c[0], c[1], c[2], c[3], c[4], c[5], parts)
@@ -73,7 +73,7 @@ def fill_orientations(corners: FloatArray, parts: FloatArray, signs: IntArray) -
 
 
 def counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return triangles (m, 3, 2), flipped where they are clockwise, and their orientations 1, -1 and 0."""
+    """Return (m, 3, 2) the triangles, with clockwise ones reversed, and (m,) their orientations 1, -1 or 0."""
     signs = np.empty(len(corners), dtype=np.int64)
     fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
     return np.where((signs < 0)[:, None, None], corners[:, ::-1], corners), signs

@@ -1,4 +1,4 @@
-"""Where a layout covers the plane more than once, without rounding."""
+"""Overlaps of the triangles of a layout, found with exact predicates."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.arrays import FloatArray, IntArray, as_faces, as_floats, require_finite, rows_of, unit_exponent
 from ..base.compiled import compiled
 from ..errors import ArrayShapeError, OptionError
-from .coverage import covered_twice
-from .fans import find_fans, lie_apart
+from .coverage import overlap_areas
+from .fans import are_disjoint, find_fans
 from .layers import may_overlap, open_sides
 from .orientation import fill_orientations, orientation
 
-# Of the largest coordinate: what is smaller counts as 0, lest products underflow.
+# Relative to the largest coordinate: smaller coordinates count as 0, so that products do not underflow.
 MIN_COORDINATE = 2.0**-420
 
 
@@ -27,10 +27,10 @@ class Overlaps:
     Attributes:
         pairs: (k, 2) all pairs of triangles whose interiors have a point in common, each with the smaller index
             first, in lexicographic order.
-        area: of the points of the plane inside at least two triangles, in squared units of the layout.
-        fraction: the same over the area of the points inside at least one. Both are NaN where they would take too
-            long, as of thousands of long triangles in all directions.
-        complete: False if there are more pairs than asked for; then `area` and `fraction` are NaN.
+        area: area of the points of the plane inside at least two triangles, in squared units of the layout.
+        fraction: this area divided by the area of the points inside at least one triangle. Both are NaN if they would
+            take too long, as with thousands of long triangles in all directions.
+        complete: False if there are more pairs than the limit; then `area` and `fraction` are NaN.
     """
 
     pairs: IntArray
@@ -39,72 +39,76 @@ class Overlaps:
     complete: bool = True
 
 
-#: Of a layout of which nobody asks: they may be many, and take long to be found.
+#: Value for a layout whose overlaps were not searched for, as there may be many, which take long to find.
 NOT_LOOKED_FOR = Overlaps(np.empty((0, 2), dtype=np.int64), float("nan"), float("nan"), complete=False)
 
 
 def find_overlaps(
     points: ArrayLike, triangles: ArrayLike | None = None, *, limit: int | None = None
 ) -> Overlaps:
-    """Return all pairs of triangles in the plane that overlap, without rounding.
+    """Return all pairs of triangles in the plane that overlap, found with exact predicates.
 
     Args:
-        points: (n, 2); or, without `triangles`, (m, 3, 2) the corners of each triangle.
-        triangles: (m, 3) indices of points. Clockwise triangles cover the plane like others; those whose
-            corners are on a line cover nothing.
-        limit: end with so many pairs, any of them; 1 asks only whether there is one.
+        points: (n, 2) points; or, without `triangles`, (m, 3, 2) the corners of each triangle.
+        triangles: (m, 3) indices of points. Clockwise triangles cover the plane like others. Triangles with collinear
+            corners cover nothing.
+        limit: stop at this number of pairs, which may be any of them; 1 tests whether there is a pair.
+
+    Returns:
+        The pairs, and the area of the overlaps.
 
     Raises:
-        MeshError: an array has the wrong shape, an index no point, a point no finite place.
+        MeshError: an array has the wrong shape, an index is out of range, or a coordinate is not finite.
         OptionError: the limit is below 1.
 
     Notes:
-        Interiors are open: triangles that touch in points or along sides, in whole or in part, do not overlap,
-        and whatever has inner points in common does, however thin. No tolerance is involved, and all signs are
-        exact for the coordinates as they are given (J. R. Shewchuk, "Adaptive precision floating-point arithmetic and
-        fast robust geometric predicates", 1997; those below 2^-420 of the largest count as 0). So two sides
-        of a seam that should coincide, but are an ulp apart the wrong way, do overlap; `area` then is what
-        rounding makes of it, about 1e-16 of the layout's extent times the length of the seam.
+        Triangles overlap if their open interiors have a common point, however thin the intersection is. Triangles
+        that touch in points or along sides, or along parts of sides, do not overlap. There is no tolerance, and all
+        signs are exact for the given coordinates (J. R. Shewchuk, "Adaptive precision floating-point arithmetic and
+        fast robust geometric predicates", 1997; coordinates below 2^-420 of the largest count as 0). Therefore the
+        two sides of a seam overlap if they should coincide, but differ by an ulp in the wrong direction. `area` then
+        has the size of rounding errors, about 1e-16 of the extent of the layout times the length of the seam.
 
-        Candidates come from a binary tree of boxes, which takes n log n; so do those around one point, by their
-        angles. Large numbers of other long triangles in many directions, whose boxes all overlap, take more.
+        Candidates come from a binary tree of bounding boxes, in n log n time, and around a common point from the
+        angles there, in the same time. Large numbers of other long triangles in many directions, whose boxes all
+        overlap, take longer.
     """
     if limit is not None and limit < 1:
         raise OptionError(f"the limit must be 1 or more, not {limit}")
     corners, exponent = _at_unit_size(_corners(points, triangles))
-    turned, signs = _counterclockwise(corners)
-    return _overlaps(turned, exponent, np.flatnonzero(signs), limit)
+    oriented, signs = _counterclockwise(corners)
+    return _overlaps(oriented, exponent, np.flatnonzero(signs), limit)
 
 
 def overlaps_of_mesh(edge_halfedges: IntArray, corners: FloatArray) -> Overlaps:
-    """Return what `find_overlaps` does of triangles that are known to hang together, in a fraction of the time.
+    """Return the same as `find_overlaps` for triangles of a mesh with known edges, in a fraction of the time.
 
-    Only what lies near the outline, or is covered twice by the winding number of this, is compared.
+    Only triangles near the outline, or where the winding number of the outline is above 1, are compared.
 
     Args:
         edge_halfedges: (e, 2) the half-edges of each edge, see `TriangleMesh`.
-        corners: (m, 3, 2) of the triangles in the plane.
+        corners: (m, 3, 2) corners of the triangles in the plane.
     """
     corners, exponent = _at_unit_size(_corners(corners, None))
-    turned, signs = _counterclockwise(corners)
-    # What is not counterclockwise has sides that add up with those beside them, or none that count.
+    oriented, signs = _counterclockwise(corners)
+    # The sides of triangles that are not counterclockwise do not cancel with those of their neighbours.
     is_open = open_sides(edge_halfedges, corners, signs - 1)
-    return _overlaps(turned, exponent, may_overlap(corners, signs, is_open), None)
+    return _overlaps(oriented, exponent, may_overlap(corners, signs, is_open), None)
 
 
-def _overlaps(turned: FloatArray, exponent: int, chosen: IntArray, limit: int | None) -> Overlaps:
-    """Return the overlaps of chosen triangles, of those of all which may overlap; see `_find_pairs`."""
-    pairs, complete = _find_pairs(turned, chosen, limit)
+def _overlaps(oriented: FloatArray, exponent: int, chosen: IntArray, limit: int | None) -> Overlaps:
+    """Return the overlaps of counterclockwise triangles, given those that may overlap; see `_find_pairs`."""
+    pairs, complete = _find_pairs(oriented, chosen, limit)
     if not complete:
         return Overlaps(pairs, float("nan"), float("nan"), False)
     if not len(pairs):
         return Overlaps(pairs, 0.0, 0.0)
-    twice, once = covered_twice(turned, pairs)
+    twice, once = overlap_areas(oriented, pairs)
     return Overlaps(pairs, float(np.ldexp(twice, 2 * exponent)), 0.0 if once <= 0 else twice / once)
 
 
 def _corners(points: ArrayLike, triangles: ArrayLike | None) -> FloatArray:
-    """Return (m, 3, 2) the corners, if all is as it should be."""
+    """Return (m, 3, 2) the corners of the triangles after a check of the arrays."""
     places = as_floats("points", points)
     shape = "(n, 2)" if triangles is not None else "(m, 3, 2)"
     if places.shape[1:] != ((2,) if triangles is not None else (3, 2)):
@@ -120,7 +124,7 @@ def _corners(points: ArrayLike, triangles: ArrayLike | None) -> FloatArray:
 
 
 def _at_unit_size(corners: FloatArray) -> tuple[FloatArray, int]:
-    """Return the corners divided by a power of two, which rounds nothing, and its exponent."""
+    """Return the corners divided by a power of two, which is exact, and the exponent of the power."""
     exponent = unit_exponent(corners)
     if exponent <= -1000:  # the factor would not be finite
         corners, factor = np.ldexp(corners, -exponent), 1.0
@@ -132,26 +136,26 @@ def _at_unit_size(corners: FloatArray) -> tuple[FloatArray, int]:
 
 
 def _counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return the triangles, flipped where they are clockwise, and their orientations 1, -1 and 0."""
+    """Return (m, 3, 2) the triangles, with clockwise ones reversed, and (m,) their orientations 1, -1 or 0."""
     signs = np.empty(len(corners), dtype=np.int64)
     fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
     clockwise = np.flatnonzero(signs < 0)
     if not len(clockwise):
         return corners, signs
-    turned = corners.copy()
-    turned[clockwise] = corners[clockwise][:, ::-1]
-    return turned, signs
+    oriented = corners.copy()
+    oriented[clockwise] = corners[clockwise][:, ::-1]
+    return oriented, signs
 
 
 def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tuple[IntArray, bool]:
-    """Return the pairs of the chosen triangles that overlap, and whether these are all.
+    """Return the pairs of chosen triangles that overlap, and whether all pairs were found.
 
-    corners: (m, 3, 2), those chosen counterclockwise.
+    corners: (m, 3, 2) corners of the triangles; the chosen ones must be counterclockwise.
     """
     if len(chosen) < 2:
         return np.empty((0, 2), dtype=np.int64), True
     places = rows_of(corners.reshape(-1, 6), chosen)
-    boxes = snug_boxes(places.reshape(-1, 3, 2))
+    boxes = bounding_boxes(places.reshape(-1, 3, 2))
     order = z_order(boxes)
     fans = find_fans(places.reshape(-1, 3, 2))
     if fans is not None:
@@ -163,45 +167,49 @@ def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tup
     chosen = chosen[order]
     arrays = tree, *around, rows_of(places, order), np.empty(12)
     stack, top = np.zeros((4 * len(tree).bit_length(), 2), dtype=np.int64), 1
-    keys, room, left = [], len(chosen), np.inf if limit is None else limit + 1
+    keys, capacity, left = [], len(chosen), np.inf if limit is None else limit + 1
     while top > 0 and left > 0:
-        found = np.empty((int(min(left, room)), 2), dtype=np.int64)
+        found = np.empty((int(min(left, capacity)), 2), dtype=np.int64)
         top, count = join(*arrays, stack, top, found)
         pairs = chosen[found[:count]]
         keys.append(pairs.min(axis=1) * len(corners) + pairs.max(axis=1))
         left -= count
-        room *= 2
+        capacity *= 2
     key = np.sort(np.concatenate(keys)[:limit])
     return np.stack(np.divmod(key, len(corners)), axis=1), left > 0
 
 
-# By how much coordinates of up to 1 may be off once they are turned.
+# Largest rounding error of coordinates of up to 1 after a rotation.
 COORDINATE_ROUNDING = 2.0**-48
-# Boxes are turned if that leaves less than this part of their areas.
+# Boxes are rotated if that reduces their total area to less than this fraction.
 MAX_BOX_SHARE = 0.5
 
 
-def snug_boxes(corners: FloatArray) -> FloatArray:
-    """Return (m, 4) x0, y0, -x1, -y1 of triangles (m, 3, 2), none above 1: the box around several is their minimum.
+def bounding_boxes(corners: FloatArray) -> FloatArray:
+    """Return (m, 4) bounding boxes x0, y0, -x1, -y1 of triangles (m, 3, 2) with coordinates of up to 1.
 
-    They are along the axes, or along the sides of long triangles askew to them; these are larger by what rounding may
-    have taken.
+    With these signs, the box around several boxes is their minimum. The boxes are aligned with the axes, or, if they
+    are then much smaller, with the main direction of the triangles; rotated boxes include a margin for rounding.
     """
     straight, askew = np.empty((2, len(corners), 4))
     flat = np.ascontiguousarray(corners).reshape(-1, 6)
     area, x, y = fill_boxes(flat, 1.0, 0.0, 0.0, straight)
     turn = -math.atan2(y, x) / 2
-    turned_area, _, _ = fill_boxes(flat, math.cos(turn), math.sin(turn), COORDINATE_ROUNDING, askew)
-    return askew if turned_area < MAX_BOX_SHARE * area else straight
+    rotated_area, _, _ = fill_boxes(flat, math.cos(turn), math.sin(turn), COORDINATE_ROUNDING, askew)
+    return askew if rotated_area < MAX_BOX_SHARE * area else straight
 
 
 @compiled
 def fill_boxes(
     corners: FloatArray, cos: float, sin: float, margin: float, boxes: FloatArray
 ) -> tuple[float, float, float]:
-    """Fill the boxes of triangles (m, 6), turned; return their area, and the sum of the squares of sides as complex.
+    """Write the boxes of rotated triangles (m, 6); return their total area, and the sum of squared complex sides.
 
-    margin: by which boxes are larger on every side.
+    Args:
+        corners: (m, 6) x and y of the corners of each triangle.
+        cos, sin: of the angle of rotation.
+        margin: distance by which boxes are enlarged on every side.
+        boxes: (m, 4) the boxes on return.
     """
     area, real, imaginary = 0.0, 0.0, 0.0
     for t in range(len(corners)):
@@ -224,7 +232,7 @@ def fill_boxes(
 
 
 def z_order(boxes: FloatArray) -> IntArray:
-    """Return the order of boxes along a Z-shaped curve through their centres (Morton 1966), so near ones are close.
+    """Return the order of boxes (m, 4) along a Z-order curve through their centres (Morton 1966).
 
     The cells of the curve are 2^-32 of the extent wide, so charts whose scale varies by e^8 and more are resolved.
     """
@@ -237,7 +245,7 @@ def z_order(boxes: FloatArray) -> IntArray:
 
 
 def _spread(cells: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Put a zero bit before each of 32 bits."""
+    """Return numbers with a zero bit inserted before each of their 32 bits."""
     for shift in (16, 8, 4, 2, 1):
         kept = np.uint64((2**64 - 1) // (2**shift + 1))  # runs of `shift` ones and as many zeros
         cells = (cells | cells << np.uint64(shift)) & kept
@@ -245,9 +253,9 @@ def _spread(cells: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def box_tree(boxes: FloatArray) -> FloatArray:
-    """Return (2 k - 1, 4) the boxes, last, and those around them: node i has 2 i + 1 and 2 i + 2 below it.
+    """Return (2 k - 1, 4) the nodes of a binary tree of boxes: node i has the children 2 i + 1 and 2 i + 2.
 
-    k is a power of two, and at least 2; the boxes that are missing are empty.
+    The last k nodes are the given boxes (m, 4). k is a power of two, at least 2; the remaining leaves are empty.
     """
     leaves = 2 ** max(1, (len(boxes) - 1).bit_length())
     tree = np.full((2 * leaves - 1, 4), np.inf)
@@ -261,7 +269,7 @@ def box_tree(boxes: FloatArray) -> FloatArray:
 
 @compiled
 def scale_numbers(numbers: FloatArray, factor: float, tiny: float, scaled: FloatArray) -> None:
-    """Fill in numbers times a factor, 0 where that is less than tiny."""
+    """Write numbers times a factor to `scaled`; magnitudes below `tiny` become 0."""
     for i in range(len(numbers)):
         number = numbers[i] * factor
         scaled[i] = number if abs(number) >= tiny else 0.0
@@ -269,7 +277,7 @@ def scale_numbers(numbers: FloatArray, factor: float, tiny: float, scaled: Float
 
 @compiled
 def _boxes_meet(tree: FloatArray, i: int, j: int) -> bool:
-    """Return whether two boxes (x0, y0, -x1, -y1) have inner points in common."""
+    """Return whether the interiors of the boxes (x0, y0, -x1, -y1) of two nodes have a common point."""
     return (
         tree[i, 0] < -tree[j, 2]
         and tree[j, 0] < -tree[i, 2]
@@ -280,7 +288,7 @@ def _boxes_meet(tree: FloatArray, i: int, j: int) -> bool:
 
 @compiled
 def _lies_outside(corners: FloatArray, one: int, two: int, parts: FloatArray) -> bool:
-    """Return whether some side of triangle `one` has no corner of `two` to its left."""
+    """Return whether the line along a side of triangle `one` has no corner of triangle `two` on its left."""
     for i in range(0, 6, 2):
         px, py = corners[one, i], corners[one, i + 1]
         qx, qy = corners[one, (i + 2) % 6], corners[one, (i + 3) % 6]
@@ -303,21 +311,22 @@ def join(
     top: int,
     found: IntArray,
 ) -> tuple[int, int]:
-    """Fill in the pairs of triangles whose interiors meet, until there is no room left.
+    """Write the pairs of triangles whose interiors intersect, until the buffer is full.
 
-    Convex polygons have no inner point in common if and only if the line along a side of one of them has one on
-    either side of it.
+    The interiors of two convex polygons are disjoint if and only if the line along a side of one of them separates
+    them.
 
     Args:
-        tree: (2 k - 1, 4) boxes: node i is above 2 i + 1 and 2 i + 2, the last k are the triangles' own.
+        tree: (2 k - 1, 4) boxes: node i has the children 2 i + 1 and 2 i + 2, the last k are those of the triangles.
         fans, angles: (2 k - 1,) the fan of each node and (2 k - 1, 2) its angles, see `Fans`; empty if there is none.
-        corners: (m, 6) of the triangles, counterclockwise.
-        parts: (12,) room for exact sums.
-        stack: (s, 2) pairs of nodes of one level, the lower first, to be searched yet: the first `top`.
-        found: (p, 2) filled.
+        corners: (m, 6) corners of the triangles, counterclockwise.
+        parts: (12,) buffer for exact sums.
+        stack: (s, 2) pairs of nodes of the same level, the smaller first, that are still to be searched.
+        top: number of pairs on the stack.
+        found: (p, 2) buffer for the pairs.
 
     Returns:
-        The height of the stack, 0 at the end, and the number of pairs filled in.
+        The height of the stack, 0 if the search is complete, and the number of pairs written.
     """
     first_leaf = len(tree) // 2
     count = 0
@@ -334,7 +343,7 @@ def join(
         for a in range(2 * i + 1, 2 * i + 3):
             for b in range(2 * j + 1, 2 * j + 3):
                 if (a == b and a < first_leaf) or (
-                    a < b and _boxes_meet(tree, a, b) and not (len(fans) and lie_apart(fans, angles, a, b))
+                    a < b and _boxes_meet(tree, a, b) and not (len(fans) and are_disjoint(fans, angles, a, b))
                 ):
                     stack[top, 0] = a
                     stack[top, 1] = b

@@ -1,4 +1,4 @@
-"""Points and triangles of the plane, which may be flipped: column i of sides is the side opposite corner i."""
+"""Points and triangles in the plane; triangles may be flipped. Column i of sides is the side opposite corner i."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ..base.compiled import compiled
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
 
-# Height over longest side below which a triangle counts as flat, neither positively oriented nor flipped:
-# coordinates are good to about 1e-12 of an edge.
+# Height divided by longest side below which a triangle counts as degenerate, neither positively oriented nor flipped:
+# coordinates are accurate to about 1e-12 of an edge.
 FLAT_HEIGHT = 1e-10
-# Areas below so much of the mean are taken as so much, where a logarithm is wanted.
-LEAST_AREA = 1e-12
+# Smallest area, relative to the mean, of which a logarithm is taken; smaller areas are replaced by it.
+MIN_AREA = 1e-12
 
 
 def as_complex(places: FloatArray) -> ComplexArray:
-    """Return (k,) points x + i y, given as (k, 2)."""
+    """Return (k,) complex points x + i y from (k, 2) coordinates."""
     points: ComplexArray = places[:, 0] + 1j * places[:, 1]
     return points
 
 
 def as_pairs(points: ComplexArray) -> FloatArray:
-    """Return (k, 2) points, given as (k,) x + i y."""
+    """Return (k, 2) coordinates of (k,) complex points x + i y."""
     return np.stack([points.real, points.imag], axis=1)
 
 
 def signed_double_areas(corners: FloatArray) -> FloatArray:
-    """Return (m,) twice the area of triangles with corners (m, 3, 2), negative where these run clockwise."""
+    """Return (m,) twice the area of triangles with corners (m, 3, 2), negative for clockwise ones."""
     with np.errstate(over="ignore", invalid="ignore"):
         one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         areas: FloatArray = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
@@ -35,7 +35,7 @@ def signed_double_areas(corners: FloatArray) -> FloatArray:
 
 
 def bounds(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (m, 2) the least and the largest coordinates of triangles with corners (m, 3, 2)."""
+    """Return (m, 2) the smallest and (m, 2) the largest coordinates of triangles with corners (m, 3, 2)."""
     low, high = np.empty((2, len(corners), 2))
     points = np.ascontiguousarray(corners, dtype=np.float64).reshape(-1, 2)
     every = np.arange(len(corners))
@@ -44,15 +44,15 @@ def bounds(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def signed_angles(sides: ComplexArray) -> FloatArray:
-    """Return (m, 3) the corner angles, radians, of triangles with sides (m, 3); negative where they are flipped."""
+    """Return (m, 3) the corner angles, radians, of triangles with sides (m, 3); negative for flipped triangles."""
     angles = np.empty(sides.shape)
-    for i in range(3):  # column by column: NumPy is slow at picking columns
+    for i in range(3):  # column by column, as NumPy is slow at indexing columns
         angles[:, i] = np.angle(-sides[:, NEXT[i]] * np.conj(sides[:, PREVIOUS[i]]))
     return angles
 
 
 def heights(sides: ComplexArray) -> FloatArray:
-    """Return (m,) height over longest side of triangles with sides (m, 3); negative for flipped ones."""
+    """Return (m,) the height divided by the longest side of triangles with sides (m, 3); negative for flipped ones."""
     doubled = (np.conj(sides[:, 0]) * sides[:, 1]).imag
     squares = sides.real**2 + sides.imag**2
     longest = np.maximum(np.maximum(squares[:, 0], squares[:, 1]), squares[:, 2])
@@ -61,7 +61,7 @@ def heights(sides: ComplexArray) -> FloatArray:
 
 
 def sides_between(corners: FloatArray) -> ComplexArray:
-    """Return (m, 3) the sides of triangles with corners (m, 3, 2)."""
+    """Return (m, 3) the sides, as complex numbers, of triangles with corners (m, 3, 2)."""
     sides = np.empty(corners.shape)
     for i in range(3):
         np.subtract(corners[:, PREVIOUS[i]], corners[:, NEXT[i]], out=sides[:, i])
@@ -69,10 +69,10 @@ def sides_between(corners: FloatArray) -> ComplexArray:
 
 
 def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    """Return (m, 3) the derivatives, by the places of the corners, of a and b in the map z -> a z + b conj(z).
+    """Return (m, 3) and (m, 3) the derivatives of a and b in the map z -> a z + b conj(z) by the corner positions.
 
-    The map takes triangles from the shapes that they should have, of which `rest` (m, 3) has the sides, to the plane.
-    Its singular values are |a| + |b| and |a| - |b|. Of triangles without area there is none: not numbers.
+    The map takes each triangle from its rest shape, with the sides `rest` (m, 3), to the plane. Its singular values
+    are |a| + |b| and |a| - |b|. For triangles without area the result is NaN or infinite.
     """
     r0, r1 = rest[:, 0], rest[:, 1]
     area = r0 * np.conj(r1) - np.conj(r0) * r1
@@ -85,12 +85,16 @@ def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
 
 
 def laid_out_curvature(mesh: TriangleMesh, corners: FloatArray, at: BoolArray | None = None) -> FloatArray:
-    """Return (n,) the curvature of triangles with given corners (m, 3, 2): a full or half turn less their angles.
+    """Return (n,) the curvature of a layout with corners (m, 3, 2): 2 pi, or pi on the boundary, minus the angles.
 
-    Those of triangles that are flipped count as negative. Where triangles wind around a vertex twice, the
-    curvature is a full turn less than it seems.
+    The angles of flipped triangles are negative. If the triangles around a vertex wind around it twice, the curvature
+    includes this: it is 2 pi less than with one turn.
 
-    at: (n,) the vertices of interest, as it takes less time at few; None for all. Elsewhere it is undefined.
+    Args:
+        mesh: the mesh.
+        corners: (m, 3, 2) corners of the triangles in the plane.
+        at: (n,) True at the vertices where the curvature is needed, which saves time; None: all. It is undefined at the
+            others.
     """
     chosen = np.arange(len(mesh.faces)) if at is None else np.flatnonzero(has_any(at, mesh.faces))
     sides = sides_between(corners[chosen])
@@ -102,11 +106,14 @@ def laid_out_curvature(mesh: TriangleMesh, corners: FloatArray, at: BoolArray | 
 
 
 def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return (n,) half the log of the ratio of areas around each vertex, after to before, (m,) each."""
+    """Return (n,) half the log of the ratio of the areas around each vertex, from triangle areas `before` and `after`.
+
+    before, after: (m,) areas of the triangles.
+    """
     ratio = []
     for areas in (before, after):
         around = np.bincount(mesh.faces.ravel(), np.repeat(areas, 3), minlength=len(mesh.vertices))
-        ratio.append(np.maximum(around, LEAST_AREA * around.mean()))
+        ratio.append(np.maximum(around, MIN_AREA * around.mean()))
     log_scale: FloatArray = np.log(ratio[1] / ratio[0]) / 2
     return log_scale
 
@@ -115,9 +122,9 @@ def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) 
 def fill_bounds(
     points: FloatArray, corners: IntArray, chosen: IntArray, low: FloatArray, high: FloatArray
 ) -> None:
-    """Write the least and the largest coordinates of chosen triangles to (m, 2), at their own places there.
+    """Write the smallest and the largest coordinates of chosen triangles to their rows of `low` and `high` (m, 2).
 
-    points: (u, 2). corners: (m, 3) indices of points.
+    points: (u, 2) positions. corners: (m, 3) indices of points.
     """
     for f in chosen:
         for x in range(2):

@@ -1,4 +1,4 @@
-"""The shapes of the input's own triangles in a flat metric that lives on flipped edges."""
+"""The shapes of the triangles of the input in a flat metric that is given on a flipped triangulation."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .intrinsic import IntrinsicTriangulation, check_lengths, intrinsic_triangul
 
 @dataclass(frozen=True, eq=False)
 class FlatTriangles:
-    """Triangles in the plane, each in a frame of its own.
+    """Triangles in the plane, each in its own frame.
 
     Attributes:
         sides: (3m,) each half-edge as a vector in the frame of its triangle, a complex number.
-        turns: (3m,) unit numbers: a vector in the frame of a half-edge's twin, times this, is the vector in
-            the frame of its own triangle. 1 on the boundary.
+        turns: (3m,) complex numbers of modulus 1. A vector in the frame of the twin of a half-edge, multiplied by
+            this number, is the vector in the frame of the triangle of the half-edge. 1 on the boundary.
         twin: (3m,) the half-edge on the other side, -1 on the boundary.
     """
 
@@ -39,7 +39,7 @@ class FlatTriangles:
 
 
 def flat_triangles(mesh: TriangleMesh, lengths: ArrayLike) -> FlatTriangles:
-    """Return a mesh's own triangles in the plane, each with given side lengths: a flat metric on the mesh as it is.
+    """Return the triangles of a mesh in the plane, with given side lengths: a flat metric on the mesh itself.
 
     Args:
         mesh: the mesh, such as `check_mesh(vertices, faces).mesh`.
@@ -47,7 +47,7 @@ def flat_triangles(mesh: TriangleMesh, lengths: ArrayLike) -> FlatTriangles:
 
     Raises:
         ArrayShapeError, NonFiniteError: the lengths do not fit the mesh, or are not finite.
-        LengthError: they make no triangles with area, or differ between the two sides of an edge.
+        LengthError: a triangle has no area, or the two sides of an edge have different lengths.
     """
     triangulation = intrinsic_triangulation(mesh, check_lengths(mesh, lengths))
     return straight_triangles(triangulation, np.empty(0, dtype=np.int64))
@@ -56,17 +56,17 @@ def flat_triangles(mesh: TriangleMesh, lengths: ArrayLike) -> FlatTriangles:
 def straight_triangles(
     triangulation: IntrinsicTriangulation, flips: IntArray, face_count: int | None = None
 ) -> FlatTriangles:
-    """Return the input's triangles with straight sides in a flat metric.
+    """Return the triangles of the input with straight sides in a flat metric.
 
-    An edge of the input is a geodesic of the input's metric; in the flat metric the straight segment in its
-    place is found by undoing the flips, the last one first, each by unfolding two triangles into the plane.
-    Where a quad is not convex this turns a triangle over: the signs of the areas tell.
+    An edge of the input is a geodesic of the metric of the input. The straight segment that replaces it in the flat
+    metric is found by undoing the flips in reverse order, each by unfolding two triangles into the plane. If their
+    quad is not convex, a triangle is flipped, which the sign of its area shows.
 
     Args:
-        triangulation: flat triangles with their lengths; left as it is.
-        flips: half-edges flipped between the input's triangles and these, in order.
-        face_count: how many triangles, the first ones, are the input's; None: all. The others are the mirror
-            image of a doubled surface, and edges towards them are the boundary.
+        triangulation: flat triangles with their lengths; not modified.
+        flips: half-edges flipped between the triangles of the input and these, in order.
+        face_count: number of triangles of the input, which come first; None: all. The others are the mirror image of
+            a doubled surface, and edges shared with them are on the boundary.
     """
     twin, tail = triangulation.twin.copy(), triangulation.tail.copy()
     sides = np.empty(len(twin), dtype=np.complex128)
@@ -84,7 +84,7 @@ def straight_triangles(
 
 @compiled
 def place_triangles(length: FloatArray, sides: ComplexArray) -> None:
-    """Fill the three sides of each triangle as vectors in a frame of its own, its longest side along x."""
+    """Write the three sides of each triangle as vectors in its own frame, with the longest side along x."""
     for base in range(0, len(length), 3):
         i = 0
         for k in range(1, 3):
@@ -97,7 +97,7 @@ def place_triangles(length: FloatArray, sides: ComplexArray) -> None:
         slack_c = min(a, b) - (c - max(a, b))
         perimeter = a + b + c
         height = math.sqrt(perimeter * slack_a * slack_b * slack_c) / (2 * a)
-        # b and c times the cosines at the longest side, through the slacks: short sides keep their digits.
+        # b and c times the cosines at the longest side are computed from slacks, so that short sides are accurate.
         sides[h] = complex(a, 0.0)
         sides[h1] = complex(-(perimeter * slack_c - slack_a * slack_b) / (4 * a), height)
         sides[h2] = complex(-(perimeter * slack_b - slack_a * slack_c) / (4 * a), -height)
@@ -107,10 +107,10 @@ def place_triangles(length: FloatArray, sides: ComplexArray) -> None:
 def undo_flips(
     twin: IntArray, tail: IntArray, sides: ComplexArray, turns: ComplexArray, flips: IntArray
 ) -> None:
-    """Fill the turns between triangles, and undo flips, the last one first, each by unfolding its two triangles.
+    """Write the rotations between frames, and undo flips in reverse order, each by unfolding its two triangles.
 
-    The frames of triangles are carried along: vectors are added and turned, never divided by a side, which
-    may have length zero on the way.
+    The frames of the triangles are updated: vectors are added and rotated, but never divided by a side, which may have
+    length zero in an intermediate step.
     """
     for h in range(len(twin)):
         t = twin[h]
@@ -129,8 +129,8 @@ def undo_flips(
         t1 = t - t % 3 + (t + 1) % 3
         t2 = t - t % 3 + (t + 2) % 3
         turn = turns[h]
-        # The edge turns clockwise: sides move h1 to h2, h2 to t1, t1 to t2, t2 to h1; of these the second
-        # changes from the frame of h to that of t, the fourth from t to h.
+        # The edge rotates clockwise: sides move h1 to h2, h2 to t1, t1 to t2, t2 to h1. The second of them changes
+        # from the frame of h to that of t, the fourth from that of t to that of h.
         old = (h1, h2, t1, t2)
         new = (h2, t1, t2, h1)
         into = (1.0 + 0.0j, turn.conjugate(), 1.0 + 0.0j, turn)

@@ -1,6 +1,6 @@
 """Triangles given by their side lengths: column i is the side opposite corner i.
 
-The formulas go through the slacks b + c - a, evaluated so that needles and caps keep their digits
+The formulas use the slacks b + c - a, which are evaluated so that results are accurate also for needles and caps
 (W. Kahan, "Miscalculating area and angles of a needle-like triangle", 2014).
 """
 
@@ -17,22 +17,26 @@ from ..base.text import list_some, plural
 from ..errors import ArrayShapeError, DegenerateFaceError, FaceIndexError
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, corner_fans
 
-# Twice the area over the longest side squared. Lengths, rounded, know no smaller areas; the flattest triangles of
-# real scans have 1e-3.
+# Twice the area divided by the square of the longest side, at which a triangle counts as having no area. Smaller values
+# cannot be represented by rounded lengths; the flattest triangles of real scans have 1e-3.
 ZERO_AREA = 1e-7
-# What the triangle inequality is given to spare, in mean side lengths: enough for angles good to 1e-11.
+# Slack that mollification gives every triangle, relative to the mean side length: enough for angles accurate to 1e-11.
 MIN_SLACK = 1e-5
-#: Cosine of the angle, about 53 degrees, by which faces bend at an edge that is drawn sharp: between the 42 degrees
-#: of an icosahedron, which stands for a ball, and the 60 of a hexagonal prism, which is meant to have edges.
+#: Cosine of the dihedral angle, about 53 degrees, above which an edge is drawn sharp. It is between the 42 degrees of
+#: an icosahedron, which approximates a sphere, and the 60 degrees of a hexagonal prism, which has sharp edges.
 CREASE_COSINE = 0.6
 
 
 def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return (m, 3) side lengths in model units; both sides of an edge get the same bits.
 
+    Args:
+        vertices: (n, 3) positions, or (n, 2) in the plane.
+        faces: (m, 3) vertex indices.
+
     Raises:
-        ArrayShapeError: vertices are not (n, 3), or (n, 2), or faces not (m, 3).
-        FaceIndexError: a face names a vertex that does not exist.
+        ArrayShapeError: the vertices are not (n, 3) or (n, 2), or the faces are not (m, 3).
+        FaceIndexError: a face refers to a vertex that does not exist.
     """
     from ..mesh.connectivity import measure_sides
 
@@ -52,7 +56,7 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def as_triples(name: str, values: ArrayLike) -> FloatArray:
-    """Return numbers (m, 3) in one piece; compiled loops would read beyond others."""
+    """Return values as a contiguous (m, 3) float array, as compiled loops need; raise ArrayShapeError otherwise."""
     array = as_floats(name, values)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ArrayShapeError(f"{name} must have the shape (m, 3), not {array.shape}")
@@ -60,7 +64,7 @@ def as_triples(name: str, values: ArrayLike) -> FloatArray:
 
 
 def slacks(lengths: FloatArray) -> FloatArray:
-    """Return (m, 3) b + c - a for every side a; negative where the triangle inequality is broken."""
+    """Return (m, 3) the slack b + c - a of every side a; negative if the triangle inequality is broken."""
     lengths = as_triples("lengths", lengths)
     slack = np.empty_like(lengths)
     fill_slacks(lengths, slack)
@@ -68,12 +72,12 @@ def slacks(lengths: FloatArray) -> FloatArray:
 
 
 def is_broken(lengths: FloatArray) -> BoolArray:
-    """Return (m,) True where the three lengths close to no triangle (Section 2.3 of the paper)."""
+    """Return (m,) True where the three lengths break the triangle inequality (Section 2.3 of the paper)."""
     return np.asarray(slacks(lengths).min(axis=1) < 0)
 
 
 def double_areas(lengths: FloatArray) -> FloatArray:
-    """Return (m,) twice the area of each triangle; 0 where the triangle inequality is broken."""
+    """Return (m,) twice the area of each triangle; 0 if the triangle inequality is broken."""
     lengths = as_triples("lengths", lengths)
     areas = np.empty(len(lengths))
     fill_double_areas(lengths, areas)
@@ -83,8 +87,8 @@ def double_areas(lengths: FloatArray) -> FloatArray:
 def corner_angles(lengths: FloatArray) -> FloatArray:
     """Return (m, 3) corner angles in radians.
 
-    Where the triangle inequality is broken the angles are complex; these are their real parts, pi opposite
-    the side that is too long and 0 at the others (Section 4.3 of the paper).
+    If the triangle inequality is broken, the angles are complex numbers. Their real parts are returned: pi opposite the
+    side that is too long and 0 at the others (Section 4.3 of the paper).
     """
     slack = np.maximum(slacks(lengths), 0)
     perimeter = _perimeter(lengths)[:, None]
@@ -103,7 +107,7 @@ def cotangents(lengths: FloatArray) -> FloatArray:
 
 
 def _perimeter(lengths: FloatArray) -> FloatArray:
-    # Column by column: NumPy is slow at sums along an axis of three.
+    # Computed column by column, as NumPy is slow at sums along an axis of length three.
     perimeter: FloatArray = lengths[:, 0] + lengths[:, 1] + lengths[:, 2]
     return perimeter
 
@@ -111,18 +115,21 @@ def _perimeter(lengths: FloatArray) -> FloatArray:
 def mollify(
     lengths: FloatArray, *, strict: bool = False, names: IntArray | None = None
 ) -> tuple[FloatArray, str | None]:
-    """Return lengths with which every triangle has area, and a note if they had to change.
+    """Return lengths with which every triangle has area, and a note if they were changed.
 
-    Where some triangle has none, every side of the mesh grows by the same small length, which opens
-    collapsed triangles and keeps all others (N. Sharp and K. Crane 2020, Section 4.5).
+    If a triangle has no area, the same small length is added to every side of the mesh. This opens collapsed triangles
+    and hardly changes the others (N. Sharp and K. Crane 2020, Section 4.5).
 
     Args:
         lengths: (m, 3) side lengths.
-        strict: refuse such triangles instead.
-        names: (m,) what the user calls each face.
+        strict: raise an error for triangles without area instead.
+        names: (m,) face numbers of the input, for messages.
+
+    Returns:
+        (m, 3) the lengths, and the note or None.
 
     Raises:
-        DegenerateFaceError: with `strict`, or when the mesh as a whole has no area.
+        DegenerateFaceError: `strict` is True and a triangle has no area, or the total area of the mesh is zero.
     """
     lengths = as_triples("lengths", lengths)
     longest = np.maximum(np.maximum(lengths[:, 0], lengths[:, 1]), lengths[:, 2])
@@ -150,29 +157,29 @@ def mollify(
 
 
 @compiled
-def slack_beside(lengths: FloatArray, t: int, i: int) -> float:
-    """Return by how much the two other sides of a triangle are longer than side i."""
+def side_slack(lengths: FloatArray, t: int, i: int) -> float:
+    """Return the slack of side i of triangle t: by how much the two other sides together are longer."""
     b, c = lengths[t, (i + 1) % 3], lengths[t, (i + 2) % 3]
     return float(min(b, c) - (lengths[t, i] - max(b, c)))
 
 
 @compiled
 def fill_slacks(lengths: FloatArray, slack: FloatArray) -> None:
-    """Fill (m, 3) b + c - a for every side a of triangles with sides (m, 3)."""
+    """Write the slacks (m, 3), b + c - a for every side a, of triangles with sides (m, 3)."""
     for t in range(len(lengths)):
         for i in range(3):
-            slack[t, i] = slack_beside(lengths, t, i)
+            slack[t, i] = side_slack(lengths, t, i)
 
 
 @compiled
 def fill_cotangents(lengths: FloatArray, cots: FloatArray) -> None:
-    """Fill (m, 3) the cotangents of the angles of triangles with sides (m, 3); NumPy's way takes a dozen arrays."""
+    """Write the cotangents (m, 3) of the angles of triangles with sides (m, 3); NumPy would need a dozen arrays."""
     for t in range(len(lengths)):
         perimeter, product = lengths[t, 0] + lengths[t, 1] + lengths[t, 2], 1.0
         for i in range(3):
-            cots[t, i] = slack_beside(lengths, t, i)
+            cots[t, i] = side_slack(lengths, t, i)
             product *= 0.0 if cots[t, i] < 0.0 else cots[t, i]
-        # Eight times the area, rounded as `fill_double_areas` rounds.
+        # Eight times the area, with the same rounding as in `fill_double_areas`.
         eightfold = 4 * (math.sqrt(perimeter * product) / 2)
         one, two, three = cots[t, 0], cots[t, 1], cots[t, 2]
         cots[t, 0] = (perimeter * one - two * three) / eightfold
@@ -182,28 +189,28 @@ def fill_cotangents(lengths: FloatArray, cots: FloatArray) -> None:
 
 @compiled
 def fill_double_areas(lengths: FloatArray, areas: FloatArray) -> None:
-    """Fill (m,) twice the area of triangles with sides (m, 3)."""
+    """Write twice the area (m,) of triangles with sides (m, 3)."""
     for t in range(len(lengths)):
         product = 1.0
         for i in range(3):
-            slack = slack_beside(lengths, t, i)
-            product *= 0.0 if slack < 0.0 else slack  # what is not a number stays so
+            slack = side_slack(lengths, t, i)
+            product *= 0.0 if slack < 0.0 else slack  # NaN is preserved
         areas[t] = math.sqrt((lengths[t, 0] + lengths[t, 1] + lengths[t, 2]) * product) / 2
 
 
 def face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (m, 3) normals of faces, as long as twice their areas."""
+    """Return (m, 3) normals of faces, whose lengths are twice the areas."""
     a, b, c = (np.take(vertices, faces[:, k], axis=0) for k in range(3))
     return np.asarray(np.cross(b - a, c - a))
 
 
 def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (n, 3) unit normals, each the mean of its faces' by area; 0 where there is none."""
+    """Return (n, 3) unit normals of vertices, the area-weighted means of those of their faces; 0 if undefined."""
     return unit_vectors(sums_at(faces, face_normals(vertices, faces)[:, None], len(vertices)))
 
 
 def corner_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (m, 3, 3) the unit normal at each corner: the mean by angle of faces joined to it across no crease."""
+    """Return (m, 3, 3) unit normals of corners: angle-weighted means over the faces up to the nearest creases."""
     flat = unit_vectors(face_normals(vertices, faces))
     pairs = TriangleMesh(vertices, faces).edge_halfedges
     pairs = pairs[pairs[:, 1] >= 0]
@@ -214,15 +221,15 @@ def corner_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def sums_at(places: IntArray, vectors: FloatArray, count: int) -> FloatArray:
-    """Return (count, 3) for each place the sum of the vectors at it, of (m, 3) places and (m, 3 or 1, 3) vectors."""
+    """Return (count, 3) the sum of the vectors (m, 3 or 1, 3) that have each index in `places` (m, 3)."""
     each = np.broadcast_to(vectors, (*places.shape, 3))
     return np.stack([np.bincount(places.ravel(), each[..., k].ravel(), count) for k in range(3)], axis=1)
 
 
 def unit_vectors(vectors: FloatArray) -> FloatArray:
-    """Return vectors of length one, of (k, 3) of any size; 0 for those without a direction."""
+    """Return (k, 3) vectors scaled to unit length; 0 for zero vectors and those that are not finite."""
     with np.errstate(over="ignore", invalid="ignore"):
-        # Squares of the largest component's parts neither overflow nor vanish.
+        # Divided by the largest component, so that squares neither overflow nor vanish.
         scaled = vectors / np.maximum(np.abs(vectors).max(axis=1, keepdims=True), np.finfo(float).tiny)
         lengths = np.linalg.norm(scaled, axis=1, keepdims=True)
     is_vector = np.isfinite(lengths) & (lengths > 0)
@@ -230,9 +237,9 @@ def unit_vectors(vectors: FloatArray) -> FloatArray:
 
 
 def dihedral_angles(mesh: TriangleMesh) -> FloatArray:
-    """Return (e,) the angle between the normals of the faces beside each edge, radians; 0 on the boundary.
+    """Return (e,) the signed angle between the normals of the two faces of each edge, radians; 0 on the boundary.
 
-    Where the faces run counterclockwise seen from outside, it is positive on ridges and negative in valleys.
+    If the faces are counterclockwise seen from outside, it is positive at convex and negative at concave edges.
     """
     normals = face_normals(mesh.vertices, mesh.faces)
     one, two = normals[mesh.edge_faces[:, 0]], normals[mesh.edge_faces[:, 1]]

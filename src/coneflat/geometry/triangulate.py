@@ -1,7 +1,7 @@
-"""Triangulating polygons.
+"""Triangulation of polygons.
 
-Quads and convex polygons are split here, all at once; ears of the others are clipped by mapbox_earcut, one polygon at
-a time.
+Quads and convex polygons are split here, vectorised. Other polygons are triangulated one at a time by the ear clipping
+of mapbox_earcut.
 """
 
 from __future__ import annotations
@@ -15,30 +15,30 @@ from ..mesh.polygons import fan_corners, first_bad_corner, polygon_of
 from .delaunay import intrinsic_delaunay
 from .triangles import edge_lengths
 
-#: Relative to a polygon's area, and to the lengths of a quad's diagonals: smaller areas count as none, smaller
-#: differences as equal. Far above the rounding of collinear corners and of rotated squares (about 1e-16).
+#: Relative to the area of a polygon and to the lengths of the diagonals of a quad: smaller areas count as zero, smaller
+#: differences as equal. It is far above the rounding of collinear corners and of rotated squares (about 1e-16).
 _ROUNDING = 1e-9
 
 
 def triangulate(vertices: FloatArray, corners: IntArray, offsets: IntArray) -> tuple[IntArray, IntArray]:
-    """Return triangles that cover polygons, k - 2 for each polygon of k corners, oriented as it is.
+    """Return the triangulation of polygons: k - 2 triangles for a polygon of k corners, with its orientation.
 
-    A quad is split along the diagonal that leaves both halves facing the way the quad does; if both
-    diagonals do, along the shorter. Larger polygons become fans where they are convex; of others ears are clipped,
-    and diagonals flipped until they are Delaunay. Coordinates may be NaN: the result is valid in its indices then.
+    A quad is split along the diagonal for which both halves have the orientation of the quad; if both diagonals do,
+    along the shorter one. Larger convex polygons are split into fans. Others are triangulated by ear clipping, and
+    their diagonals are flipped to Delaunay. Coordinates may be NaN; the indices of the result are then still valid.
 
     Args:
         vertices: (n, 3) positions.
         corners: (c,) vertex of every polygon corner, polygon after polygon.
-        offsets: (p + 1,) polygon i owns corners[offsets[i]:offsets[i + 1]].
+        offsets: (p + 1,) polygon i has the corners corners[offsets[i]:offsets[i + 1]].
 
     Returns:
-        (m, 3) vertex indices, in the order of the polygons; a view of `corners` if all are triangles. (m, 3)
-        index into `corners` of the same.
+        (m, 3) vertex indices, in the order of the polygons; a view of `corners` if all are triangles. (m, 3) the
+        same as indices into `corners`.
 
     Raises:
         DegenerateFaceError: a polygon has fewer than 3 corners.
-        FaceIndexError: a corner names a vertex that does not exist.
+        FaceIndexError: a corner refers to a vertex that does not exist.
     """
     corners = np.asarray(corners, dtype=np.int64)
     offsets = np.asarray(offsets, dtype=np.int64)
@@ -73,11 +73,11 @@ def triangulate(vertices: FloatArray, corners: IntArray, offsets: IntArray) -> t
 def is_polygon_side(face_corners: IntArray, offsets: IntArray) -> BoolArray:
     """Return (m, 3) whether the side from triangle corner k to k + 1 is a side of its polygon.
 
-    False for the diagonals that `triangulate` put in. Triangles may run either way around.
+    It is False for the diagonals that `triangulate` adds. Triangles may have either orientation.
 
     Args:
         face_corners: (m, 3) polygon corner at each triangle corner.
-        offsets: (p + 1,) where the corners of each polygon begin.
+        offsets: (p + 1,) where the corners of each polygon start.
     """
     sizes = np.diff(offsets)
     if np.all(sizes == 3):
@@ -98,9 +98,9 @@ def _check(vertex_count: int, corners: IntArray, offsets: IntArray, sizes: IntAr
 
 
 def _splits_at_first_corner(vertices: FloatArray, quads: IntArray) -> BoolArray:
-    """Return (q,) whether to split quads from corner 0 to 2 rather than from 1 to 3.
+    """Return (q,) whether to split quads from corner 0 to 2 instead of from 1 to 3.
 
-    The choice does not depend on which corner is named first.
+    The choice does not depend on which corner comes first.
     """
     p0, p1, p2, p3 = (vertices[quads[:, k]] for k in range(4))
     with np.errstate(invalid="ignore", over="ignore"):
@@ -117,7 +117,7 @@ def _splits_at_first_corner(vertices: FloatArray, quads: IntArray) -> BoolArray:
         choice = length_02 < length_13
         tied = np.abs(length_02 - length_13) <= _ROUNDING * (length_02 + length_13)
     if tied.any():
-        # The corner that comes first by coordinates decides; on a grid all diagonals run one way then.
+        # The diagonal from the lexicographically first corner is chosen, so that on a grid all diagonals are parallel.
         rank = np.empty(len(vertices), dtype=np.int64)
         rank[np.lexsort(vertices.T[::-1])] = np.arange(len(vertices))
         ranks = rank[quads[tied]]
@@ -126,11 +126,11 @@ def _splits_at_first_corner(vertices: FloatArray, quads: IntArray) -> BoolArray:
 
 
 def _ngons(points: FloatArray) -> IntArray:
-    """Return (q, k - 2, 3) triangles of q polygons of k > 4 corners.
+    """Return (q, k - 2, 3) triangles of q polygons of k > 4 corners, as corner numbers 0 to k - 1.
 
-    They are positions 0 to k - 1 of corners, in each triangle ascending, so that it is oriented as its polygon is.
+    The numbers ascend in each triangle, so that it has the orientation of its polygon.
 
-    points: (q, k, 3) the corners.
+    points: (q, k, 3) positions of the corners.
     """
     size = points.shape[1]
     triangles = np.tile(fan_corners(np.array([0, size])), (len(points), 1, 1))
@@ -146,7 +146,7 @@ def _ngons(points: FloatArray) -> IntArray:
                 planes.append(plane)
                 clipped.append(i)
     if clipped:
-        # Ear clipping is content with triangles between three corners on a line.
+        # Ear clipping may give triangles with collinear corners; Delaunay flips remove them.
         mesh = TriangleMesh(np.concatenate(planes), np.concatenate(ears))
         delaunay, _ = intrinsic_delaunay(mesh, edge_lengths(mesh.vertices, mesh.faces))
         triangles[clipped] = np.sort(delaunay.faces.reshape(-1, size - 2, 3) % size, axis=2)
@@ -154,7 +154,7 @@ def _ngons(points: FloatArray) -> IntArray:
 
 
 def _newell_normals(points: FloatArray) -> FloatArray:
-    """Return (q, 3) Newell's normals, of twice the area's length."""
+    """Return (q, 3) normals by Newell's method, whose lengths are twice the areas."""
     local = points - points[:, :1]
     return np.asarray(np.cross(local[:, 1:-1], local[:, 2:]).sum(axis=1))
 
@@ -170,7 +170,7 @@ def _is_convex(points: FloatArray, normals: FloatArray) -> BoolArray:
 
 
 def _in_plane(points: FloatArray, normal: FloatArray) -> FloatArray | None:
-    """Return (k, 2) the polygon seen against its normal, counterclockwise; None if it has no plane."""
+    """Return (k, 2) the polygon projected along its normal, counterclockwise; None if the normal is undefined."""
     length = np.linalg.norm(normal)
     if not np.isfinite(points).all() or not np.isfinite(length) or length == 0:
         return None
@@ -182,9 +182,9 @@ def _in_plane(points: FloatArray, normal: FloatArray) -> FloatArray | None:
 
 
 def _clipped(plane: FloatArray) -> IntArray | None:
-    """Return (k - 2, 3) triangles of a polygon in the plane; None where they do not reach all its corners.
+    """Return (k - 2, 3) triangles of a polygon in the plane, by ear clipping; None if they do not use all corners.
 
-    Neighbours still have these corners. It happens where a polygon touches or crosses itself.
+    Neighbouring polygons still use these corners. This happens if a polygon touches or crosses itself.
     """
     from mapbox_earcut import triangulate_float64
 

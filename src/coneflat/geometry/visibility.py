@@ -1,4 +1,4 @@
-"""How well the vertices of a surface can be seen from all around."""
+"""Visibility of the vertices of a surface from all directions (ambient occlusion)."""
 
 from __future__ import annotations
 
@@ -9,42 +9,44 @@ import numpy as np
 from ..base.arrays import BoolArray, FloatArray, IntArray, dots
 from ..base.compiled import compiled
 from ..errors import OptionError
-from ..mesh.ties import own_axes
+from ..mesh.ties import shape_axes
 from .triangles import vertex_normals
 
-# Directions to look from, evenly spread, and pixels along the side of each picture.
+# Number of view directions, evenly distributed, and number of pixels along a side of each depth image.
 DIRECTIONS, PIXELS = 64, 256
 
 
 def visible_share(vertices: FloatArray, faces: IntArray, up: FloatArray | None = None) -> FloatArray:
-    """Return (n,) how much of what there is to see of each vertex from all around can be seen, 0 to 1.
+    """Return (n,) the visible fraction of each vertex, averaged over all view directions, 0 to 1.
 
-    This is ambient occlusion: a direction counts by the cosine of its angle with the normal, as the surface then looks
-    so large. The surface has two sides; the one that is seen better counts. It is drawn from every direction.
+    This is ambient occlusion. A direction is weighted by the cosine of its angle with the normal, the apparent size of
+    the surface. The surface has two sides, of which the more visible one counts. A depth image is drawn for every
+    direction.
 
     Args:
-        vertices, faces: (n, 3), (m, 3) one mesh, or several that hide one another.
-        up: (3,) where up is, if the model is mostly seen standing: what is seen from straight below counts nothing.
+        vertices, faces: (n, 3), (m, 3) one mesh, or several that occlude one another.
+        up: (3,) the up direction, for models that are mostly seen upright: directions are weighted from 1 for views
+            from above to 0 for views from below. None: all directions have the same weight.
 
     Raises:
         OptionError: `up` is not a direction.
     """
-    axes = own_axes(vertices)
+    axes = shape_axes(vertices)
     if up is not None:
-        axes = _upright(axes, np.asarray(up, dtype=np.float64))
+        axes = _axes_with_up(axes, np.asarray(up, dtype=np.float64))
     centred = vertices - vertices.mean(axis=0)
     size = float(np.sqrt(dots(centred, centred).max()))
     points = centred * ((PIXELS / 2 - 1) / size if size > 0 else 1.0)
     normals = vertex_normals(vertices, faces)
-    seen, whole = np.zeros((2, 2, len(vertices)))
+    seen, total = np.zeros((2, 2, len(vertices)))
     for direction in _directions() @ axes:
         facing = normals @ direction
         side = (facing < 0).astype(np.int64), np.arange(len(vertices))
         amount = np.abs(facing)
-        whole[side] += amount
+        total[side] += amount
         weight = 1.0 if up is None else (1 + direction @ axes[2]) / 2
         seen[side] += weight * amount * _is_seen(points, faces, amount, direction, axes)
-    share = (seen / np.maximum(whole, np.finfo(float).tiny)).max(axis=0)
+    share = (seen / np.maximum(total, np.finfo(float).tiny)).max(axis=0)
     # The mean of (1 + z) / 2 over a hemisphere, where directions count by z.
     best = 1.0 if up is None else 5 / 6
     return np.minimum(share / best, 1.0)
@@ -53,7 +55,7 @@ def visible_share(vertices: FloatArray, faces: IntArray, up: FloatArray | None =
 def _is_seen(
     points: FloatArray, faces: IntArray, facing: FloatArray, direction: FloatArray, axes: FloatArray
 ) -> BoolArray:
-    """Return (n,) whether points, in pixels from the centre, are seen from a direction."""
+    """Return (n,) whether points, given in pixels from the centre, are visible from a direction."""
     right = np.cross(direction, axes[np.argmin(np.abs(axes @ direction))])
     right /= np.linalg.norm(right)
     seen_from = points @ np.stack([right, np.cross(direction, right), -direction], axis=1)
@@ -61,15 +63,15 @@ def _is_seen(
     depth, face = np.full((PIXELS, PIXELS), np.inf), np.empty((PIXELS, PIXELS), dtype=np.int64)
     fill_nearest(seen_from, faces, depth, face)
     column, row = seen_from[:, :2].astype(np.int64).T
-    # A vertex may lie a pixel behind what the picture shows, and as much more as the surface falls within a pixel.
-    # Where the picture shows nothing, the depth is infinite: all is before it.
+    # A vertex counts as visible up to one pixel behind the depth image, plus the change of depth of the surface within
+    # a pixel. Pixels without a surface have infinite depth, so everything is in front of it.
     gap = np.maximum(seen_from[:, 2] - depth[row, column] - 1, -np.finfo(float).max)
     behind = facing * gap
     return np.asarray(behind <= np.sqrt(np.maximum(1 - facing**2, 0.0)))
 
 
 def _directions() -> FloatArray:
-    """Return (d, 3) unit vectors evenly spread over the sphere: on a spiral, as seeds in a sunflower."""
+    """Return (d, 3) unit vectors distributed evenly over the sphere, on a Fibonacci spiral."""
     index = np.arange(DIRECTIONS)
     z = 1 - (2 * index + 1) / DIRECTIONS
     angle = np.pi * (1 + 5**0.5) * index
@@ -77,11 +79,11 @@ def _directions() -> FloatArray:
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
 
 
-def _upright(axes: FloatArray, up: FloatArray) -> FloatArray:
-    """Return axes of which the third is up."""
+def _axes_with_up(axes: FloatArray, up: FloatArray) -> FloatArray:
+    """Return (3, 3) orthonormal axes, as rows, of which the third is `up`."""
     length = np.linalg.norm(up) if up.shape == (3,) else np.nan
     if not (np.isfinite(length) and length > 0):
-        raise OptionError(f"up is a direction, three numbers that are not all 0, not {up.tolist()}")
+        raise OptionError(f"up must be a direction: three numbers that are not all 0, not {up.tolist()}")
     up = up / length
     flat = axes - np.outer(axes @ up, up)
     first = flat[np.argmax(np.linalg.norm(2 * flat, axis=1) > 1)]
@@ -91,14 +93,14 @@ def _upright(axes: FloatArray, up: FloatArray) -> FloatArray:
 
 @compiled
 def first_centre(position: float, size: int) -> int:
-    """Return the first pixel whose centre is at a position or beyond, from 0 up to the size."""
+    """Return the first pixel, from 0 to `size`, whose centre is not below a position."""
     return int(min(max(math.ceil(position - 0.5), 0.0), float(size)))
 
 
 @compiled
 def crossing(points: FloatArray, p: int, q: int, y: float) -> float:
-    """Return the x at which the side between two points crosses a scan line; NaN if it does not."""
-    # From the upper end to the lower in every triangle: both faces of an edge then round alike.
+    """Return the x at which the segment between two points crosses a scan line; NaN if it does not."""
+    # Computed from the upper to the lower end in every triangle, so that both faces of an edge have the same rounding.
     if points[p, 1] > points[q, 1]:
         p, q = q, p
     if not points[p, 1] <= y < points[q, 1]:
@@ -109,10 +111,12 @@ def crossing(points: FloatArray, p: int, q: int, y: float) -> float:
 
 @compiled
 def fill_nearest(points: FloatArray, faces: IntArray, depth: FloatArray, face: IntArray) -> None:
-    """Write the nearest face, and its depth, to every pixel whose centre a face covers.
+    """Write the nearest face and its depth to every pixel whose centre is covered by a face, in place.
 
-    points: (n, 3) pixel x to the right, pixel y downwards, and depth away from the eye. depth, face: (h, w) what there
-    is already; of faces at the same depth the first stays.
+    Args:
+        points: (n, 3) x to the right and y downwards in pixels, and depth away from the viewer.
+        faces: (m, 3) indices of points.
+        depth, face: (h, w) depth and face of the image so far; among faces of the same depth, the first is kept.
     """
     height, width = depth.shape
     for f in range(len(faces)):
@@ -123,7 +127,7 @@ def fill_nearest(points: FloatArray, faces: IntArray, depth: FloatArray, face: I
         total = xb * yc - yb * xc
         right = (zb * yc - zc * yb) / total if total != 0 else 0.0
         down = (zc * xb - zb * xc) / total if total != 0 else 0.0
-        # In a triangle seen nearly edge on the gradient is mostly rounding error.
+        # In a triangle that is seen nearly edge-on, the gradient is mostly rounding error, so the depth is clamped.
         nearest = min(za, points[b, 2], points[c, 2])
         farthest = max(za, points[b, 2], points[c, 2])
         first = first_centre(min(ya, points[b, 1], points[c, 1]), height)

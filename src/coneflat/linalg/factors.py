@@ -1,6 +1,7 @@
-"""Factorized matrices: by MKL PARDISO (pypardiso) if the system is large and it is installed, else by cholespy.
+"""Sparse factorizations: MKL PARDISO (pypardiso) for large systems if it is installed, else CHOLMOD (cholespy).
 
-A matrix is factorized once and solved with often. SuperLU factorizes indefinite matrices and small scattered ones.
+A matrix is factorized once and used for many solves. SuperLU factorizes indefinite matrices and small matrices of many
+nearly disconnected blocks.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from scipy.sparse.linalg import splu
 from ..base.arrays import FloatArray
 from ..errors import MetricError
 
-# Unknowns below which loading MKL, 0.03 s in each process, takes longer than what it saves.
+# Number of unknowns below which loading MKL, 0.03 s in each process, takes longer than it saves.
 MIN_PARDISO_UNKNOWNS = 12_000
-# Unknowns of scattered parts below which SuperLU is faster.
+# Number of unknowns below which SuperLU is faster for matrices of many nearly disconnected blocks.
 MAX_SUPERLU_UNKNOWNS = 20_000
 
 
@@ -29,7 +30,7 @@ class NotPositiveDefinite(ArithmeticError):
 
 
 def aligned(shape: tuple[int, ...]) -> FloatArray:
-    """Return room for numbers, in one piece, that starts at a multiple of 64 bytes; MKL counts on it."""
+    """Return an uninitialised contiguous float64 array that starts at a multiple of 64 bytes, as MKL expects."""
     size = math.prod(shape)
     buffer = np.empty(size + 8)
     start = -(buffer.ctypes.data // 8) % 8
@@ -37,15 +38,15 @@ def aligned(shape: tuple[int, ...]) -> FloatArray:
 
 
 def is_aligned(array: FloatArray) -> bool:
-    """Return whether an array is like those of `aligned`."""
+    """Return whether an array is contiguous, float64 and 64-byte aligned, like those of `aligned`."""
     return array.dtype == np.float64 and array.flags.c_contiguous and array.ctypes.data % 64 == 0
 
 
 class Factor:
-    """A factorized matrix; this one has no rows, as that of a mesh without free vertices.
+    """Interface of factorized matrices, and the factor of the matrix without rows (a mesh without free vertices).
 
     Attributes:
-        break_even: how many solutions, with what conjugate gradients do besides, take as long as another factorization.
+        break_even: number of iterations of conjugate gradients, one solve each, that take as long as a factorization.
     """
 
     break_even = 60
@@ -54,11 +55,13 @@ class Factor:
         pass
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
+        """Return the solution x of A x = right, for one right-hand side (n,) or several (n, k)."""
         return np.zeros_like(right)
 
-    def renewed(self, matrix: csc_matrix) -> Factor:
-        """Return the factor of another matrix of the same size, and use this one up: its analysis may serve again.
+    def refactorized(self, matrix: csc_matrix) -> Factor:
+        """Return the factor of another matrix of the same size; this factor must not be used afterwards.
+
+        The symbolic analysis is reused if the pattern is the same.
 
         Raises:
             NotPositiveDefinite: rounding has made the matrix indefinite.
@@ -67,7 +70,7 @@ class Factor:
 
 
 class SuperLUFactor(Factor):
-    """A sparse LU factorization that keeps a symmetric ordering."""
+    """A sparse LU factorization (SuperLU) with a symmetric ordering."""
 
     def __init__(self, matrix: csc_matrix) -> None:
         try:
@@ -79,19 +82,19 @@ class SuperLUFactor(Factor):
             ) from error
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
+        """Return the solution x of A x = right, for one right-hand side (n,) or several (n, k)."""
         solution: FloatArray = self._factor.solve(np.asarray(right, dtype=np.float64))
         return solution
 
 
 class CholespyFactor(Factor):
-    """A sparse Cholesky factorization by CHOLMOD: wheels everywhere, quick to load, slow on large meshes."""
+    """A sparse Cholesky factorization by CHOLMOD: available everywhere, quick to load, slow on large meshes."""
 
     def __init__(self, matrix: csc_matrix) -> None:
         from cholespy import CholeskySolverD, MatrixType
 
         if not (matrix.diagonal() > 0).all():
-            # CHOLMOD finds out, too, and says so on standard output.
+            # CHOLMOD would also detect this, but prints a message on standard output.
             raise NotPositiveDefinite("the diagonal is not positive")
         try:
             self._solver = CholeskySolverD(
@@ -105,7 +108,7 @@ class CholespyFactor(Factor):
             raise NotPositiveDefinite(str(error)) from error
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
+        """Return the solution x of A x = right, for one right-hand side (n,) or several (n, k)."""
         right = np.ascontiguousarray(right, dtype=np.float64)
         solution = np.zeros_like(right)
         self._solver.solve(right, solution)
@@ -114,25 +117,26 @@ class CholespyFactor(Factor):
 
 @cache
 def has_pardiso() -> bool:
-    """Whether PARDISO is installed."""
+    """Return whether PARDISO (pypardiso) is installed."""
     return find_spec("pypardiso") is not None
 
 
 def factorize(
     matrix: csc_matrix, used_up: Factor | None = None, whole: int = 0, is_scattered: bool = False
 ) -> Factor:
-    """Factorize a sparse symmetric positive definite matrix.
+    """Return the factorization of a sparse symmetric positive definite matrix.
 
     Args:
         matrix: (n, n), both triangles, with sorted indices.
-        used_up: the factor of another matrix of the same size, needed no more, whose analysis may serve.
-        whole: unknowns of something larger that it is a part of: what is loaded for that factorizes it, too, and has an
-            analysis that serves again, which takes most of the time.
-        is_scattered: whether it is of small parts that hardly hang together. SuperLU finds an order of elimination
-            for these in a fraction of the time that others take.
+        used_up: the factor of another matrix of the same size that is not needed any more; its symbolic analysis is
+            reused if possible.
+        whole: number of unknowns of the larger system that the matrix belongs to, if any. The solver is chosen by the
+            larger of both sizes: it is loaded anyway, and reuses its analysis, which takes most of the time.
+        is_scattered: whether the matrix consists of many small, nearly disconnected blocks. SuperLU finds an
+            elimination order for these in a fraction of the time of the other solvers.
 
     Raises:
-        MetricError: it is singular in double precision.
+        MetricError: the matrix is singular in double precision.
     """
     size = matrix.shape[0]
     if size == 0:
@@ -140,12 +144,12 @@ def factorize(
     is_by_pardiso = max(size, whole) >= MIN_PARDISO_UNKNOWNS and has_pardiso()
     try:
         if used_up is not None:
-            return used_up.renewed(matrix)
+            return used_up.refactorized(matrix)
         if is_scattered and size < MAX_SUPERLU_UNKNOWNS:
             return SuperLUFactor(matrix)
         return _by_pardiso(matrix) if is_by_pardiso else CholespyFactor(matrix)
     except NotPositiveDefinite:
-        # Rounding has made it indefinite: with pivots it has a factorization all the same.
+        # Rounding has made the matrix indefinite; with pivoting it can still be factorized.
         return _by_pardiso(matrix, is_definite=False) if is_by_pardiso else SuperLUFactor(matrix)
 
 
@@ -156,13 +160,13 @@ def _by_pardiso(matrix: csc_matrix, is_definite: bool = True) -> Factor:
 
 
 class HermitianFactor:
-    """A factorized Hermitian positive definite matrix: as a real one of twice the size.
+    """A factorized Hermitian positive definite matrix, stored as a real matrix of twice the size.
 
     Args:
         matrix: (n, n) complex.
 
     Raises:
-        MetricError: it is singular in double precision.
+        MetricError: the matrix is singular in double precision.
     """
 
     def __init__(self, matrix: csr_matrix) -> None:
@@ -170,7 +174,7 @@ class HermitianFactor:
         self._factor = factorize(csc_matrix(bmat([[real, -imaginary], [imaginary, real]])))
 
     def solve(self, right: NDArray[Any]) -> NDArray[np.complex128]:
-        """Return the complex x with A x = right, both (n,)."""
+        """Return the complex solution x of A x = right, both (n,)."""
         parts = self._factor.solve(np.concatenate([right.real, right.imag]))
         solution: NDArray[np.complex128] = parts[: len(right)] + 1j * parts[len(right) :]
         return solution

@@ -1,4 +1,4 @@
-"""What fits into memory, asked before long work: later, the system would end the process without a word."""
+"""Check of the free memory before long computations; without it, the system may kill the process silently."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from pathlib import Path
 
 from ..errors import TooLargeError
 
-# Triangles from which on it is asked.
+# Number of triangles from which the memory is checked.
 CHECKED_TRIANGLES = 1_000_000
-# Bytes at the peak of a flattening for each triangle: measured on five and ten million. With cones of which many are
-# tried it is more; less is refused than does not fit.
+# Peak memory of a flattening in bytes per triangle, measured on five and ten million triangles. A search that tries
+# many cones needs more, so the check accepts some meshes that do not fit.
 BYTES_PER_TRIANGLE = 1400
 CGROUP = Path("/sys/fs/cgroup")
 
 
 def check_memory(triangles: int) -> None:
-    """Raise TooLargeError if no flattening of so many triangles fits into the memory that is free."""
+    """Raise TooLargeError if a flattening of this number of triangles does not fit into the free memory."""
     if triangles < CHECKED_TRIANGLES:
         return
     needed, free = triangles * BYTES_PER_TRIANGLE, free_memory()
@@ -26,12 +26,12 @@ def check_memory(triangles: int) -> None:
 
 
 def free_memory() -> float:
-    """Return the bytes that this process may still take, swap space included."""
+    """Return the number of bytes that this process may still allocate, including swap space."""
     import psutil
 
     free = float(psutil.virtual_memory().available + psutil.swap_memory().free)
     try:
-        # Of a container; the file says max where there is no limit.
+        # The limit of a container; the file contains "max" if there is no limit.
         limit, used = (int((CGROUP / f"memory.{what}").read_text()) for what in ("max", "current"))
     except (OSError, ValueError):
         return free

@@ -1,4 +1,4 @@
-"""Newton's method with a line search, for convex functions that are given by their gradients."""
+"""Newton's method with a line search for convex functions that are given by their gradients."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from ..base.arrays import FloatArray
 from ..base.progress import check_cancelled
 from ..errors import MetricError
 
-# A step of this share of the variables is lost in the sum.
+# Relative size of a step that does not change the variables in floating point.
 ROUNDING = 2.0**-52
-# Part of the slope that a step must gain at least where values are compared (Armijo), and halvings of a step after
-# which it is taken for rounding: the change is then below 1e-9 of the first trial.
+# Fraction of the linear decrease that a step must attain where function values are compared (Armijo), and largest
+# number of halvings of a step. After them the step is below 1e-9 of the first trial and counts as rounding.
 ARMIJO, HALVINGS = 1e-4, 30
 
 
 @dataclass(eq=False)
 class Point:
-    """The variables of a function, and how it falls there.
+    """A point of a function: the variables and the negative gradient.
 
     Attributes:
         place: (n,) the variables.
         residual: (n,) minus the gradient.
-        is_admissible: False where the function does not stand for what is sought.
+        is_admissible: False if the point must not be accepted as a step, as the function is not valid there.
     """
 
     place: FloatArray
@@ -35,7 +35,7 @@ class Point:
 
     @cached_property
     def largest(self) -> float:
-        """The largest part of the gradient; infinite where it is beyond double precision."""
+        """The largest absolute component of the gradient; infinite if it overflows."""
         largest = float(np.abs(self.residual).max(initial=0.0))
         return largest if np.isfinite(largest) else np.inf
 
@@ -47,11 +47,13 @@ class Convex(Protocol[P]):
     """A convex function of (n,) variables."""
 
     def evaluate(self, place: FloatArray) -> P:
-        """Return the point at a place."""
+        """Return the point with given variables (n,)."""
         ...
 
     def direction(self, here: P, exactly: bool) -> tuple[FloatArray, bool]:
-        """Return (n,) the Newton direction, and whether it is as exact as can be; if `exactly`, it must be.
+        """Return (n,) the Newton direction, and whether it was computed by a direct solve.
+
+        exactly: require a direct solve.
 
         Raises:
             MetricError: the Hessian is singular in double precision.
@@ -61,16 +63,17 @@ class Convex(Protocol[P]):
 
 @dataclass(frozen=True)
 class Limits:
-    """When to stop.
+    """Stopping criteria of Newton's method.
 
     Attributes:
-        tolerance: gradient that counts as none. The method goes on below it as long as steps halve the gradient.
-        steps: Newton steps at most.
-        goal: gradient below which nothing is left to gain but rounding.
-        halvings: of a step, at most.
-        halvings_below: the same once the gradient is below the tolerance.
+        tolerance: gradient that counts as converged. Below it, the method goes on as long as steps halve the gradient.
+        steps: largest number of Newton steps.
+        goal: gradient at the level of rounding, at which the method stops.
+        halvings: largest number of halvings of a step.
+        halvings_below: the same when the gradient is below the tolerance.
         largest_step: largest change of a variable in one step.
-        least_change: part of the gradient that a step must change; less is a slope without an end.
+        least_change: smallest relative change of the gradient in a step; the method stops below it, as the function
+            then decreases without a minimum.
     """
 
     tolerance: float
@@ -83,14 +86,24 @@ class Limits:
 
 
 def minimise(function: Convex[P], start: P, limits: Limits) -> tuple[P, int]:
-    """Return the point of least gradient that Newton's method reaches, and the number of steps.
+    """Return the point with the smallest gradient that Newton's method reaches, and the number of steps.
 
-    The line search looks at the slope of the function along the step, not at its values, whose rounding hides what a
-    step gains near the end. It halves the step while the slope is positive. The function being convex, a step with a
-    slope below zero stops short of the minimum along the line, so the function has fallen, and by at least half of
-    what was to be had when the step before it, twice as long, went beyond. The slope is negative at length 0 and
-    continuous: some length is accepted. A step beyond the minimum is taken only if it halves the least gradient so
-    far, which can happen but finitely often. So the search can neither stall nor cycle.
+    Args:
+        function: the convex function.
+        start: the first point.
+        limits: the stopping criteria.
+
+    Returns:
+        The point, and the number of Newton steps.
+
+    Notes:
+        The line search uses the slope of the function along the step, not its values: near the minimum, the gain of a
+        step is smaller than the rounding of the values. It halves the step while the slope is positive. As the
+        function is convex, a step with a negative slope ends before the minimum along the line. The function has then
+        decreased, by at least half of the possible decrease if the step of twice the length went beyond the minimum.
+        The slope is negative at length 0 and continuous, so some length is accepted. A step beyond the minimum is
+        accepted only if it halves the smallest gradient so far, which can happen only finitely often. Therefore the
+        search neither stalls nor cycles.
     """
     here = best = start
     steps, exactly = 0, False
@@ -99,7 +112,7 @@ def minimise(function: Convex[P], start: P, limits: Limits) -> tuple[P, int]:
         is_reached = best.largest <= limits.tolerance
         try:
             step, is_exact = function.direction(here, exactly)
-        except MetricError:  # singular in double precision: the best so far has to do
+        except MetricError:  # singular in double precision: return the best point so far
             break
         if not is_reached and np.abs(step).max() <= ROUNDING * np.abs(here.place).max():
             break
@@ -126,7 +139,7 @@ def minimise(function: Convex[P], start: P, limits: Limits) -> tuple[P, int]:
 def _search_line(
     function: Convex[P], here: P, step: FloatArray, least: float, halvings: int, largest_step: float
 ) -> P | None:
-    """Return the first point accepted; None if there is none."""
+    """Return the first accepted point along a step, or None."""
     reach = float(np.abs(step).max(initial=0.0))
     if not np.isfinite(reach) or reach == 0.0:
         return None

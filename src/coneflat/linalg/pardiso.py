@@ -1,7 +1,8 @@
-"""PARDISO of Intel's MKL, which pypardiso brings: the fastest on large meshes, on x86-64 only.
+"""PARDISO of Intel's MKL, installed with pypardiso: the fastest solver on large meshes, on x86-64 only.
 
-Its own interface copies, hashes and checks matrices, which takes longer than the factorization; here the routine is
-called itself. It takes the upper triangle by rows: for a symmetric matrix the lower one by columns.
+The interface of pypardiso copies, hashes and checks matrices, which takes longer than the factorization. This module
+calls the routine directly. It takes the upper triangle by rows, which for a symmetric matrix is the lower triangle by
+columns.
 """
 
 from __future__ import annotations
@@ -27,14 +28,14 @@ AnyArray: TypeAlias = NDArray[Any]
 
 
 class Kind(IntEnum):
-    """Kinds of matrices."""
+    """Matrix types of PARDISO."""
 
     POSITIVE_DEFINITE = 2
     INDEFINITE = -2
 
 
 class Phase(IntEnum):
-    """What PARDISO is to do."""
+    """Phases of a call of PARDISO."""
 
     ANALYSE = 11
     FACTORIZE = 22
@@ -42,8 +43,8 @@ class Phase(IntEnum):
     RELEASE = -1
 
 
-class Place(IntEnum):
-    """Positions in PARDISO's table of parameters."""
+class Parameter(IntEnum):
+    """Indices into the parameter table `iparm` of PARDISO."""
 
     NO_DEFAULTS = 0
     ORDERING = 1
@@ -52,29 +53,30 @@ class Place(IntEnum):
 
 
 class Code(IntEnum):
-    """Errors."""
+    """Error codes of PARDISO."""
 
     OUT_OF_MEMORY = -2
     ZERO_PIVOT = -4
 
 
-# Parallel nested dissection, and a factorization on two levels; a permutation, given or asked for, would silently turn
-# that off.
-SETTINGS = {Place.NO_DEFAULTS: 1, Place.ORDERING: 3, Place.SCHEDULE: 1, Place.FROM_ZERO: 1}
-# MKL's file on each system, and what tells pypardiso of another one.
+# Parallel nested dissection, and a two-level factorization. A permutation, given or requested, would silently disable
+# the latter.
+SETTINGS = {Parameter.NO_DEFAULTS: 1, Parameter.ORDERING: 3, Parameter.SCHEDULE: 1, Parameter.FROM_ZERO: 1}
+# File names of MKL on the operating systems, and the environment variable that gives pypardiso another path.
 RUNTIMES = ("libmkl_rt.", "mkl_rt.")
-LIBRARY_GIVEN = "PYPARDISO_MKL_RT"
-# How long, in milliseconds, a thread of MKL that has nothing to do turns in circles on its core before it sleeps; by
-# default 200, which other stages or other processes need.
-WAITING_TIME = "KMP_BLOCKTIME"
+LIBRARY_VARIABLE = "PYPARDISO_MKL_RT"
+# Environment variable: milliseconds for which an idle thread of MKL spins before it sleeps. The default, 200, takes
+# time from other stages and processes.
+BLOCK_TIME_VARIABLE = "KMP_BLOCKTIME"
 
 
 class PardisoFactor(Factor):
-    """A sparse Cholesky factorization whose analysis serves other matrices of the same pattern.
+    """A sparse Cholesky factorization by PARDISO; its analysis is reused for matrices of the same pattern.
 
-    It stays on as many threads as it was made on: to solve on fewer than were factorized on gives wrong results
-    without an error, and to factorize anew on more than were solved on ends the process. On two levels results are the
-    same, bit for bit, from one run to the next, and differ in the last digits between numbers of threads.
+    All calls use the number of threads of the constructor. A solve with fewer threads than the factorization gives
+    wrong results without an error, and another factorization with more threads than the solve ends the process. With
+    the two-level factorization, results are the same bit for bit in every run, but the last digits depend on the
+    number of threads.
     """
 
     break_even = 30
@@ -86,7 +88,7 @@ class PardisoFactor(Factor):
         self._table = np.zeros(64, dtype=np.int32)
         self._table[list(SETTINGS)] = list(SETTINGS.values())
         self._order = np.zeros(n, dtype=np.int32)
-        # What is released when this object goes: PARDISO keeps its memory elsewhere.
+        # PARDISO allocates its memory itself; it must be released with this object.
         self._finalizer = weakref.finalize(self, _release, kind, self._threads, self._handle, self._table, n)
         self._set_pattern(matrix)
         self._fill(matrix)
@@ -106,8 +108,8 @@ class PardisoFactor(Factor):
         self._call(Phase.FACTORIZE)
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Return x with A x = right, for a vector (n,) or several at once (n, k)."""
-        # One after the other in memory; of (k, n) this is a view.
+        """Return the solution x of A x = right, for one right-hand side (n,) or several (n, k)."""
+        # Each right-hand side must be contiguous; for the transpose of a (k, n) array this is a view.
         columns = right.T
         if not is_aligned(columns):
             columns = _copied(columns)
@@ -115,10 +117,10 @@ class PardisoFactor(Factor):
         self._call(Phase.SOLVE, columns, solution)
         return solution.T
 
-    def renewed(self, matrix: csc_matrix) -> PardisoFactor:
-        """Return the factor of another matrix of the same size."""
+    def refactorized(self, matrix: csc_matrix) -> PardisoFactor:
+        """Return the factor of another matrix of the same size; this factor must not be used afterwards."""
         if matrix.indices is not self._indices:
-            # A second analysis by one handle would leave the memory of the first behind.
+            # A second analysis with the same handle would leak the memory of the first.
             _release(self._kind, self._threads, self._handle, self._table, matrix.shape[0])
             self._handle[:] = 0
             self._set_pattern(matrix)
@@ -196,24 +198,24 @@ def _address(array: AnyArray | None) -> ctypes.c_void_p:
 
 @lru_cache(maxsize=1)
 def _routines() -> tuple[Any, Any]:
-    """Return PARDISO, and what sets the number of threads of the calling thread and returns the one before."""
+    """Return PARDISO, and the function that sets the number of threads of MKL and returns the previous number."""
     library = _library()
     pardiso, set_threads = library["pardiso"], library["MKL_Set_Num_Threads_Local"]
     pardiso.restype = None
     set_threads.argtypes, set_threads.restype = [ctypes.c_int], ctypes.c_int
-    # Or else it takes fewer threads than it is told where it thinks that best.
+    # Otherwise MKL may use fewer threads than requested.
     library["MKL_Set_Dynamic"](0)
     return pardiso, set_threads
 
 
 def _library() -> ctypes.CDLL:
-    """Load MKL from the package that brings it; pypardiso, which knows more places, looks through all folders."""
-    os.environ.setdefault(WAITING_TIME, "0")
+    """Return MKL, loaded from the installed package `mkl`, or else found by pypardiso, whose search is slower."""
+    os.environ.setdefault(BLOCK_TIME_VARIABLE, "0")
     try:
         installed = metadata.files("mkl") or ()
     except metadata.PackageNotFoundError:
         installed = ()
-    for path in installed if LIBRARY_GIVEN not in os.environ else ():
+    for path in installed if LIBRARY_VARIABLE not in os.environ else ():
         if path.name.startswith(RUNTIMES):
             with suppress(OSError):
                 return ctypes.CDLL(str(path.locate()))

@@ -1,4 +1,4 @@
-"""Shortest paths and spanning trees on graphs that may have parallel edges and loops."""
+"""Shortest paths and spanning trees of graphs that may have parallel edges and loops."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from ..base.sets import edges_at_nodes, grow_forest
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """The shortest path to each node from the nearest of some sources.
+    """The shortest path to each node from its nearest source.
 
     Attributes:
-        distance: (n,) infinite at nodes that are not reached.
-        before, edge: (n,) the last node before each on its path, and the edge from there; -1 at sources and at nodes
-            that are not reached.
-        source: (n,) where the path begins, -1 at nodes that are not reached.
+        distance: (n,) length of the path; infinite at nodes that are not reached.
+        before, edge: (n,) the predecessor of each node on its path, and the edge from there; -1 at sources and at
+            nodes that are not reached.
+        source: (n,) the source of the path, -1 at nodes that are not reached.
     """
 
     distance: FloatArray
@@ -29,7 +29,7 @@ class Paths:
     source: IntArray
 
     def nodes_to(self, ends: IntArray) -> IntArray:
-        """Return the nodes on the paths to some nodes, each once, without the sources."""
+        """Return the nodes on the paths to given nodes, each once, without the sources."""
         found: dict[int, None] = {}
         for node in ends.tolist():
             while node not in found and self.before[node] >= 0:
@@ -40,13 +40,13 @@ class Paths:
 
 @dataclass(frozen=True, eq=False)
 class MultiGraph:
-    """An undirected graph.
+    """An undirected graph with edge costs; parallel edges and loops are allowed.
 
     Attributes:
         nodes: number of nodes.
         ends: (e, 2) the nodes that each edge connects.
-        costs: (e,) from 0, for paths.
-        beside: the edges at each node, if they are known; see `edges_at_nodes`.
+        costs: (e,) edge costs, not negative.
+        beside: the incident edges of each node if they are known, as `edges_at_nodes` returns them.
     """
 
     nodes: int
@@ -55,27 +55,27 @@ class MultiGraph:
     beside: tuple[IntArray, IntArray] | None = None
 
     @cached_property
-    def _beside(self) -> tuple[IntArray, IntArray]:
+    def _incident(self) -> tuple[IntArray, IntArray]:
         return edges_at_nodes(self.ends, self.nodes) if self.beside is None else self.beside
 
     def shortest_paths(self, sources: IntArray, targets: IntArray | None = None) -> Paths:
-        """Return the shortest paths from sources; edges of infinite costs are not taken.
+        """Return the shortest paths from the sources; edges of infinite cost are not used.
 
         Args:
-            sources: nodes.
-            targets: nodes of which only the nearest is of interest: the search ends there, and what lies farther away
-                is as if it could not be reached, or farther than it is.
+            sources: (s,) nodes.
+            targets: (t,) nodes. The search ends at the nearest of them. Nodes that are farther away are not reached,
+                or have a distance that is too large. None: all nodes are reached.
         """
         is_target = np.zeros(self.nodes, dtype=bool)
         if targets is not None:
             is_target[targets] = True
         distance = np.full(self.nodes, np.inf)
         before, edge, source = np.full((3, self.nodes), -1)
-        find_paths(*self._beside, self.ends, self.costs, sources, is_target, distance, before, edge, source)
+        find_paths(*self._incident, self.ends, self.costs, sources, is_target, distance, before, edge, source)
         return Paths(distance, before, edge, source)
 
     def minimum_spanning_tree(self) -> IntArray:
-        """Return the edges of a minimum spanning forest; of equally dear ones the first."""
+        """Return the edges of a minimum spanning forest, ascending; among edges of equal cost, the first is taken."""
         order = np.argsort(self.costs, kind="stable")
         return np.sort(order[grow_forest(self.ends[order], self.nodes)])
 
@@ -93,11 +93,17 @@ def find_paths(
     edge: IntArray,
     source: IntArray,
 ) -> None:
-    """Fill distances (infinite on entry), and what `Paths` has beside them (-1), as far as the nearest target.
+    """Write the shortest paths up to the nearest target, by Dijkstra's algorithm.
 
     E. W. Dijkstra, "A note on two problems in connexion with graphs", 1959.
 
-    starts, sides: of the edges at each node, see `edges_at_nodes`.
+    Args:
+        starts, sides: incident edges of the nodes, see `edges_at_nodes`.
+        ends, costs: (e, 2) the nodes and (e,) the cost of each edge.
+        sources: (s,) nodes.
+        is_target: (n,) whether a node is a target.
+        distance: (n,) infinite on entry; see `Paths`.
+        before, edge, source: (n,) -1 on entry; see `Paths`.
     """
     keys, items = np.empty(len(sides) + len(sources)), np.empty(len(sides) + len(sources), np.int64)
     size = 0
@@ -123,7 +129,7 @@ def find_paths(
 
 @compiled
 def push(keys: FloatArray, items: IntArray, size: int, key: float, item: int) -> int:
-    """Put an item on a heap, four below each, and return its new size."""
+    """Insert an item into a 4-ary heap; return the new size of the heap."""
     i = size
     while i > 0:
         parent = (i - 1) >> 2
@@ -139,7 +145,7 @@ def push(keys: FloatArray, items: IntArray, size: int, key: float, item: int) ->
 
 @compiled
 def drop_first(keys: FloatArray, items: IntArray, size: int) -> int:
-    """Take the least item off a heap and return its new size."""
+    """Remove the smallest item from a 4-ary heap; return the new size of the heap."""
     size -= 1
     key, item = keys[size], items[size]
     i = 0

@@ -1,4 +1,4 @@
-"""Triangle meshes: connectivity, checks and repair, cutting open, what a user says of vertices and edges."""
+"""Triangle meshes: connectivity, checks and repair, cutting open, charts and seams of UVs."""
 
 from .charts import point_seams, point_vertices, uv_seams
 from .check import REPAIR_ADVICE, CheckedMesh

@@ -1,4 +1,4 @@
-"""Charts of a mesh whose triangle corners have points in the plane, and the seams between and within them."""
+"""Charts of a mesh whose triangle corners have points in the plane, and the seams between and within charts."""
 
 from __future__ import annotations
 
@@ -12,16 +12,21 @@ from ..base.compiled import compiled
 from ..base.sets import number_sets, unite
 from .connectivity import TriangleMesh, end_corners
 
-# UV distance over UV edge length at which two sides of an edge count as one.
+# Largest UV distance, relative to the UV edge length, at which the two sides of an edge count as joined.
 JOIN_TOLERANCE = 1e-6
 
 Values = TypeVar("Values", FloatArray, IntArray)
 
 
 def both_sides(mesh: TriangleMesh, edges: IntArray, at_corners: Values) -> tuple[Values, Values]:
-    """Return values (k, 2, ...) at the ends of inner edges as each of their two faces has them, in one order.
+    """Return the values (k, 2, ...) at the ends of inner edges in the first and in the second face of each edge.
 
-    at_corners: (m, 3, ...).
+    Both have the same order of ends.
+
+    Args:
+        mesh: the mesh.
+        edges: (k,) inner edges.
+        at_corners: (m, 3, ...) values at the corners.
     """
     flat = at_corners.reshape(-1, *at_corners.shape[2:])
     one, two = (end_corners(mesh.edge_halfedges[edges, side]) for side in (0, 1))
@@ -29,9 +34,12 @@ def both_sides(mesh: TriangleMesh, edges: IntArray, at_corners: Values) -> tuple
 
 
 def point_seams(mesh: TriangleMesh, corners: IntArray, among: IntArray | None = None) -> IntArray:
-    """Return the inner edges whose two sides have different points; `corners` (m, 3) numbers those of the corners.
+    """Return the inner edges whose two sides have different points.
 
-    among: edges among which they are; None for all.
+    Args:
+        mesh: the mesh.
+        corners: (m, 3) the point at each corner.
+        among: edges to choose from; None: all.
     """
     corners = np.ascontiguousarray(corners)
     if among is not None:
@@ -40,33 +48,33 @@ def point_seams(mesh: TriangleMesh, corners: IntArray, among: IntArray | None = 
 
 
 def point_vertices(faces: IntArray, corners: IntArray, count: int) -> IntArray:
-    """Return (u,) the vertex of each of so many points; faces, corners: (m, 3) the vertex and the point at corners."""
+    """Return (count,) the vertex of each point; faces, corners: (m, 3) the vertex and the point at each corner."""
     vertex = np.zeros(count, dtype=np.int64)
     vertex[corners.ravel()] = faces.ravel()
     return vertex
 
 
 def uv_seams(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
-    """Return the inner edges whose two sides lie apart in the plane; `corner_uv` is (m, 3, 2)."""
+    """Return the inner edges whose two sides do not coincide in the plane; `corner_uv` is (m, 3, 2)."""
     return np.flatnonzero(~joined_edges(mesh, corner_uv) & ~mesh.is_boundary_edge)
 
 
 def joined_edges(mesh: TriangleMesh, corner_uv: FloatArray) -> BoolArray:
-    """Return (e,) True for inner edges whose two sides lie on each other in the plane; `corner_uv` is (m, 3, 2)."""
+    """Return (e,) True for inner edges whose two sides coincide in the plane; `corner_uv` is (m, 3, 2)."""
     uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
     joined: BoolArray = find_joined(mesh.edge_halfedges, uv, JOIN_TOLERANCE)
     return joined
 
 
 def label_charts(mesh: TriangleMesh, joined: BoolArray) -> tuple[int, IntArray]:
-    """Return the number of charts, and (m,) the chart of each triangle; `joined` (e,) are inner edges within charts."""
+    """Return the number of charts, and (m,) the chart of each triangle; `joined` (e,) is True for edges in charts."""
     number, labels = label_across(mesh.edge_halfedges, joined, len(mesh.faces))
     return int(number), labels
 
 
 @compiled
 def label_across(edge_halfedges: IntArray, joined: BoolArray, count: int) -> tuple[int, IntArray]:
-    """Return how many sets of triangles hang together across joined edges (e,), and the set of each of `count`."""
+    """Return the number of components of `count` triangles connected across joined edges (e,), and that of each."""
     parent = np.arange(count)
     for e in range(len(joined)):
         if joined[e]:
@@ -76,11 +84,11 @@ def label_across(edge_halfedges: IntArray, joined: BoolArray, count: int) -> tup
 
 @compiled
 def find_split(edge_halfedges: IntArray, corners: IntArray) -> BoolArray:
-    """Return (e,) whether the two sides of each edge have different points at their ends; not so on the boundary.
+    """Return (e,) whether the two sides of each edge have different points at their ends; False on the boundary.
 
     Args:
-        edge_halfedges: (e, 2) the half-edges of each edge, which run opposite ways; -1 on the boundary.
-        corners: (m, 3) numbers of points.
+        edge_halfedges: (e, 2) the half-edges of each edge, of opposite directions; -1 on the boundary.
+        corners: (m, 3) the point at each corner.
     """
     split = np.zeros(len(edge_halfedges), np.bool_)
     for e in range(len(edge_halfedges)):
@@ -96,12 +104,12 @@ def find_split(edge_halfedges: IntArray, corners: IntArray) -> BoolArray:
 
 @compiled
 def find_joined(edge_halfedges: IntArray, corner_uv: FloatArray, near: float) -> BoolArray:
-    """Return (e,) whether the two sides of each edge have the same ends in the plane; not so on the boundary.
+    """Return (e,) whether the two sides of each edge have the same ends in the plane; False on the boundary.
 
     Args:
-        edge_halfedges: (e, 2) the half-edges of each edge, which run opposite ways; -1 on the boundary.
-        corner_uv: (m, 3, 2).
-        near: how far ends may be apart, as a share of the longer side.
+        edge_halfedges: (e, 2) the half-edges of each edge, of opposite directions; -1 on the boundary.
+        corner_uv: (m, 3, 2) positions of the corners.
+        near: largest distance of coinciding ends, relative to the longer side.
     """
     joined = np.zeros(len(edge_halfedges), np.bool_)
     for e in range(len(edge_halfedges)):

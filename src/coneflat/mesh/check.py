@@ -1,4 +1,4 @@
-"""What a mesh must be, the errors that say what is wrong and where, and the repair."""
+"""Checks that a mesh is valid, with errors that state what is wrong and where, and its repair."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ LEFT_OUT, FACELESS = "Left out ", " without a face."
 
 @dataclass(frozen=True, eq=False)
 class CheckedMesh:
-    """A mesh that can be flattened, and how it came from the input.
+    """A mesh that can be flattened, with its relation to the input.
 
     Attributes:
         mesh: manifold, consistently oriented, without isolated vertices.
-        vertex_origin: (n,) the input vertex of each of its vertices.
-        face_origin: (m,) the input face of each of its faces.
+        vertex_origin: (n,) the input vertex of each vertex of the mesh.
+        face_origin: (m,) the input face of each face of the mesh.
         is_turned: (m,) True for faces whose orientation was reversed (corners 1 and 2 exchanged).
-        notes: what was done, one sentence each.
-        exponent: the mesh has been scaled by two to the power of this.
+        notes: the changes that were made, one sentence each.
+        exponent: the mesh has been scaled by two to the power of this number.
     """
 
     mesh: TriangleMesh
@@ -57,16 +57,19 @@ class CheckedMesh:
 
 
 def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -> CheckedMesh:
-    """Return the mesh in the form that the rest of the package relies on, or say why it cannot be.
+    """Return the mesh as a checked manifold with consistent orientation; raise an error if that is impossible.
 
-    Orientation is made consistent and isolated vertices are left out, with a note.
+    Faces are oriented consistently and isolated vertices are left out; notes report both.
 
     Args:
         vertices: (n, 3) positions.
         faces: (m, 3) vertex indices, from 0.
         repair: drop faces that use a vertex twice and faces given twice, split non-manifold edges and
-            vertices, cut non-orientable surfaces, instead of refusing them. A mesh that would not be refused is
-            left as it is.
+            vertices, and cut non-orientable surfaces, instead of raising an error. A mesh that raises no error is not
+            changed.
+
+    Returns:
+        The mesh, and how its vertices and faces correspond to the input.
 
     Raises:
         EmptyMeshError, ArrayShapeError, NonFiniteError, FaceIndexError: the arrays are not a mesh.
@@ -95,12 +98,12 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -
 
 
 def left_out(count: int) -> str:
-    """Return the note that vertices belong to no face."""
+    """Return the note that vertices without a face were left out."""
     return f"{LEFT_OUT}{plural(count, 'vertex', 'vertices')}{FACELESS}"
 
 
 def is_left_out(note: str) -> bool:
-    """Return whether a note is `left_out`'s."""
+    """Return whether a note was made by `left_out`."""
     return note.startswith(LEFT_OUT) and note.endswith(FACELESS)
 
 
@@ -120,9 +123,9 @@ def _as_vertices(vertices: ArrayLike) -> FloatArray:
 
 
 class _Check:
-    """The faces on their way to a manifold, with a record of what happened to them.
+    """The state of a mesh during the check, with a record of the changes.
 
-    The steps build on one another and run in the order in which they stand here.
+    The steps depend on one another and run in the order of the methods.
     """
 
     def __init__(self, vertices: FloatArray, faces: IntArray, repair: bool) -> None:
@@ -137,7 +140,7 @@ class _Check:
         self.pairing: tuple[IntArray, IntArray, IntArray] | None = None
 
     def run(self) -> CheckedMesh:
-        """Take all steps."""
+        """Run all steps and return the checked mesh."""
         self.drop_degenerate_faces()
         if self.is_manifold():
             return self.finish()
@@ -154,7 +157,11 @@ class _Check:
             raise EmptyMeshError("the mesh has no faces left once degenerate ones are dropped")
 
     def drop_degenerate_faces(self) -> None:
-        """Refuse or drop faces that use a vertex twice; drop faces given twice in a repair."""
+        """Drop faces that use a vertex twice, and faces given twice, if the mesh is repaired.
+
+        Raises:
+            DegenerateFaceError: a face uses a vertex twice and the mesh is not repaired.
+        """
         one, two, three = self.faces.T
         bad = (one == two) | (two == three) | (three == one)
         if bad.any():
@@ -175,7 +182,7 @@ class _Check:
                 self._keep(keep)
 
     def is_manifold(self) -> bool:
-        """Whether the faces are one as they stand, as most are: then there is nothing to do."""
+        """Return whether the faces form an oriented manifold already, as in most meshes; then nothing is to be done."""
         *pairing, is_plain = pair_sides(self.faces, len(self.vertices))
         if not is_plain or not has_one_fan_each(self.faces, len(self.vertices), *pairing[1:]):
             return False
@@ -183,7 +190,11 @@ class _Check:
         return True
 
     def pair_halfedges(self) -> None:
-        """Find the pairs of half-edges (k, 2) that are glued; edges of three or more faces are not."""
+        """Find the pairs (k, 2) of half-edges that are glued; those of edges with three or more faces are not.
+
+        Raises:
+            NonManifoldError: an edge has more than two faces and the mesh is not repaired.
+        """
         tails, heads = self.faces[:, NEXT].ravel(), self.faces[:, PREVIOUS].ravel()
         order, is_first = sort_pairs(tails, heads, len(self.vertices))
         starts = np.flatnonzero(is_first)
@@ -202,7 +213,11 @@ class _Check:
         self.pairs = np.stack([order[double], order[double + 1]], axis=1)
 
     def orient(self) -> None:
-        """Turn faces so that neighbours agree, the fewest of each component."""
+        """Flip faces so that neighbours have the same orientation; in each component, the smaller set is flipped.
+
+        Raises:
+            NonOrientableError: the surface is not orientable and the mesh is not repaired.
+        """
         count = len(self.faces)
         tails = self.faces[:, NEXT].ravel()
         same_way = tails[self.pairs[:, 0]] == tails[self.pairs[:, 1]]
@@ -211,7 +226,7 @@ class _Check:
         pairs = self.pairs // 3
         one, two = pairs.T
         tree = np.flatnonzero(grow_forest(pairs, count))
-        # Two copies of each face, one for each orientation; a tree joins them to two mirrored halves.
+        # There are two copies of each face, one per orientation; a spanning tree joins them to two mirrored halves.
         crossing = same_way[tree] * count
         first, second = one[tree], two[tree]
         _, half = label_components(
@@ -219,39 +234,45 @@ class _Check:
             np.concatenate([first, first + count]),
             np.concatenate([second + crossing, second + count - crossing]),
         )
-        turn = half[:count] > half[count:]
-        conflict = same_way ^ turn[one] ^ turn[two]
+        flip = half[:count] > half[count:]
+        conflict = same_way ^ flip[one] ^ flip[two]
         if conflict.any():
             if not self.repair:
                 raise NonOrientableError(
-                    "the surface has one side only, like a Moebius strip: its faces cannot be oriented to "
-                    f"agree (edge {self._edge_name(int(np.flatnonzero(conflict)[0]))}); "
+                    "the surface is not orientable, like a Moebius strip: its faces cannot be oriented "
+                    f"consistently (edge {self._edge_name(int(np.flatnonzero(conflict)[0]))}); "
                     f"{REPAIR_ADVICE} to cut it open"
                 )
             self.pairs = self.pairs[~conflict]
-            self.notes.append(f"Cut the one-sided surface at {plural(int(conflict.sum()), 'edge')}.")
+            self.notes.append(f"Cut the non-orientable surface at {plural(int(conflict.sum()), 'edge')}.")
         components, component = label_components(count, one[tree], two[tree])
         sizes = np.bincount(component, minlength=components)
-        turned = np.bincount(component, weights=turn, minlength=components)
-        turn ^= (turned > sizes / 2)[component]
-        self._turn(turn)
+        flipped = np.bincount(component, weights=flip, minlength=components)
+        flip ^= (flipped > sizes / 2)[component]
+        self._flip(flip)
 
     def _edge_name(self, pair: int) -> str:
         h = self.pairs[pair, 0]
         ends = sorted((int(self.faces[h // 3, NEXT[h % 3]]), int(self.faces[h // 3, PREVIOUS[h % 3]])))
         return f"{ends[0]}-{ends[1]}"
 
-    def _turn(self, turn: BoolArray) -> None:
-        self.faces = np.where(turn[:, None], self.faces[:, [0, 2, 1]], self.faces)
-        self.is_turned ^= turn
+    def _flip(self, flip: BoolArray) -> None:
+        self.faces = np.where(flip[:, None], self.faces[:, [0, 2, 1]], self.faces)
+        self.is_turned ^= flip
         corner = self.pairs % 3
         exchanged = np.where(corner == 0, 0, 3 - corner)
-        self.pairs = np.where(turn[self.pairs // 3], self.pairs - corner + exchanged, self.pairs)
-        if turn.any():
-            self.notes.append(f"Turned {plural(int(turn.sum()), 'face')} to agree with the rest.")
+        self.pairs = np.where(flip[self.pairs // 3], self.pairs - corner + exchanged, self.pairs)
+        if flip.any():
+            self.notes.append(
+                f"Flipped {plural(int(flip.sum()), 'face')} to make the orientation consistent."
+            )
 
     def split_fans(self) -> None:
-        """Refuse or split vertices with more than one fan of faces; leave out isolated vertices."""
+        """Split vertices with more than one fan of faces if the mesh is repaired; leave out isolated vertices.
+
+        Raises:
+            NonManifoldError: a vertex has more than one fan and the mesh is not repaired.
+        """
         fans, fan = corner_fans(self.faces, *self.pairs.T)
         origin = np.empty(fans, dtype=np.int64)
         origin[fan] = self.faces
@@ -267,7 +288,7 @@ class _Check:
             self.notes.append(f"Split {plural(len(split), 'non-manifold vertex', 'non-manifold vertices')}.")
         if isolated:
             self.notes.append(left_out(isolated))
-        # Numbered as the input is, the parts of a split vertex one after the other.
+        # Vertices are numbered in the order of the input; the copies of a split vertex follow one another.
         order = sort_by_counting(origin, len(self.vertices))
         rank = np.empty(fans, dtype=np.int64)
         rank[order] = np.arange(fans)
@@ -275,28 +296,28 @@ class _Check:
         self.faces = rank[fan]
 
     def finish(self) -> CheckedMesh:
-        """Return the result."""
+        """Return the checked mesh with its relation to the input."""
         mesh = TriangleMesh(self.vertices[self.vertex_origin], self.faces)
         if self.pairing is not None:
-            mesh.__dict__["_pairing"] = self.pairing  # the mesh's own, which it need not find again
+            mesh.__dict__["_pairing"] = self.pairing  # cached, so that the mesh does not compute it again
         return CheckedMesh(mesh, self.vertex_origin, self.face_origin, self.is_turned, tuple(self.notes))
 
 
 def weld(vertices: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return which vertices to keep and what every vertex becomes.
+    """Return the vertices that remain after vertices of equal position are merged, and the new index of each vertex.
 
-    Two vertices are merged when their coordinates are equal bit for bit, -0.0 being taken as 0.0.
+    Two vertices are merged if their coordinates are equal bit for bit, except that -0.0 equals 0.0.
 
     Args:
         vertices: (n, k) positions.
 
     Returns:
-        (p,) the first vertex of each position, ascending; (n,) index into those of every vertex.
+        (p,) the first vertex at each position, ascending; (n,) the index of every vertex into these.
     """
     rows = np.ascontiguousarray(vertices, dtype=np.float64) + 0.0
-    # As one value of so many bytes each, rows are sorted several times as fast as by columns.
-    whole = rows.view(f"V{rows.itemsize * rows.shape[1]}").reshape(-1)
-    _, first, number = np.unique(whole, return_index=True, return_inverse=True)
+    # Rows that are viewed as one value of bytes are sorted several times faster than by columns.
+    rows_as_bytes = rows.view(f"V{rows.itemsize * rows.shape[1]}").reshape(-1)
+    _, first, number = np.unique(rows_as_bytes, return_index=True, return_inverse=True)
     order = np.argsort(first)
     place = np.empty_like(order)
     place[order] = np.arange(len(order))

@@ -1,8 +1,8 @@
 """Triangle meshes and their connectivity.
 
-Half-edge `h = 3 * f + i` is the side of face `f` opposite its corner `i`: it runs from corner `i + 1` to
-corner `i + 2` (mod 3). So everything that belongs to a side (length, cotangent, twin) has the index of
-the corner it lies opposite to.
+Half-edge `h = 3 * f + i` is the side of face `f` opposite its corner `i`. It runs from corner `i + 1` to
+corner `i + 2` (mod 3). Every quantity of a side (length, cotangent, twin) therefore has the index of the
+opposite corner.
 """
 
 from __future__ import annotations
@@ -20,12 +20,17 @@ from ..base.sets import edges_at_nodes, label_nodes
 
 NEXT = np.array([1, 2, 0])
 PREVIOUS = np.array([2, 0, 1])
-# What is kept with a mesh and depends on its faces alone.
+# Cached properties of a mesh that depend on its faces only.
 CONNECTIVITY = ("_pairing", "tails", "heads", "is_boundary_edge", "is_boundary_vertex", "edges_beside")
 
 
 def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
-    """Return the number of connected components of a graph and the component of each of its nodes."""
+    """Return the number of connected components of a graph, and (count,) the component of each node.
+
+    Args:
+        count: number of nodes.
+        tails, heads: (e,) the nodes that each edge connects.
+    """
     number, labels = label_nodes(
         count, *(np.ascontiguousarray(ends, dtype=np.int64) for ends in (tails, heads))
     )
@@ -33,19 +38,19 @@ def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int,
 
 
 def label_faces(faces: IntArray, count: int) -> tuple[int, IntArray]:
-    """Return how many sets of points hang together, and (m,) the set of each triangle: the charts, in the plane.
+    """Return the number of connected components of triangles, and (m,) the component of each: the charts of UVs.
 
     Args:
         faces: (m, 3) indices of points.
-        count: of all points; those of no triangle are sets of their own.
+        count: number of all points; each point without a triangle is a component of its own.
     """
     number, labels = label_components(count, faces[:, :2].reshape(-1), np.repeat(faces[:, 2], 2))
     return number, labels[faces[:, 0]]
 
 
 def sort_by_counting(keys: IntArray, bound: int) -> IntArray:
-    """Return the stable order of integers from 0 up to a bound, in linear time."""
-    # To turn rows into columns, SciPy counts.
+    """Return the stable order (k,) of integers (k,) from 0 to bound - 1, in linear time."""
+    # SciPy converts rows to columns by a counting sort.
     count = len(keys)
     rows = csr_matrix((np.empty(count, dtype=np.int8), keys, np.arange(count + 1)), shape=(count, bound))
     order: IntArray = rows.tocsc().indices
@@ -53,7 +58,15 @@ def sort_by_counting(keys: IntArray, bound: int) -> IntArray:
 
 
 def sort_pairs(one: IntArray, two: IntArray, bound: int) -> tuple[IntArray, BoolArray]:
-    """Return the stable order of unordered pairs, by the smaller index first, and where in it each pair comes first."""
+    """Return the stable order of unordered pairs by smaller, then larger index, and a mask of first occurrences.
+
+    Args:
+        one, two: (k,) the indices of each pair, from 0 to bound - 1.
+        bound: number of indices.
+
+    Returns:
+        (k,) the order; (k,) True where a pair in this order differs from the one before.
+    """
     low, high = np.minimum(one, two), np.maximum(one, two)
     order: IntArray = np.argsort(low * np.int64(bound) + high, kind="stable")
     first = np.ones(len(order), dtype=bool)
@@ -65,8 +78,8 @@ def sort_pairs(one: IntArray, two: IntArray, bound: int) -> tuple[IntArray, Bool
 class TriangleMesh:
     """A manifold, consistently oriented triangle mesh without isolated vertices.
 
-    The arrays are kept as they are, without a copy, and nothing is checked: neither their types and shapes nor that
-    the mesh is a manifold. `coneflat.check_mesh` makes one out of arbitrary arrays, or says why it cannot.
+    The arrays are stored without a copy. Types, shapes and manifoldness are not checked; `coneflat.check_mesh` makes
+    a mesh from arbitrary arrays, or raises an error that states why it cannot.
 
     Attributes:
         vertices: (n, 3) positions, float64, in model units.
@@ -89,23 +102,23 @@ class TriangleMesh:
         return pairs, edge_of, sides
 
     def moved_to(self, vertices: FloatArray) -> TriangleMesh:
-        """Return the mesh with its vertices elsewhere, (n, 3); edges that have been found need not be found again."""
+        """Return the mesh with other vertex positions (n, 3); cached connectivity is shared."""
         moved, known = TriangleMesh(vertices, self.faces), self.__dict__
         moved.__dict__.update({name: known[name] for name in CONNECTIVITY if name in known})
         return moved
 
     @cached_property
     def tails(self) -> IntArray:
-        """(3m,) vertex that each half-edge starts from."""
-        return _turned(self.faces, NEXT)
+        """(3m,) start vertex of each half-edge."""
+        return _permuted(self.faces, NEXT)
 
     @cached_property
     def heads(self) -> IntArray:
-        """(3m,) vertex that each half-edge ends at."""
-        return _turned(self.faces, PREVIOUS)
+        """(3m,) end vertex of each half-edge."""
+        return _permuted(self.faces, PREVIOUS)
 
     def ends_of(self, halfedges: IntArray) -> tuple[IntArray, IntArray]:
-        """Return the vertices that some half-edges start from and end at; those of all need not be listed for it."""
+        """Return the start and end vertices of given half-edges, without computing those of all half-edges."""
         flat = self.faces.ravel()
         start, end = end_corners(halfedges)
         return flat[start], flat[end]
@@ -127,7 +140,7 @@ class TriangleMesh:
 
     @cached_property
     def edge_faces(self) -> IntArray:
-        """(e, 2) the faces beside each edge; the second is -1 on the boundary."""
+        """(e, 2) the faces of each edge; the second is -1 on the boundary."""
         return self.edge_halfedges // 3  # -1 stays -1
 
     @cached_property
@@ -144,12 +157,12 @@ class TriangleMesh:
 
     @cached_property
     def edges_beside(self) -> tuple[IntArray, IntArray]:
-        """Where the edges at each vertex begin, (n + 1,), and these edges, (2e,)."""
+        """Incident edges of the vertices: where those of each vertex start, (n + 1,), and the edges, (2e,)."""
         return edges_at_nodes(self.edges, len(self.vertices))
 
     @cached_property
     def boundary_loops(self) -> tuple[int, IntArray]:
-        """The number of boundary loops, and the loop of each vertex (n,), -1 inside."""
+        """The number of boundary loops, and (n,) the loop of each vertex; -1 at inner vertices."""
         on_boundary = np.flatnonzero(self.is_boundary_vertex)
         local = np.full(len(self.vertices), -1, dtype=np.int64)
         local[on_boundary] = np.arange(len(on_boundary))
@@ -159,7 +172,7 @@ class TriangleMesh:
         return count, local
 
     def boundary_walk(self) -> IntArray:
-        """Return (b,) the half-edges of the one boundary loop in order, with the mesh to the left."""
+        """Return (b,) the half-edges of the boundary in order, the mesh on the left; there must be one loop."""
         sides = self.edge_halfedges[self.is_boundary_edge, 0]
         leaving = np.empty(len(self.vertices), dtype=np.int64)
         tails, heads = self.ends_of(sides)
@@ -172,7 +185,7 @@ class TriangleMesh:
 
     @cached_property
     def components(self) -> tuple[int, IntArray]:
-        """The number of connected components, and the component of each vertex (n,)."""
+        """The number of connected components, and (n,) the component of each vertex."""
         return label_components(len(self.vertices), self.edges[:, 0], self.edges[:, 1])
 
     @property
@@ -185,7 +198,7 @@ class TriangleMesh:
         return (2 - self.euler_characteristic - self.boundary_loops[0]) // 2
 
     def split_components(self) -> list[tuple[TriangleMesh, IntArray, IntArray]]:
-        """Return each component as a mesh of its own, with its vertex and face indices in this mesh."""
+        """Return each component as a separate mesh, with its vertex and face indices in this mesh."""
         count, labels = self.components
         if count == 1:
             return [(self, np.arange(len(self.vertices)), np.arange(len(self.faces)))]
@@ -203,28 +216,27 @@ class TriangleMesh:
         return parts
 
 
-def _turned(faces: IntArray, columns: IntArray) -> IntArray:
-    """Return (3m,) other columns (3,) of faces (m, 3), one by one: NumPy is slow at picking several."""
-    turned = np.empty(faces.shape, dtype=np.int64)
+def _permuted(faces: IntArray, columns: IntArray) -> IntArray:
+    """Return (3m,) faces with permuted columns; copied column by column, as NumPy is slow at indexing several."""
+    permuted = np.empty(faces.shape, dtype=np.int64)
     for i, column in enumerate(columns):
-        turned[:, i] = faces[:, column]
-    return turned.ravel()
+        permuted[:, i] = faces[:, column]
+    return permuted.ravel()
 
 
 def corner_fans(faces: IntArray, one: IntArray, two: IntArray) -> tuple[int, IntArray]:
-    """Join the corners that meet across pairs of half-edges.
+    """Return the number of fans, and (m, 3) the fan of each corner; corners joined across half-edges share a fan.
 
     Args:
         faces: (m, 3) vertex indices.
         one, two: (k,) half-edges glued to each other, on the same pair of vertices.
 
     Returns:
-        The number of fans (classes of joined corners) and the fan of each corner (m, 3). Gluing along all
-        interior edges, a vertex of a manifold has one fan; leaving seams unglued, the fans are the
-        vertices of the cut mesh.
+        The number of fans (classes of joined corners) and the fan of each corner (m, 3). If all interior edges are
+        glued, a vertex of a manifold has one fan. If seams are not glued, the fans are the vertices of the cut mesh.
     """
     flat = faces.ravel()
-    # A half-edge's end corners, ordered so that both sides name the same vertex first.
+    # The end corners of both half-edges, ordered so that the same vertex comes first.
     start_one, end_one = end_corners(one)
     start_two, end_two = end_corners(two)
     opposed = flat[start_one] == flat[end_two]
@@ -236,23 +248,24 @@ def corner_fans(faces: IntArray, one: IntArray, two: IntArray) -> tuple[int, Int
 
 
 def end_corners(halfedges: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the corners, numbered along `faces.ravel()`, that half-edges start from and end at."""
+    """Return the start and end corners of half-edges, as indices into `faces.ravel()`."""
     corner = halfedges % 3
     base = halfedges - corner
     return base + NEXT[corner], base + PREVIOUS[corner]
 
 
-# Sides of so many edges from one vertex are sorted by insertion, more by merging: quicksort takes n^2 around a hub.
-FEW_SIDES = 64
+# Up to this number, keys are sorted by insertion; more are sorted by merging, as quicksort is quadratic around vertices
+# of high valence.
+MAX_INSERTION_SORT = 64
 
 
 @compiled
 def pair_sides(faces: IntArray, count: int) -> tuple[IntArray, IntArray, IntArray, bool]:
-    """Return the edges between `count` vertices, in the order of their ends, and the half-edges of each.
+    """Return the edges of faces between `count` vertices, in the order of their ends, and the half-edges of each.
 
     Returns:
         (e, 2) the ends, the smaller index first; (3m,) the edge of each half-edge; (e, 2) the half-edges of each edge,
-        the second -1 if there is one alone; and whether all edges have one half-edge, or two that run opposite ways.
+        the second -1 if there is only one; and whether all edges have one half-edge, or two of opposite directions.
     """
     size, bits = 3 * len(faces), 1
     while 2**bits < size:
@@ -264,7 +277,7 @@ def pair_sides(faces: IntArray, count: int) -> tuple[IntArray, IntArray, IntArra
     for v in range(count):
         starts[v + 1] += starts[v]
     place = starts[:-1].copy()
-    # Of each half-edge from or to a vertex of larger index: that, and the half-edge itself.
+    # For each half-edge, listed at its end of smaller index: the other end in the high bits, the half-edge in the low.
     keys = np.empty(size, dtype=np.int64)
     for f in range(len(faces)):
         for i in range(3):
@@ -274,7 +287,7 @@ def pair_sides(faces: IntArray, count: int) -> tuple[IntArray, IntArray, IntArra
             place[low] += 1
     edges = 0
     for v in range(count):
-        sort_few(keys[starts[v] : starts[v + 1]])
+        sort_keys(keys[starts[v] : starts[v + 1]])
         last = -1
         for at in range(starts[v], starts[v + 1]):
             edges += keys[at] >> bits != last
@@ -299,9 +312,9 @@ def pair_sides(faces: IntArray, count: int) -> tuple[IntArray, IntArray, IntArra
 
 
 @compiled
-def sort_few(keys: IntArray) -> None:
-    """Sort different numbers, mostly few, in place."""
-    if len(keys) > FEW_SIDES:
+def sort_keys(keys: IntArray) -> None:
+    """Sort distinct integers (k,) in place; fast if there are few."""
+    if len(keys) > MAX_INSERTION_SORT:
         keys[:] = keys[np.argsort(keys, kind="mergesort")]
         return
     for at in range(1, len(keys)):
@@ -314,10 +327,10 @@ def sort_few(keys: IntArray) -> None:
 
 @compiled
 def has_one_fan_each(faces: IntArray, count: int, edge_of: IntArray, sides: IntArray) -> bool:
-    """Return whether the faces at each of `count` vertices follow one another across edges, and there are some.
+    """Return whether every vertex has faces, and these form a single fan across edges.
 
     Args:
-        faces: (m, 3), oriented alike.
+        faces: (m, 3), consistently oriented.
         count: number of vertices.
         edge_of, sides: (3m,) the edge of each half-edge, and (e, 2) the half-edges of each edge, one or two.
     """
@@ -330,7 +343,7 @@ def has_one_fan_each(faces: IntArray, count: int, edge_of: IntArray, sides: IntA
         if corner[vertex] < 0:
             return False
         seen = 0
-        # Around it one way, and from where that ends at a border, the other way.
+        # Walk around the vertex in one direction, and if that ends at the boundary, in the other direction.
         for turn in (1, 2):
             here = corner[vertex]
             while here >= 0:
@@ -343,7 +356,7 @@ def has_one_fan_each(faces: IntArray, count: int, edge_of: IntArray, sides: IntA
                     break
             if here == corner[vertex]:
                 break
-            seen -= turn == 1  # the corner begun at counts once
+            seen -= turn == 1  # the first corner counts once
         if seen != valence[vertex]:
             return False
     return True
@@ -351,7 +364,7 @@ def has_one_fan_each(faces: IntArray, count: int, edge_of: IntArray, sides: IntA
 
 @compiled
 def measure_sides(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (m, 3) the lengths of sides, each opposite a corner; the same bits from both ends."""
+    """Return (m, 3) side lengths, each opposite a corner; both sides of an edge get the same bits."""
     lengths = np.empty(faces.shape)
     for f in range(len(faces)):
         for i in range(3):

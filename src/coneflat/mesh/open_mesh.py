@@ -1,4 +1,4 @@
-"""Cutting a mesh along seams."""
+"""Cutting a mesh open along seams."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .connectivity import TriangleMesh, label_components
 
 @dataclass(frozen=True, eq=False)
 class CutMesh:
-    """A mesh opened along seams.
+    """A mesh that was cut open along seams.
 
     Attributes:
-        mesh: the cut mesh; its faces are those of the mesh before the cut, in the same order.
-        origin: (c,) the vertex before the cut of each of its vertices; ascending.
+        mesh: the cut mesh; its faces are those of the original mesh, in the same order.
+        origin: (c,) the vertex of the original mesh of each vertex; ascending.
     """
 
     mesh: TriangleMesh
@@ -27,14 +27,14 @@ class CutMesh:
 
 
 def cut_open(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
-    """Cut a connected mesh along edges to disks.
+    """Return a connected mesh cut along edges into disks.
 
     Args:
         mesh: the mesh.
         seams: (k,) edges, none of them on the boundary.
 
     Raises:
-        MetricError: the seams do not open the mesh to disks.
+        MetricError: a component of the cut mesh is not a disk.
     """
     cut = open_along(mesh, seams)
     sides = np.concatenate(
@@ -42,20 +42,20 @@ def cut_open(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
     )
     border, ends = np.unique(cut.mesh.ends_of(sides), return_inverse=True)
     loops, _ = label_components(len(border), *ends.reshape(2, -1))
-    # Pieces all have borders, so there is one if there is one border.
+    # Every component has a boundary, so a single boundary loop implies a single component.
     pieces = cut.mesh.components[0] if loops > 1 else 1
     euler = len(cut.origin) - (len(mesh.edges) + len(seams)) + len(mesh.faces)
-    # A slit of one edge has the same vertices on both sides, which makes it none.
+    # A slit of a single edge has the same vertices on both sides, so it does not open the mesh.
     if euler != pieces or loops != pieces or len(sides) == 2:
         raise MetricError(
-            f"cutting along {plural(len(seams), 'edge')} leaves no disk: Euler characteristic {euler}, "
+            f"cutting along {plural(len(seams), 'edge')} does not give disks: Euler characteristic {euler}, "
             f"{plural(loops, 'boundary loop')}"
         )
     return cut
 
 
 def open_along(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
-    """Return a mesh whose faces are not joined at given edges (k,); vertices are numbered as before, in their order."""
+    """Return a mesh cut open along given edges (k,); the copies of vertices are in the order of the vertices."""
     on_seam = np.zeros(len(mesh.vertices), dtype=bool)
     on_seam[mesh.edges[seams]] = True
     is_seam = np.zeros(len(mesh.edges), dtype=bool)
@@ -79,11 +79,11 @@ def number_copies(
     """Number the copies of each vertex on a seam, from 0, in the order of their first corners.
 
     Args:
-        faces: (m, 3), oriented alike.
+        faces: (m, 3), consistently oriented.
         edge_of, sides: (3m,) the edge of each half-edge, and (e, 2) the half-edges of each edge.
         is_seam: (e,) the edges across which faces are not joined.
-        copies: (n,) 0 at the vertices on seams, 1 elsewhere; gets the number of copies.
-        number: (m, 3) 0; gets the copy at each corner.
+        copies: (n,) 0 at the vertices on seams and 1 elsewhere on entry; the number of copies on return.
+        number: (m, 3) 0 on entry; the copy at each corner on return.
     """
     is_done = np.empty(3 * len(faces), np.bool_)
     for c in range(len(is_done)):
@@ -92,7 +92,7 @@ def number_copies(
         if is_done[first]:
             continue
         vertex = faces[first // 3, first % 3]
-        # Around it one way as far as that goes, and then the other way.
+        # Walk around the vertex in one direction up to a seam or boundary, then in the other direction.
         for turn in (1, 2):
             here = first
             while here >= 0 and (here == first or not is_done[here]):

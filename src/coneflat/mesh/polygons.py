@@ -1,4 +1,4 @@
-"""Polygons, and the triangles that they fall into."""
+"""Polygons and their triangulations."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 
 from ..base.arrays import BoolArray, IntArray
 
-#: Names of the properties that are a vertex's colour.
+#: Names of the properties that hold the colour of a vertex.
 COLOURS = ("red", "green", "blue")
 
 
 @dataclass(frozen=True, eq=False)
 class Polygons:
-    """The polygons that triangles make up.
+    """Polygons that are split into triangles.
 
     Attributes:
-        offsets: (p + 1,) the corners of polygon i are numbered from offsets[i] to offsets[i + 1].
-        corners: (m, 3) the polygon's corner at each triangle corner.
+        offsets: (p + 1,) the corners of polygon i have the numbers offsets[i] to offsets[i + 1] - 1.
+        corners: (m, 3) the polygon corner at each triangle corner.
     """
 
     offsets: IntArray
@@ -26,7 +26,7 @@ class Polygons:
 
     @property
     def sizes(self) -> IntArray:
-        """(p,) corners of each polygon."""
+        """(p,) number of corners of each polygon."""
         return np.diff(self.offsets)
 
     @property
@@ -36,15 +36,15 @@ class Polygons:
 
     @property
     def is_reversed(self) -> BoolArray:
-        """(p,) True for polygons whose triangles run the other way."""
+        """(p,) True for polygons whose triangles have the opposite orientation."""
         a, b, c = self.corners.T
         reversed_ = np.zeros(len(self.offsets) - 1, dtype=bool)
-        # Corners of a triangle that runs the polygon's way ascend but for one step back.
+        # The corners of a triangle with the polygon's orientation ascend, except for one step back.
         reversed_[self.owner] = (b < a).astype(np.int8) + (c < b) + (a < c) == 2
         return reversed_
 
     def loops(self) -> IntArray:
-        """Return (c,) the corners of each polygon, from its first on, in the order in which its triangles run."""
+        """Return (c,) the corners of each polygon, from its first, in the orientation of its triangles."""
         sizes = self.sizes
         start, size = np.repeat(self.offsets[:-1], sizes), np.repeat(sizes, sizes)
         step = np.arange(len(start)) - start
@@ -52,7 +52,7 @@ class Polygons:
         return loops
 
     def points(self, uv_faces: IntArray) -> IntArray:
-        """Return (c,) the point at each polygon corner; -1 where triangles have several there, or where there is none.
+        """Return (c,) the point at each polygon corner; -1 if its triangles have several points there, or none.
 
         uv_faces: (m, 3) the point of each triangle corner.
         """
@@ -62,22 +62,22 @@ class Polygons:
         return points
 
     def are_whole(self, points: IntArray) -> BoolArray:
-        """Return (p,) whether all triangles of a polygon are there, and none is cut off in the plane.
+        """Return (p,) whether a polygon has all its triangles, and no seam separates them in the plane.
 
-        points: (c,) what `points` returns.
+        points: (c,) as returned by `points`.
         """
         counts = np.bincount(self.owner, minlength=len(self.sizes))
-        whole: BoolArray = (counts == self.sizes - 2) & np.logical_and.reduceat(
+        complete: BoolArray = (counts == self.sizes - 2) & np.logical_and.reduceat(
             points >= 0, self.offsets[:-1]
         )
-        return whole
+        return complete
 
     def corner_triples(self, points: IntArray) -> tuple[IntArray, IntArray]:
-        """Return (k, 3) the points before, at and after each corner of whole polygons of four corners and more.
+        """Return (k, 3) the points before, at and after each corner of the complete polygons, and (k,) the polygon.
 
-        Triples run as the triangles do. Also (k,) the polygon of each.
+        Only polygons of four corners and more are included. Triples have the orientation of the triangles.
 
-        points: (c,) what `points` returns.
+        points: (c,) as returned by `points`.
         """
         sizes, loops = self.sizes, self.loops()
         polygon = np.repeat(np.arange(len(sizes)), sizes)
@@ -89,9 +89,9 @@ class Polygons:
 
 
 def fan_corners(offsets: IntArray) -> IntArray:
-    """Return (m, 3) the corners of the triangles that polygons fall into, all from the first corner of each.
+    """Return (m, 3) the polygon corners of the triangles if each polygon is split into a fan around its first corner.
 
-    offsets: (p + 1,) where the corners of each polygon begin.
+    offsets: (p + 1,) where the corners of each polygon start.
     """
     counts = np.diff(offsets) - 2
     first = np.repeat(offsets[:-1], counts)
@@ -100,18 +100,18 @@ def fan_corners(offsets: IntArray) -> IntArray:
 
 
 def polygon_of(face_corners: IntArray, offsets: IntArray) -> IntArray:
-    """Return (m,) the polygon that each triangle is a part of.
+    """Return (m,) the polygon that each triangle belongs to.
 
     Args:
         face_corners: (m, 3) polygon corner at each triangle corner.
-        offsets: (p + 1,) where the corners of each polygon begin.
+        offsets: (p + 1,) where the corners of each polygon start.
     """
     polygon: IntArray = np.searchsorted(offsets, face_corners[:, 0], side="right") - 1
     return polygon
 
 
 def first_bad_corner(corners: IntArray, vertex_count: int) -> int | None:
-    """Return the first of (c,) corners that names no vertex, if any does."""
+    """Return the index of the first of (c,) corners whose vertex does not exist, or None."""
     if corners.min(initial=0) >= 0 and corners.max(initial=-1) < vertex_count:
         return None
     return int(np.argmax((corners < 0) | (corners >= vertex_count)))

@@ -1,4 +1,4 @@
-"""Choices among equals that depend on the shape, not on the numbering."""
+"""Tie-breaking by the shape of the mesh, independent of the numbering of its vertices."""
 
 from __future__ import annotations
 
@@ -9,42 +9,42 @@ import numpy as np
 from ..base.arrays import FloatArray, dots
 from .connectivity import TriangleMesh
 
-# Relative to the range of the values: far above what rounding makes of equal ones, far below what tells others
-# apart.
+# Values that differ by less than this fraction of their range are equal. It is far above rounding errors, and far below
+# the differences of distinct values.
 EQUAL_TOLERANCE = 1e-9
 
 
-def _own_vectors(centred: FloatArray) -> tuple[FloatArray | None, FloatArray | None]:
-    """Return two unit vectors that turn with the shape, None for those that it is too symmetric to have.
+def _shape_vectors(centred: FloatArray) -> tuple[FloatArray | None, FloatArray | None]:
+    """Return two unit vectors that rotate with the shape; None for a vector that its symmetry leaves undefined.
 
     Args:
-        centred: (n, 3) vertices relative to their centre, at most 1 from it.
+        centred: (n, 3) vertices relative to their centre, at a distance of at most 1.
     """
     squares = dots(centred, centred)
     one, two = squares @ centred, squares**2 @ centred
     (a, b, c), (d, e, f) = one.tolist(), two.tolist()
     across = np.array([b * f - c * e, c * d - a * f, a * e - b * d])
     lengths = [math.sqrt(vector @ vector) for vector in (one, two, across)]
-    # What rounding leaves of vectors that vanish means nothing.
+    # Vectors that vanish up to rounding have no meaningful direction.
     has_one = lengths[0] > 1e-6 * len(centred)
     has_across = lengths[2] > 1e-6 * max(lengths[0] * lengths[1], 1e-12 * len(centred) ** 2)
     return one / lengths[0] if has_one else None, across / lengths[2] if has_across else None
 
 
 def _centred(vertices: FloatArray) -> FloatArray:
-    """Return (n, 3) vertices relative to their centre, the farthest at 1; or all at 0."""
+    """Return (n, 3) vertices relative to their centre, scaled to a largest distance of 1 (0 if all coincide)."""
     centred = vertices - vertices.mean(axis=0)
     size = float(np.sqrt(dots(centred, centred).max()))
     return centred / size if size > 0 else centred
 
 
-def own_axes(vertices: FloatArray) -> FloatArray:
-    """Return three orthonormal axes, rows, that turn with the shape.
+def shape_axes(vertices: FloatArray) -> FloatArray:
+    """Return (3, 3) orthonormal axes, as rows, that rotate with the shape.
 
-    Those that it is too symmetric to have are taken from the coordinate axes.
+    Axes that the symmetry of the shape leaves undefined are taken from the coordinate axes.
     """
     axes: list[FloatArray] = []
-    for vector in (*_own_vectors(_centred(vertices)), *np.eye(3)):
+    for vector in (*_shape_vectors(_centred(vertices)), *np.eye(3)):
         if vector is not None and len(axes) < 2:
             rest = vector - sum(axis * (axis @ vector) for axis in axes)
             if np.linalg.norm(2 * rest) > 1:
@@ -53,20 +53,23 @@ def own_axes(vertices: FloatArray) -> FloatArray:
 
 
 def tie_key(vertices: FloatArray) -> FloatArray:
-    """Return (n,) a number for each vertex that rigid motions, scale and numbering do not change.
+    """Return (n,) a number for each vertex that is invariant under rigid motions, scaling and renumbering.
 
-    Distances from the centre alone would not tell mirror images apart. Two vectors that belong to the shape span its
-    plane of mirror symmetry, if it has one, and their cross product tells the sides of it.
+    Distances from the centre alone would not distinguish mirror images. Two vectors that are computed from the shape
+    span its plane of mirror symmetry, if there is one, and their cross product distinguishes the two sides.
+
+    vertices: (n, 3) positions.
     """
     centred = _centred(vertices)
-    one, across = _own_vectors(centred)
+    one, across = _shape_vectors(centred)
     key: FloatArray = dots(centred, centred)
     if one is not None:
         key += 0.3 * (centred @ one)
     if across is not None:
         key += 0.1 * (centred @ across)
-    # On symmetric shapes many vertices are alike. Which of them come first does not matter, but from there on the
-    # others must follow alike: small parts of the distances from the first vertex by it, the second, the third.
+    # On symmetric shapes many vertices are equivalent. Which of them comes first does not matter, but the order of the
+    # others must be determined by it. So small multiples of the distances from the first vertex by the key are added,
+    # then of those from the first by the new key, and once more.
     for weight in (0.05, 0.02, 0.01):
         away = centred - centred[np.argmax(key >= key.max() - EQUAL_TOLERANCE)]
         key += weight * np.sqrt(dots(away, away))
@@ -74,7 +77,7 @@ def tie_key(vertices: FloatArray) -> FloatArray:
 
 
 def mesh_tie_key(mesh: TriangleMesh) -> FloatArray:
-    """Return the key (n,) of a mesh, which is not computed again."""
+    """Return the tie key (n,) of a mesh, which is cached with the mesh."""
     known = mesh.__dict__
     if "_tie_key" not in known:
         known["_tie_key"] = tie_key(mesh.vertices)
@@ -83,7 +86,10 @@ def mesh_tie_key(mesh: TriangleMesh) -> FloatArray:
 
 
 def argmax_tied(values: FloatArray, key: FloatArray) -> int:
-    """Return where a value is largest; among those that are equal but for rounding, where the key is."""
+    """Return the index of the largest value; among values that are equal up to rounding, of the largest key.
+
+    values, key: (n,).
+    """
     top = values.max()
     tied = np.flatnonzero(values >= top - EQUAL_TOLERANCE * max(top - values.min(), np.finfo(float).tiny))
     return int(tied[np.argmax(key[tied])])

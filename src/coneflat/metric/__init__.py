@@ -1,4 +1,4 @@
-"""Flat metrics: the linear one of the paper and the exact one."""
+"""Flat metrics: the linear metric of the paper and the exact discrete conformal metric."""
 
 from .boundary import straight_boundary
 from .exact import ExactMetric, checked_target, exact_metric

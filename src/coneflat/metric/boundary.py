@@ -1,4 +1,4 @@
-"""What curvature a prescribed boundary has: straight sides between corners, or round loops."""
+"""The curvature of a prescribed boundary: straight sides between corners, or round loops."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..mesh.connectivity import TriangleMesh
 
 @dataclass(frozen=True, eq=False)
 class BoundaryCurvature:
-    """Curvature wanted on the boundary of a connected mesh.
+    """Prescribed curvature of the boundary of a connected mesh.
 
     Attributes:
         mesh: the mesh.
@@ -28,11 +28,11 @@ class BoundaryCurvature:
 
     @property
     def has_round_loops(self) -> bool:
-        """Whether the target depends on the metric."""
+        """Whether there is a round loop, so that the target depends on the metric."""
         return bool(np.isfinite(self.round_total).any())
 
     def target(self, lengths: FloatArray, log_scale: FloatArray) -> FloatArray:
-        """Return (n,) target curvature: round loops turn evenly along their length in the scaled metric.
+        """Return (n,) target curvature, radians; on round loops it is uniform along the length in the scaled metric.
 
         Args:
             lengths: (m, 3) side lengths before scaling.
@@ -53,7 +53,7 @@ class BoundaryCurvature:
 
 
 def straight_boundary(mesh: TriangleMesh, target: FloatArray) -> BoundaryCurvature:
-    """Return straight sides between corners; `target` (n,) has their curvature on the boundary, else 0."""
+    """Return a boundary with straight sides between corners; `target` (n,) is the curvature at corners, else 0."""
     corners = np.where(mesh.is_boundary_vertex, target, 0.0)
     return BoundaryCurvature(mesh, corners, np.full(mesh.boundary_loops[0], np.nan))
 
@@ -68,19 +68,20 @@ def prescribed_boundary(
 ) -> BoundaryCurvature:
     """Return the boundary curvature that makes a disk, or a polygon with the given corners.
 
-    The outer loop, which has the corners or else is the longest, takes 2 pi chi less what the cones and the
-    holes take; every other loop becomes a round hole of total curvature -2 pi.
+    The outer loop has the corners, or is the longest loop if there are none. Its total curvature is 2 pi chi minus
+    those of the cones and the holes. Every other loop becomes a round hole of total curvature -2 pi.
 
     Args:
         mesh: connected, with a boundary.
         lengths: (m, 3) side lengths.
-        cone_total: sum of the curvatures of the cones.
-        corners, curvatures: (c,) boundary vertices and radians, NaN for all to share equally; none for a disk.
-        names: (n,) what the user calls each vertex.
+        cone_total: sum of the curvatures of the cones, radians.
+        corners, curvatures: (c,) boundary vertices and their curvatures, radians; all NaN to distribute the curvature
+            equally. Empty for a disk.
+        names: (n,) vertex numbers of the input, for messages.
 
     Raises:
-        CurvatureError: corners on several loops, curvatures that do not sum to what the surface needs, or a
-            corner of pi and more.
+        CurvatureError: corners are on several loops, the curvatures do not have the required sum, or a corner has a
+            curvature of pi or more.
     """
     count, loop = mesh.boundary_loops
     sides = mesh.edges[mesh.is_boundary_edge]

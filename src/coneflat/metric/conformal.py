@@ -15,32 +15,33 @@ from ..geometry.delaunay import make_delaunay
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..linalg import Factor, factorize
 from ..linalg.newton import HALVINGS, Limits, Point, minimise
-from .hessian import HeldInverse, HessianPattern, Inverse, conjugate_gradients, corrected
+from .hessian import GroundedInverse, HessianPattern, Inverse, conjugate_gradients, corrected
 
-# Residual, radians, below which nothing is left to gain: the rounding of a sum of a few angles.
+# Residual, radians, at which the solve stops: the rounding error of a sum of a few angles.
 GOAL_RESIDUAL = 1e-13
-# Largest change of phi in one step. Beyond e^5 in length the quadratic model says nothing any more.
+# Largest change of phi in one step. Beyond a factor e^5 of lengths, the quadratic model is meaningless.
 LARGEST_STEP = 5.0
-# A step is solved for to the accuracy of the residual, but to this at least: more is lost to the next.
+# A Newton step is computed with a relative error like the residual, but at most this; less accurate steps cost more
+# steps.
 MAX_RELATIVE_RESIDUAL = 0.05
-# Below so many vertices a factorization takes less time than the calls that conjugate gradients are made of.
+# Number of vertices below which a factorization takes less time than the function calls of conjugate gradients.
 MAX_DIRECT_VERTICES = 200
-# Log scales that differ by less than this have nearly the same Hessian.
+# Largest difference of log scales whose Hessians are nearly the same.
 MAX_REUSE_CHANGE = 0.05
-# Halvings of a step at most where the surface can be doubled instead of creeping along triangles that are about to
-# break.
+# Largest number of halvings of a step on surfaces with a boundary: instead of taking tiny steps past triangles that
+# nearly break the triangle inequality, the surface is doubled.
 HALVINGS_BOUNDED = 6
 
 
 @dataclass(eq=False)
 class State(Point):
-    """Curvature at a log scale, on the triangulation that is Delaunay for it.
+    """Curvature for a log scale, on the triangulation that is Delaunay for it.
 
     Attributes:
-        curvature: (n,) radians; the residual is what it misses.
+        curvature: (n,) radians; the residual is the target minus this.
         cots: (3m,) cotangents opposite the half-edges.
-        broken: triangles that break the triangle inequality. On a bounded surface, whose boundary cannot be flipped,
-            the theory does not hold, and no state with such triangles is admissible.
+        broken: number of triangles that break the triangle inequality. On a surface with a boundary, whose edges
+            cannot be flipped, the theory does not hold for such states, and they are not admissible.
     """
 
     curvature: FloatArray = field(default_factory=lambda: np.empty(0))
@@ -49,14 +50,14 @@ class State(Point):
 
 
 def centred(log_scale: FloatArray) -> FloatArray:
-    """Return a log scale with its middle at 0: neither huge nor tiny factors overflow, and angles see ratios only."""
+    """Return a log scale shifted so that the middle of its range is 0, which avoids overflow and keeps all angles."""
     middle: FloatArray = log_scale - (log_scale.max() + log_scale.min()) / 2
     return middle
 
 
 @dataclass(eq=False)
 class ConformalProblem:
-    """Find phi, so that the curvature of l_ij exp((phi_i + phi_j) / 2) is the target.
+    """The problem of finding phi such that the curvature of l_ij exp((phi_i + phi_j) / 2) is the target.
 
     K(phi) - target is the gradient of a convex energy (Springborn, Schroeder, Pinkall 2008, Eq. 7), whose
     Hessian is the cotangent Laplacian of the scaled metric; flipped to Delaunay, the energy is defined
@@ -64,17 +65,17 @@ class ConformalProblem:
 
     Attributes:
         triangulation: lengths l; flipped in place.
-        flat_turn: (n,) 2 pi inside, pi on the boundary.
+        flat_angle: (n,) angle sum of a flat vertex, radians: 2 pi inside, pi on the boundary.
         target: (n,) curvature, radians; not used at fixed vertices.
         fixed: (n,) True where phi is given.
         pinned: (n,) True for one vertex of each component without fixed ones.
         records: half-edges flipped so far.
-        preconditioner: solves for the Laplacian of a metric that is similar, zero at fixed vertices; may be none.
-        last: the state evaluated last, the one the triangulation belongs to.
+        preconditioner: inverse of the Laplacian of a similar metric, zero at fixed vertices; None if there is none.
+        last: the state evaluated last, to which the triangulation belongs.
     """
 
     triangulation: IntrinsicTriangulation
-    flat_turn: FloatArray
+    flat_angle: FloatArray
     target: FloatArray
     fixed: BoolArray
     pinned: BoolArray
@@ -87,13 +88,13 @@ class ConformalProblem:
 
     @cached_property
     def is_bounded(self) -> bool:
-        """Whether there is a boundary, where edges cannot be flipped and triangles may stay broken."""
+        """Whether there is a boundary: its edges cannot be flipped, and triangles there may remain broken."""
         return bool((self.triangulation.twin < 0).any())
 
     def prepare(self, delaunay: bool, flipped: IntArray | None = None) -> int:
-        """Flip the input to Delaunay in its own metric, if so wanted; return the number of flips.
+        """Flip the input to Delaunay in its own metric, if `delaunay`; return the number of flips.
 
-        flipped: the half-edges by whose flips it has become so already, if it has.
+        flipped: the flipped half-edges, if the triangulation is Delaunay already.
         """
         if not delaunay:
             return 0
@@ -101,33 +102,33 @@ class ConformalProblem:
         return len(self.records[0])
 
     def flat_lengths(self, log_scale: FloatArray) -> FloatArray:
-        """Return (3m,) the scaled lengths, the same bits on both sides of an edge."""
+        """Return (3m,) the scaled lengths; both sides of an edge get the same bits."""
         at_tail = log_scale[self.triangulation.tail].reshape(-1, 3)
         sums = np.empty(at_tail.shape)
         for i in range(3):
             np.add(at_tail[:, i], at_tail[:, (i + 1) % 3], out=sums[:, i])
         sums /= 2
-        # Multiplication commutes, and the background lengths agree.
+        # The sums are commutative, and the unscaled lengths have the same bits on both sides.
         lengths: FloatArray = np.exp(sums, out=sums).ravel()
         lengths *= self.triangulation.length
         return lengths
 
     def sum_angles(self, log_scale: FloatArray, sums: FloatArray, cots: FloatArray) -> int:
-        """Fill the (n,) angle sums and (3m,) weights of the scaled metric; return the number of broken triangles."""
+        """Write the (n,) angle sums and (3m,) cotangents of the scaled metric; return the count of broken triangles."""
         scale = np.exp(centred(log_scale) / 2)
         return sum_angles(self.triangulation.tail, self.triangulation.length, scale, sums, cots)
 
     def record(self, flipped: IntArray) -> None:
-        """Keep in mind that half-edges were flipped."""
+        """Record flipped half-edges; the sparsity pattern of the Hessian becomes invalid."""
         self.records.append(flipped)
         self._pattern = None
 
     def evaluate(self, log_scale: FloatArray) -> State:
-        """Flip to Delaunay in the scaled metric and return the curvature there."""
+        """Return the state of a log scale (n,); the triangulation is flipped to Delaunay in the scaled metric."""
         sums = np.empty(len(log_scale))
         cots = np.empty(len(self.triangulation.tail))
         broken = self.sum_angles(log_scale, sums, cots)
-        # The cotangents are needed anyway and tell at a glance where there is nothing to flip.
+        # The cotangents are needed anyway, and give a fast test for edges that need no flip.
         found = np.empty(len(cots), dtype=np.int64)
         suspects = found[: find_suspects(self.triangulation.twin, cots, found)]
         if len(suspects):
@@ -135,19 +136,19 @@ class ConformalProblem:
             if len(flipped):
                 self.record(flipped)
                 broken = self.sum_angles(log_scale, sums, cots)
-        curvature = self.flat_turn - sums
+        curvature = self.flat_angle - sums
         residual = np.where(self.fixed, 0.0, self.target - curvature)
         if not self.fixed.any() and np.count_nonzero(self.pinned) == 1:
-            # Gauss-Bonnet holds but for the rounding of 2 pi at every vertex, which no scale can take away.
+            # Gauss-Bonnet holds up to the rounding of 2 pi at every vertex, which no scale can remove.
             residual -= residual.mean()
         is_admissible = not (self.is_bounded and broken)
         self.last = State(log_scale, residual, is_admissible, curvature, cots, broken)
         return self.last
 
     def direction(self, here: State, exactly: bool) -> tuple[FloatArray, bool]:
-        """Return the Newton direction of a state, 0 at fixed vertices, and whether it was factorized for.
+        """Return (n,) the Newton direction of a state, 0 at fixed vertices, and whether the Hessian was factorized.
 
-        exactly: factorize, whatever there is to solve with.
+        exactly: factorize the Hessian even if there is a preconditioner.
 
         Raises:
             MetricError: the Hessian is singular in double precision.
@@ -165,14 +166,14 @@ class ConformalProblem:
             step = conjugate_gradients(hessian, state.residual, inverse, accuracy)
             if step is not None:
                 return np.where(self.fixed, 0.0, step), False
-        held = self.fixed | self.pinned
-        hessian = self._pattern.matrix(state.cots, held)
+        grounded = self.fixed | self.pinned
+        hessian = self._pattern.matrix(state.cots, grounded)
         self._factor = factorize(hessian, self._factor)
-        self.preconditioner = HeldInverse(self._factor, hessian, held)
+        self.preconditioner = GroundedInverse(self._factor, hessian, grounded)
         return self.preconditioner.solve(state.residual), True
 
     def _corrected(self, inverse: Inverse, hessian: csc_matrix, log_scale: FloatArray) -> Inverse:
-        """Return an inverse corrected for the Hessian, or for one that was nearly the same."""
+        """Return an inverse corrected for the Hessian; reused while the Hessian has hardly changed."""
         known = self._known
         if known is None or known[0] is not inverse or np.ptp(log_scale - known[1]) > MAX_REUSE_CHANGE:
             known = self._known = inverse, log_scale, corrected(inverse, hessian, self.fixed)
@@ -185,9 +186,10 @@ def find_scale(
     tolerance: float,
     max_steps: int,
 ) -> tuple[State, int]:
-    """Return the state with the least residual that Newton's method reaches, and the number of steps.
+    """Return the state with the smallest residual that Newton's method reaches, and the number of steps.
 
-    The search starts from a given log scale; on a bounded surface from none, where that breaks triangles.
+    The search starts from a given log scale (n,). On a surface with a boundary it starts from 0 if the given one breaks
+    triangles.
     """
     start = problem.evaluate(log_scale)
     if not start.is_admissible:
@@ -205,8 +207,8 @@ def add_angles(
 ) -> tuple[bool, float, float, float]:
     """Add the angles of a triangle with sides a, b, c opposite i, j, k to the sums there.
 
-    Where the triangle inequality is broken they are pi and 0, pi opposite the side that is too long. Returns whether it
-    is, and the cotangents at i, j, k; these are 0 then.
+    If the triangle inequality is broken, the angle opposite the side that is too long is pi and the others are 0.
+    Returns whether it is broken, and the cotangents at i, j, k, which are 0 in this case.
     """
     slack_a = min(b, c) - (a - max(b, c))
     slack_b = min(c, a) - (b - max(c, a))
@@ -221,7 +223,7 @@ def add_angles(
     angle_j = 2 * math.atan2(root, perimeter * slack_b)
     angle_sum[i] += angle_i
     angle_sum[j] += angle_j
-    angle_sum[k] += math.pi - angle_i - angle_j  # a third of the time less, and as exact as their sum is
+    angle_sum[k] += math.pi - angle_i - angle_j  # saves a third of the time; as accurate as the sum
     return (
         False,
         (perimeter * slack_a - slack_b * slack_c) / (2 * root),
@@ -234,11 +236,11 @@ def add_angles(
 def sum_angles(
     tail: IntArray, length: FloatArray, scale: FloatArray, angle_sum: FloatArray, cots: FloatArray
 ) -> int:
-    """Fill the angle sum at each vertex and the cotangent opposite each half-edge.
+    """Write the angle sum at each vertex and the cotangent opposite each half-edge; return the broken triangles.
 
-    A side from i to j has the length length * scale_i * scale_j. Where the triangle inequality is broken the
-    angles are those of the convex extension (Springborn, Schroeder, Pinkall 2008, Section 5.1): pi opposite
-    the side that is too long, 0 at the others, and no cotangents. Returns the number of broken triangles.
+    A side from i to j has the length length * scale_i * scale_j. If the triangle inequality is broken, the angles are
+    those of the convex extension (Springborn, Schroeder, Pinkall 2008, Section 5.1): pi opposite the side that is too
+    long and 0 at the others; the cotangents are 0. Returns the number of broken triangles.
     """
     broken = 0
     angle_sum[:] = 0.0
@@ -259,7 +261,7 @@ def sum_angles(
 
 @compiled
 def _has_no_weights(cots: FloatArray, h: int) -> bool:
-    """Return whether the triangle of a half-edge has no cotangents."""
+    """Return whether all cotangents of the triangle of a half-edge are 0, as its triangle inequality is broken."""
     base = h - h % 3
     return bool(cots[base] == 0.0 and cots[base + 1] == 0.0 and cots[base + 2] == 0.0)
 
@@ -268,9 +270,9 @@ def _has_no_weights(cots: FloatArray, h: int) -> bool:
 def may_be_flipped(cots: FloatArray, h: int, t: int) -> bool:
     """Return whether the edge of two half-edges may not be Delaunay.
 
-    Its cotangents sum to less than 0, or it is one of a triangle that has none, as its sides close to none.
+    Its cotangents have a negative sum, or it belongs to a triangle that breaks the triangle inequality.
     """
-    # The margin is the rounding of the cotangents; the test that decides on a flip has its own.
+    # The margin is the rounding error of the cotangents; the test that decides on a flip has its own margin.
     is_negative = cots[h] + cots[t] < -1e-13 * (abs(cots[h]) + abs(cots[t]))
     return bool(
         is_negative
@@ -281,7 +283,7 @@ def may_be_flipped(cots: FloatArray, h: int, t: int) -> bool:
 
 @compiled
 def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
-    """Write a half-edge of each edge that may not be Delaunay; return their number."""
+    """Write to `found` one half-edge of each edge that may not be Delaunay; return their number."""
     count = 0
     for h in range(len(twin)):
         t = twin[h]

@@ -1,4 +1,4 @@
-"""The exact discrete conformal metric of given curvatures."""
+"""The exact discrete conformal metric with prescribed curvatures."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from ..mesh.connectivity import TriangleMesh
 from .conformal import ConformalProblem, State, find_scale
 from .hessian import Inverse
 
-# How far, in radians, prescribed curvatures may miss Gauss-Bonnet; decimals typed by hand are good to more.
+# Largest error of the Gauss-Bonnet sum of prescribed curvatures, radians; typed decimals are more accurate.
 SUM_TOLERANCE = 1e-8
-# A first guess of phi with a wider range than this makes lengths whose squares overflow.
-WIDEST_RANGE = 1000.0
+# Largest range of an initial phi; with a larger range, the squares of lengths overflow.
+MAX_RANGE = 1000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,17 +29,17 @@ class ExactMetric:
 
     Attributes:
         log_scale: (n,) phi.
-        curvature: (n,) curvature reached, radians; at fixed vertices the one that came out.
-        triangulation: the triangulation on which the metric lives, Delaunay in it, with its flat lengths in
-            model units times exp(phi).
-        flips: half-edges flipped on the way there from the input's triangles, in order.
-        euclidean_flips: how many of them made the input Delaunay; the others happened during the solve.
-        steps: Newton steps.
+        curvature: (n,) curvature of the metric, radians.
+        triangulation: the triangulation of the metric, Delaunay in it, with its flat lengths in model units times
+            exp(phi).
+        flips: half-edges flipped to get from the triangles of the input to the triangulation, in order.
+        euclidean_flips: number of flips that made the input Delaunay; the others occurred during the solve.
+        steps: number of Newton steps.
         residual: largest curvature error, radians, over the vertices with a target.
-        worst_vertex: where it is.
+        worst_vertex: the vertex of the largest error.
         converged: whether the residual is within the tolerance and every triangle has area.
-        doubled: whether the triangulation is that of the surface glued to its mirror image; the first m
-            triangles are the input's.
+        doubled: whether the triangulation is that of the surface glued to its mirror image; its first m triangles
+            are those of the input.
     """
 
     log_scale: FloatArray
@@ -59,7 +59,7 @@ class ExactMetric:
         return len(self.flips) - self.euclidean_flips
 
     def straight(self) -> FlatTriangles:
-        """Return the input's m triangles with straight sides in the metric, which `unfold` lays out."""
+        """Return the m triangles of the input with straight sides in the metric, which `unfold` lays out."""
         count = self.triangulation.face_count
         return straight_triangles(self.triangulation, self.flips, count // 2 if self.doubled else count)
 
@@ -85,34 +85,34 @@ def exact_metric(
         lengths: (m, 3) side lengths, column i opposite corner i, model units: those of `edge_lengths`, or any others
             whose triangles have area.
         target: (n,) curvature in radians, or one number for all vertices; not used at fixed vertices.
-        fixed: (n,) True for vertices whose log scale is given and whose curvature comes out: cones with
-            phi = 0, a free boundary. None: all curvatures are prescribed, and phi, then known up to a
-            constant, is chosen to keep the total area.
+        fixed: (n,) True for vertices whose log scale is given and whose curvature is computed: cones with phi = 0, or
+            a free boundary. None: all curvatures are prescribed, and phi, which is then unique up to a constant, is
+            chosen to preserve the total area.
         fixed_log_scale: (n,) or one number, phi at the fixed vertices.
-        start: (n,) first guess of phi; the linear solution is a good one.
-        preconditioner: solves for the Laplacian of the mesh, zero at the fixed vertices, if something does
-            already: then less is factorized.
-        tolerance: curvature error, radians, that counts as converged. The solve goes on as far as rounding
-            permits.
-        delaunay: flip the input to its intrinsic Delaunay triangulation first. Without it, the conformal
-            class is that of the input's own triangles; the same on Delaunay meshes.
-        flipped: that triangulation with the half-edges flipped, from `intrinsic_delaunay`, if something has it already.
-        max_steps: Newton steps after which the best metric so far is returned; counted anew if the surface
-            has to be doubled.
+        start: (n,) initial phi; the linear solution is a good choice.
+        preconditioner: a factorized Laplacian of the mesh, zero at the fixed vertices, if there is one; it saves
+            factorizations.
+        tolerance: curvature error, radians, that counts as converged. The solve continues below it, as far as
+            rounding permits.
+        delaunay: flip the input to its intrinsic Delaunay triangulation first. If False, the conformal class is that
+            of the triangles of the input. On Delaunay meshes both are the same.
+        flipped: this triangulation and the flipped half-edges, from `intrinsic_delaunay`, if known.
+        max_steps: Newton steps after which the best metric so far is returned; counted from 0 again if the surface
+            is doubled.
 
     Raises:
         ArrayShapeError, NonFiniteError: arrays do not fit the mesh, or lengths are not finite.
-        LengthError: the lengths make no triangles with area, or differ between the two sides of an edge.
-        CurvatureError: a target is 2 pi or more inside, pi or more on the boundary, or the targets of a
-            component without fixed vertices do not sum to 2 pi times its Euler characteristic.
+        LengthError: a triangle has no area, or the two sides of an edge have different lengths.
+        CurvatureError: a target is 2 pi or more at an inner vertex, or pi or more on the boundary, or the targets of
+            a component without fixed vertices do not sum to 2 pi times its Euler characteristic.
 
     Notes:
         Springborn, Schroeder, Pinkall, "Conformal equivalence of triangle meshes", 2008, with the flips of
         Springborn, "Ideal hyperbolic polyhedra and discrete uniformization", 2019, and of Gillespie,
-        Springborn, Crane, "Discrete conformal equivalence of polyhedral surfaces", 2021. With flips a metric
-        exists for every target that passes the checks. At a boundary the theorem needs the edges of the
-        boundary to flip, too: where the solution has broken triangles there, the surface is glued to its
-        mirror image and solved again.
+        Springborn, Crane, "Discrete conformal equivalence of polyhedral surfaces", 2021. With flips, a metric exists
+        for every target that passes the checks. On surfaces with a boundary, the theorem requires that boundary edges
+        can be flipped, too. If the solution has triangles that break the triangle inequality there, the surface is
+        glued to its mirror image and solved again.
     """
     lengths, n = check_lengths(mesh, lengths), len(mesh.vertices)
     fixed = np.zeros(n, dtype=bool) if fixed is None else _per_vertex("fixed", fixed, n).astype(bool)
@@ -124,14 +124,17 @@ def exact_metric(
         raise NonFiniteError(f"fixed_log_scale is NaN or infinite at {_at(bad)}")
 
     plain = np.where(fixed, log_scale, 0.0)
-    if not np.ptp(log_scale) <= WIDEST_RANGE:
+    if not np.ptp(log_scale) <= MAX_RANGE:
         log_scale = plain
-    flat_turn = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
+    flat_angle = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
     copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
     doubled = False
 
     def solved_from(first: FloatArray) -> tuple[ConformalProblem, State, IntArray, int, int]:
-        """Return the problem, its best state, the vertices it is about, how many flips made it Delaunay, and steps."""
+        """Return the problem, its best state, the mesh vertex of each of its vertices, the Euclidean flips, and steps.
+
+        first: (n,) initial phi.
+        """
         original, known = np.arange(n), flipped if delaunay and not doubled else None
         triangulation = intrinsic_triangulation(mesh, lengths) if known is None else known[0].copy()
         if doubled:
@@ -144,7 +147,7 @@ def exact_metric(
                 np.concatenate([pinned, np.zeros(len(original) - n, dtype=bool)]),
             )
         else:
-            problem = ConformalProblem(triangulation, flat_turn, target, fixed, pinned, preconditioner)
+            problem = ConformalProblem(triangulation, flat_angle, target, fixed, pinned, preconditioner)
         euclidean = problem.prepare(delaunay, None if known is None else known[1])
         state, steps = find_scale(problem, first[original], tolerance, max_steps)
         return problem, state, original, euclidean, steps
@@ -155,8 +158,8 @@ def exact_metric(
         problem, state, original, euclidean, more = solved_from(log_scale)
         steps += more
     if not _is_solved(state, tolerance) and (log_scale != plain).any():
-        # A first guess may lie so far off, on a field of spikes say, that nothing is left of the triangles there. The
-        # input's own scale is finite.
+        # An initial phi may be so far off, for example on a surface of many spikes, that triangles there vanish. With
+        # phi = 0 they are those of the input.
         again = solved_from(plain)
         steps += again[-1]
         if again[1].largest < state.largest:
@@ -169,7 +172,7 @@ def exact_metric(
 
 
 def _per_vertex(name: str, values: ArrayLike, count: int) -> FloatArray:
-    """Return (n,) values, or one number for all; raises ArrayShapeError if they are none."""
+    """Return (n,) values from an array or from one number for all; raise ArrayShapeError for other shapes."""
     array = as_floats(name, values)
     if array.shape not in ((), (count,)):
         raise ArrayShapeError(
@@ -193,9 +196,9 @@ def _keep_area(
     log_scale: FloatArray,
     original: IntArray,
 ) -> FloatArray:
-    """Return phi, shifted on each component without fixed vertices so that its total area stays the same.
+    """Return phi, shifted by a constant on each component without fixed vertices so that its area is preserved.
 
-    original: (n,) for each vertex of the problem the vertex of the mesh that it is, or is a copy of.
+    original: (n,) the vertex of the mesh that each vertex of the problem is a copy of.
     """
     count, labels = mesh.components
     component = labels[original]
@@ -210,7 +213,7 @@ def _keep_area(
         component[problem.triangulation.tail[::3]], weights=double_areas(metric), minlength=count
     )
     copies = len(metric) / len(lengths)  # 2 if the surface was doubled
-    # Where nothing is left of the area, the metric is refused: any shift will do.
+    # If the area has vanished, the metric is rejected later, and any shift will do.
     is_left = np.isfinite(after) & (after > 0)
     shift = np.log(copies * before / np.where(is_left, after, copies * before)) / 2
     shifted: FloatArray = log_scale + np.where(free, shift, 0.0)[component]
@@ -226,7 +229,7 @@ def _finish(
     tolerance: float,
     doubled: bool,
 ) -> ExactMetric:
-    """Put the metric on the triangulation and collect the report."""
+    """Return the result: the lengths of the metric are written to the triangulation, statistics are collected."""
     triangulation = problem.triangulation
     triangulation.length = problem.flat_lengths(state.place)
     residual = np.abs(state.residual[:n])
@@ -246,7 +249,20 @@ def _finish(
 
 
 def checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> tuple[FloatArray, BoolArray]:
-    """Return a target that satisfies Gauss-Bonnet to rounding, and a pinned vertex a component, if needed."""
+    """Return a target that satisfies Gauss-Bonnet up to rounding, and one pinned vertex per component if needed.
+
+    Args:
+        mesh: the mesh.
+        target: (n,) curvature, radians; not used at fixed vertices.
+        fixed: (n,) vertices whose log scale is given.
+
+    Returns:
+        (n,) the corrected target, and (n,) True at one vertex of each component without fixed vertices.
+
+    Raises:
+        CurvatureError: a target is NaN, infinite or too large, or the targets of a component without fixed vertices
+            do not have the required sum.
+    """
     bad = np.flatnonzero(~fixed & ~np.isfinite(target))
     if len(bad):
         raise CurvatureError(f"the target curvature is NaN or infinite at {_at(bad)}")
@@ -259,8 +275,8 @@ def checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> 
         if len(bad):
             worst = bad[np.argmax(target[bad])]
             raise CurvatureError(
-                f"no metric has a curvature of {name} or more {place}: vertex {worst} is to have "
-                f"{target[worst] / np.pi:.6g} pi ({len(bad)} such); ask for less"
+                f"no metric has a curvature of {name} or more {place}: the target of vertex {worst} is "
+                f"{target[worst] / np.pi:.6g} pi ({len(bad)} such vertices); choose smaller targets"
             )
     pinned = np.zeros(len(target), dtype=bool)
     count, component = mesh.components

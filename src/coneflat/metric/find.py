@@ -1,7 +1,8 @@
-"""The flat metric of a connected mesh; exact metrics whose rotations along loops are multiples of a quantum.
+"""The flat metric of a connected mesh, and exact metrics whose holonomy along loops is a multiple of a quantum.
 
-With the cones given, an exactly conformal metric has no freedom left, and its rotations along the handles are what
-they are (Abel and Jacobi). For a quantum the conformal structure is changed: edge lengths, as little as can be.
+For given cones, an exactly conformal metric has no degree of freedom left, so its holonomy along the handles is
+determined (Abel and Jacobi). To make it a multiple of a quantum, the conformal structure is changed: the edge lengths
+are modified as little as possible.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from scipy.sparse import csc_matrix
 from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..errors import ConvergenceError
 from ..geometry import corner_angles, double_areas
-from ..geometry.handles import Turning, curvature_by_log_lengths, edge_means, off_multiple, open_turning
+from ..geometry.handles import Holonomy, curvature_by_log_lengths, edge_means, loop_holonomy, off_multiple
 from ..geometry.straight import FlatTriangles
 from ..geometry.triangles import slacks
 from ..linalg import factorize
@@ -25,21 +26,27 @@ from .boundary import prescribed_boundary, straight_boundary
 from .linear import linear_flat_metric
 from .solve import ExactChoices, exact_flat_metric
 
-# Steps at most, and radians at which to stop; it takes six or so if the cones are well placed.
+# Largest number of steps, and largest error in radians at the end; about six steps are needed for well-placed cones.
 MAX_STEPS, TOLERANCE = 60, 1e-11
-# Largest change of the log of a length in one step: from there on, what is least is found anew.
+# Largest change of the log of a length in one step. After a larger change, the derivatives are computed again.
 LARGEST_CHANGE = 0.2
-# A step of less than this part of the whole is too little: triangles are as flat as can be.
-LEAST_PART = 1e-3
-# What scaling counts in the norm of a strain, relative to shear: next to nothing, for it can be undone conformally.
+# Smallest fraction of a step that is taken. Below it, triangles are close to degenerate and the search fails.
+MIN_FRACTION = 1e-3
+# Weight of scaling in the norm of a strain, relative to shear: nearly zero, as scaling can be undone conformally.
 SCALING_WEIGHT = 1e-3
-# Shear at cones turns loops best, for it amounts to moving the cones; but little room has to bear much of it then.
-# In so many rings around them shear counts more by the factor by which scaling counts less.
+# Shear near cones changes the holonomy of loops most, as it has the effect of moving the cones; but it would be
+# concentrated on few triangles. In this number of rings around cones, the weight of shear is divided by the weight
+# of scaling.
 CONE_RINGS = 3
 
 
 def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> FlatMetric:
     """Return the flat metric of a connected mesh for its cones.
+
+    Args:
+        surface: the mesh with its side lengths.
+        solution: cones, target curvatures and the linear log scale.
+        spec: the options of the metric.
 
     Raises:
         ConvergenceError: the exact metric was not found.
@@ -52,32 +59,32 @@ def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> F
     choices = _exact_choices(surface, solution, spec)
     if quantum is not None:
         if not choices.is_held(mesh).any():
-            turning = open_turning(mesh, holes=True)
+            holonomy = loop_holonomy(mesh, holes=True)
             try:
-                if len(turning.loops) > 2 * mesh.genus():
-                    return corrected_flat_metric(lengths, solution, choices, turning, quantum)
+                if len(holonomy.loops) > 2 * mesh.genus():
+                    return corrected_flat_metric(lengths, solution, choices, holonomy, quantum)
             except ConvergenceError:
-                # Triangles cannot turn as far; handles alone may.
+                # Triangles cannot be sheared enough; correcting the handles alone may succeed.
                 pass
         if mesh.genus():
-            return corrected_flat_metric(lengths, solution, choices, open_turning(mesh), quantum)
+            return corrected_flat_metric(lengths, solution, choices, loop_holonomy(mesh), quantum)
     delaunay = surface.delaunay if surface.is_reused else surface.known_delaunay
     return exact_flat_metric(mesh, lengths, solution, choices, delaunay)
 
 
 def loop_rotations(surface: Surface, spec: MetricSpec) -> Callable[[ConeSolution], FloatArray] | None:
-    """Return a function of cones: the rotations of loops across the handles in their metric, radians.
+    """Return a function from cones to the holonomy of loops across the handles in their metric, (2 genus,) radians.
 
-    None for a linear metric, and on a mesh without handles.
+    None for a linear metric, and for a mesh without handles.
     """
     if spec.method != "exact" or not surface.mesh.genus():
         return None
-    turning, plain = open_turning(surface.mesh), spec.plain()
+    holonomy, plain = loop_holonomy(surface.mesh), spec.plain()
 
     def rotations(solution: ConeSolution) -> FloatArray:
         triangles = find_metric(surface, solution, plain).triangles
         assert triangles is not None
-        return turning.of_flat(triangles)
+        return holonomy.of_flat(triangles)
 
     return rotations
 
@@ -93,7 +100,7 @@ def _exact_choices(surface: Surface, solution: ConeSolution, spec: MetricSpec) -
     return ExactChoices(
         scale_at_cones=spec.scale_at_cones,
         boundary=boundary,
-        kept=spec.keeps_length,
+        rigid=spec.keeps_length,
         keep_area=spec.keeps_area,
         accepts_failure=spec.accepts_failure,
         names=spec.names,
@@ -101,26 +108,26 @@ def _exact_choices(surface: Surface, solution: ConeSolution, spec: MetricSpec) -
 
 
 def corrected_flat_metric(
-    lengths: FloatArray, solution: ConeSolution, choices: ExactChoices, turning: Turning, quantum: float
+    lengths: FloatArray, solution: ConeSolution, choices: ExactChoices, holonomy: Holonomy, quantum: float
 ) -> FlatMetric:
-    """Return a flat metric with the cones of a solution whose loops turn by multiples of a quantum.
+    """Return a flat metric with the cones of a solution whose holonomy along loops is a multiple of a quantum.
 
-    For each loop there is a change of edge lengths that turns it and no other, with the least shear. Large changes are
-    made in steps; the last ones, on the few rotations, are Broyden's.
+    For each loop there is a change of edge lengths of least shear that rotates this loop and no other. Large changes
+    are made in steps. Broyden's method is used for the last steps, on the few rotation angles.
 
     Args:
         lengths: (m, 3) side lengths.
         solution, choices: as for `exact_flat_metric`.
-        turning: of the mesh's handles, and around its holes where the boundary is free.
+        holonomy: of loops along the handles, and around the holes if the boundary is free.
         quantum: radians.
 
     Raises:
-        ConvergenceError: the rotations did not get there.
+        ConvergenceError: the rotations did not converge to multiples of the quantum.
     """
-    mesh = turning.mesh
+    mesh = holonomy.mesh
     given = lengths
-    metric, triangles = _solved(mesh, lengths, solution, choices)
-    off = off_multiple(turning.of_flat(triangles), quantum)
+    metric, triangles = _solve_metric(mesh, lengths, solution, choices)
+    off = off_multiple(holonomy.of_flat(triangles), quantum)
     first = float(np.abs(off).max())
     fixed = choices.is_open(mesh)
     changes = None
@@ -134,32 +141,32 @@ def corrected_flat_metric(
             return replace(metric, notes=(*metric.notes, note))
         if changes is None:
             sides = np.abs(triangles.sides).reshape(-1, 3)
-            changes = least_changes(turning, sides, shear_norm(mesh, lengths, solution.cones), fixed)
+            changes = least_changes(holonomy, sides, shear_norm(mesh, lengths, solution.cones), fixed)
             inverse = np.eye(len(off))
         step = -inverse @ off
-        part = min(1.0, LARGEST_CHANGE / np.abs(changes @ step).max())
-        sheared = _sheared(mesh, lengths, part * (changes @ step))
-        while part > LEAST_PART and not slacks(sheared).min() > 0:
-            part /= 2
-            sheared = _sheared(mesh, lengths, part * (changes @ step))
-        if part <= LEAST_PART:
+        fraction = min(1.0, LARGEST_CHANGE / np.abs(changes @ step).max())
+        sheared = _sheared(mesh, lengths, fraction * (changes @ step))
+        while fraction > MIN_FRACTION and not slacks(sheared).min() > 0:
+            fraction /= 2
+            sheared = _sheared(mesh, lengths, fraction * (changes @ step))
+        if fraction <= MIN_FRACTION:
             break
         lengths = sheared
         solution = replace(solution, log_scale=metric.log_scale - np.log(metric.scale))
-        metric, triangles = _solved(mesh, lengths, solution, choices)
-        before, off = off, off_multiple(turning.of_flat(triangles), quantum)
-        if part < 1:
+        metric, triangles = _solve_metric(mesh, lengths, solution, choices)
+        before, off = off, off_multiple(holonomy.of_flat(triangles), quantum)
+        if fraction < 1:
             changes = None
             continue
         gained = inverse @ (off - before)
         inverse += np.outer(step - gained, step @ inverse) / (step @ gained)
     raise ConvergenceError(
-        f"rotations around holes and along handles did not get to multiples of {quantum / np.pi:.4g} pi: they are off "
+        f"rotations around holes and along handles did not reach multiples of {quantum / np.pi:.4g} pi: they are off "
         f"by {np.abs(off).max():.2g} rad; other cones (--distortion, --cone-count) may help"
     )
 
 
-def _solved(
+def _solve_metric(
     mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, choices: ExactChoices
 ) -> tuple[FlatMetric, FlatTriangles]:
     metric = exact_flat_metric(mesh, lengths, solution, choices)
@@ -171,36 +178,36 @@ def _sheared(mesh: TriangleMesh, lengths: FloatArray, change: FloatArray) -> Flo
     return lengths * np.exp(change[mesh.halfedge_edges]).reshape(-1, 3)
 
 
-def least_changes(turning: Turning, sides: FloatArray, norm: csc_matrix, fixed: BoolArray) -> FloatArray:
-    """Return (e, l) changes of the logs of edge lengths, each of which turns one loop by a radian at first.
+def least_changes(holonomy: Holonomy, sides: FloatArray, norm: csc_matrix, fixed: BoolArray) -> FloatArray:
+    """Return (e, l) changes of the logs of edge lengths; each rotates one loop by one radian, to first order.
 
     Args:
-        turning: of the loops.
-        sides: (m, 3) lengths in the present flat metric.
-        norm: (e, e) of the changes.
-        fixed: (n,) vertices where conformal scaling is held, the others compensating what changes of curvature.
+        holonomy: of the l loops.
+        sides: (m, 3) lengths in the current flat metric.
+        norm: (e, e) matrix of the norm that is minimised.
+        fixed: (n,) vertices with fixed conformal scale. The scale of the others compensates the change of curvature.
     """
-    mesh = turning.mesh
+    mesh = holonomy.mesh
     fixed = fixed.copy()
     fixed[0] |= not fixed.any()
-    by_lengths = turning.by_log_lengths(sides)
+    by_lengths = holonomy.by_log_lengths(sides)
     means = edge_means(mesh)[:, ~fixed]
     curvature = curvature_by_log_lengths(mesh, sides)[~fixed]
     by_scale = np.asarray((by_lengths @ means).todense()).T
     answer = factorize(csc_matrix(curvature @ means)).solve(np.ascontiguousarray(by_scale))
     slopes = np.asarray(by_lengths.todense()).T - curvature.T @ answer
-    eased = factorize(norm).solve(slopes)
-    result: FloatArray = eased @ np.linalg.inv(slopes.T @ eased)
+    smoothed = factorize(norm).solve(slopes)
+    result: FloatArray = smoothed @ np.linalg.inv(slopes.T @ smoothed)
     return result
 
 
 def shear_norm(mesh: TriangleMesh, lengths: FloatArray, cones: IntArray) -> csc_matrix:
-    """Return (e, e) the matrix of the area integral of the squared shear by the changes of the logs of edge lengths.
+    """Return (e, e) the matrix of the area integral of squared shear, for changes of the logs of edge lengths.
 
-    In each triangle, sides of directions t change by m + a cos 2t + b sin 2t; (a, b) is the shear.
+    In each triangle, the log of a side of direction t changes by m + a cos 2t + b sin 2t, where (a, b) is the shear.
     """
     angles = corner_angles(lengths)
-    # Directions of sides 0, 1, 2, walking around: each turns by the outer angle between them.
+    # Directions of sides 0, 1, 2 around the triangle; consecutive sides differ by the exterior angle.
     directions = np.stack(
         [np.zeros(len(angles)), np.pi - angles[:, 2], 2 * np.pi - angles[:, 2] - angles[:, 0]], axis=1
     )
@@ -210,8 +217,8 @@ def shear_norm(mesh: TriangleMesh, lengths: FloatArray, cones: IntArray) -> csc_
     near[cones] = True
     for _ in range(CONE_RINGS - 1):
         near[mesh.edges[near[mesh.edges].any(axis=1)]] = True
-    is_spared = near[mesh.faces].any(axis=1)
-    norms = (double_areas(lengths) * np.where(is_spared, 1 / SCALING_WEIGHT, 1.0))[:, None] * [
+    is_stiff = near[mesh.faces].any(axis=1)
+    norms = (double_areas(lengths) * np.where(is_stiff, 1 / SCALING_WEIGHT, 1.0))[:, None] * [
         SCALING_WEIGHT,
         1.0,
         1.0,

@@ -15,20 +15,20 @@ from ..base.compiled import compiled
 from ..errors import MetricError
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..linalg import Factor, factorize
-from ..mesh.connectivity import sort_few
+from ..mesh.connectivity import sort_keys
 
-# Rows of the matrix are corrected for that have changed by more than this share of their diagonal, but so many of them
-# at most: those around cones and in coarse triangles. Conjugate gradients then take a quarter to a sixth of the
-# iterations, and the factorization of these rows takes a twentieth of that of all: 17% of the time of a flattening of
-# 97,000 triangles, 2 to 9% on other models.
+# Relative change of a row, in terms of its diagonal, above which the preconditioner is corrected for it, and largest
+# fraction of such rows. They are around cones and in coarse triangles. Conjugate gradients then need a quarter to a
+# sixth of the iterations, and the factorization of these rows takes a twentieth of that of the matrix. This saves 17%
+# of the time of a flattening of 97,000 triangles, 2 to 9% on other models.
 CHANGED_SHARE, MAX_CORRECTED_SHARE = 0.03, 0.1
 
 
 class HessianPattern:
-    """The sparsity pattern of the Laplacian of one triangulation, to be filled for many metrics until it is flipped.
+    """The sparsity pattern of the Laplacian of a triangulation, which can be filled for many metrics without flips.
 
-    Every matrix made has the same index arrays (the same objects), whichever vertices are held, so that a
-    solver may keep its symbolic analysis.
+    All matrices share the same index arrays (the same objects), whichever vertices are fixed, so that a solver can
+    reuse its symbolic analysis.
     """
 
     def __init__(self, triangulation: IntrinsicTriangulation) -> None:
@@ -40,19 +40,19 @@ class HessianPattern:
         self._entry = np.full(len(tail), -1, dtype=np.int32)
         count = number_entries(starts, keys, rows, self._entry, self._diagonal)
         self._tail, self._twin, self._starts, self._rows = tail, twin, starts, rows[:count].copy()
-        # SciPy looks at a new matrix for longer than a small one takes to be filled.
+        # For small matrices, the checks of SciPy's constructor take longer than filling in the values.
         self._matrix = csc_matrix((np.zeros(count), self._rows, self._starts), shape=(n, n))
 
-    def matrix(self, cots: FloatArray, held: BoolArray) -> csc_matrix:
-        """Return the (n, n) Laplacian, with rows and columns of the identity at the held vertices.
+    def matrix(self, cots: FloatArray, fixed: BoolArray) -> csc_matrix:
+        """Return the (n, n) Laplacian, with rows and columns of the identity at the fixed vertices.
 
         Args:
             cots: (3m,) cotangent of the angle opposite each half-edge.
-            held: (n,) True for vertices that are no unknowns.
+            fixed: (n,) True for vertices that are not unknowns.
         """
         values = np.empty(len(self._rows))
         fill_values(
-            self._tail, self._twin, cots, held, self._starts, self._rows, self._entry, self._diagonal, values
+            self._tail, self._twin, cots, fixed, self._starts, self._rows, self._entry, self._diagonal, values
         )
         matrix = copy(self._matrix)
         matrix.data = values
@@ -61,11 +61,15 @@ class HessianPattern:
 
 @compiled
 def list_columns(tail: IntArray, twin: IntArray, starts: Int32Array, keys: IntArray) -> None:
-    """Write the entries of each column, with repetitions, behind its start: the row, above 32 bits, and a half-edge.
+    """Write the entries of each column, with repetitions, as keys of a row and a half-edge.
 
-    The bits below are one more than the half-edge from column to row, or 0 for none.
+    The high 32 bits of a key are the row. The low 32 bits are one plus the half-edge from column to row, or 0 if there
+    is none.
 
-    starts: (n + 1,) zeros on entry, starts of the columns on return. keys: room for n + 6m entries.
+    Args:
+        tail, twin: the triangulation.
+        starts: (n + 1,) zeros on entry, starts of the columns on return.
+        keys: buffer for n + 6m entries.
     """
     n = len(starts) - 1
     for v in range(n):
@@ -98,19 +102,20 @@ def list_columns(tail: IntArray, twin: IntArray, starts: Int32Array, keys: IntAr
 def number_entries(
     starts: Int32Array, keys: IntArray, rows: Int32Array, entry: Int32Array, diagonal: Int32Array
 ) -> int:
-    """Sort the rows of each column and keep each once; return the number of entries.
+    """Sort the rows of each column and remove repetitions; return the number of entries.
 
     Args:
-        starts, keys: see `list_columns`; where columns start without repetitions on return.
-        rows: filled.
-        entry: (3m,) -1; filled with where the entry of each half-edge, (head, tail), is, unless these are one vertex.
-        diagonal: (n,) filled with where the diagonal is.
+        starts, keys: see `list_columns`; on return, `starts` are those of the columns without repetitions.
+        rows: the rows of the entries on return.
+        entry: (3m,) -1 on entry; the index of the entry (head, tail) of each half-edge on return, unless both ends are
+            the same vertex.
+        diagonal: (n,) the indices of the diagonal entries on return.
     """
     kept, begin = 0, 0
     for v in range(len(starts) - 1):
         end = starts[v + 1]
         starts[v] = kept
-        sort_few(keys[begin:end])
+        sort_keys(keys[begin:end])
         last = -1
         for at in range(begin, end):
             row, h = keys[at] >> 32, (keys[at] & 0xFFFFFFFF) - 1
@@ -129,7 +134,7 @@ def number_entries(
 
 @compiled
 def find_entry(starts: Int32Array, rows: Int32Array, row: int, column: int) -> int:
-    """Return where an entry is stored."""
+    """Return the index of the entry (row, column), by binary search."""
     low: int = starts[column]
     high: int = starts[column + 1] - 1
     while low < high:
@@ -146,14 +151,14 @@ def fill_values(
     tail: IntArray,
     twin: IntArray,
     cots: FloatArray,
-    held: BoolArray,
+    fixed: BoolArray,
     starts: Int32Array,
     rows: Int32Array,
     entry: Int32Array,
     diagonal: Int32Array,
     values: FloatArray,
 ) -> None:
-    """Fill in w_ij = (cot a + cot b) / 2, with unit rows and columns at the held vertices."""
+    """Write the values, w_ij = (cot a + cot b) / 2, with rows and columns of the identity at the fixed vertices."""
     values[:] = 0.0
     for base in range(0, len(tail), 3):
         for x in range(3):
@@ -165,13 +170,13 @@ def fill_values(
             values[diagonal[i]] += weight
             if t < 0:
                 values[diagonal[j]] += weight
-            if held[i] or held[j]:
+            if fixed[i] or fixed[j]:
                 continue
             values[entry[h]] -= weight
             if t < 0:
                 values[find_entry(starts, rows, i, j)] -= weight
-    for v in range(len(held)):
-        if held[v]:
+    for v in range(len(fixed)):
+        if fixed[v]:
             values[diagonal[v]] = 1.0
 
 
@@ -183,20 +188,20 @@ def changed_share(
     other_starts: Int32Array,
     other_rows: Int32Array,
     other_values: FloatArray,
-    held: BoolArray,
+    fixed: BoolArray,
 ) -> FloatArray:
-    """Return (n,) by how much two symmetric matrices differ in each column, as a share of the other's diagonal.
+    """Return (n,) the difference of two symmetric matrices in each column, relative to the diagonal of the second.
 
-    Both have sorted rows. Rows and columns that are held do not count.
+    Both have sorted rows. Rows and columns of fixed vertices do not count.
     """
-    share = np.zeros(len(held))
-    for v in range(len(held)):
-        if held[v]:
+    share = np.zeros(len(fixed))
+    for v in range(len(fixed)):
+        if fixed[v]:
             continue
         change, diagonal = 0.0, 0.0
         at, other = starts[v], other_starts[v]
         while at < starts[v + 1] or other < other_starts[v + 1]:
-            row = rows[at] if at < starts[v + 1] else len(held)
+            row = rows[at] if at < starts[v + 1] else len(fixed)
             if other < other_starts[v + 1]:
                 row = min(row, other_rows[other])
             value = 0.0
@@ -208,23 +213,23 @@ def changed_share(
                 if row == v:
                     diagonal = other_values[other]
                 other += 1
-            if not held[row]:
+            if not fixed[row]:
                 change += abs(value)
         share[v] = change / diagonal if diagonal > 0 else np.inf
     return share
 
 
 class Inverse(Protocol):
-    """What applies the inverse of a Laplacian, or something close to it; see `coneflat.linalg.Factor`."""
+    """Interface of the inverse of a Laplacian, or of an approximation to it; see `coneflat.linalg.Factor`."""
 
     @property
     def break_even(self) -> int:
-        """How many solutions take as long as another factorization."""
+        """Number of solves that take as long as a factorization."""
         ...
 
     @property
     def laplacian(self) -> csc_matrix:
-        """The matrix (n, n), with sorted indices, whichever rows are held at 0."""
+        """The matrix (n, n), with sorted indices; which of its rows are fixed does not matter."""
         ...
 
     def solve(self, right: FloatArray) -> FloatArray:
@@ -233,35 +238,36 @@ class Inverse(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class HeldInverse:
-    """A factorized Laplacian with rows and columns of the identity where the solution is held at 0."""
+class GroundedInverse:
+    """A factorized Laplacian with rows and columns of the identity where the solution is fixed at 0."""
 
     factor: Factor
     laplacian: csc_matrix
-    held: BoolArray
+    fixed: BoolArray
 
     @property
     def break_even(self) -> int:
-        """How many solutions take as long as another factorization."""
+        """Number of solves that take as long as a factorization."""
         return self.factor.break_even
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Return (n,) the solution, 0 where it is held."""
-        return np.where(self.held, 0.0, self.factor.solve(np.where(self.held, 0.0, right)))
+        """Return (n,) the solution for a right-hand side (n,), 0 at the fixed vertices."""
+        return np.where(self.fixed, 0.0, self.factor.solve(np.where(self.fixed, 0.0, right)))
 
 
 @dataclass(frozen=True, eq=False)
 class CorrectedInverse:
-    """The inverse of a similar matrix between two exact solutions of the rows that differ most.
+    """The inverse of a similar matrix, combined with exact solves for the rows that differ most.
 
-    A multiplicative Schwarz method, symmetric (B. Smith, P. Bjorstad, W. Gropp, "Domain decomposition", 1996): what the
-    rows chosen can do about the residual, what the other inverse can do about the rest, and what they can do then.
+    This is a symmetric multiplicative Schwarz method (B. Smith, P. Bjorstad, W. Gropp, "Domain decomposition", 1996):
+    a solve for the chosen rows, a solve with the other inverse for the remaining residual, and again a solve for the
+    chosen rows.
 
     Attributes:
-        inverse: of the similar matrix.
+        inverse: inverse of the similar matrix.
         chosen: (c,) rows.
-        columns: (n, c) those of the matrix.
-        factor: of its rows and columns.
+        columns: (n, c) the columns of the matrix at these rows.
+        factor: factor of the (c, c) block of these rows and columns.
     """
 
     inverse: Inverse
@@ -271,12 +277,12 @@ class CorrectedInverse:
 
     @property
     def break_even(self) -> int:
-        """How many solutions take as long as another factorization."""
+        """Number of solves that take as long as a factorization."""
         return self.inverse.break_even
 
     @property
     def laplacian(self) -> csc_matrix:
-        """The similar matrix."""
+        """The similar matrix (n, n)."""
         return self.inverse.laplacian
 
     def solve(self, right: FloatArray) -> FloatArray:
@@ -288,14 +294,17 @@ class CorrectedInverse:
         return solution
 
 
-def corrected(inverse: Inverse, matrix: csc_matrix, held: BoolArray) -> Inverse:
-    """Return an inverse that is closer to that of a matrix (n, n), with sorted indices.
+def corrected(inverse: Inverse, matrix: csc_matrix, fixed: BoolArray) -> Inverse:
+    """Return a better approximation to the inverse of a matrix (n, n) with sorted indices.
 
-    held: (n,) rows that are of no interest.
+    Args:
+        inverse: the inverse of a similar matrix.
+        matrix: the matrix.
+        fixed: (n,) rows that do not count.
     """
 
     one, other = matrix, inverse.laplacian
-    share = changed_share(one.indptr, one.indices, one.data, other.indptr, other.indices, other.data, held)
+    share = changed_share(one.indptr, one.indices, one.data, other.indptr, other.indices, other.data, fixed)
     chosen = np.flatnonzero(share > max(CHANGED_SHARE, float(np.quantile(share, 1 - MAX_CORRECTED_SHARE))))
     if not len(chosen):
         return inverse
@@ -303,17 +312,17 @@ def corrected(inverse: Inverse, matrix: csc_matrix, held: BoolArray) -> Inverse:
     block = csc_matrix(columns.T.tocsc()[:, chosen].T)
     try:
         return CorrectedInverse(inverse, chosen, columns, factorize(block, is_scattered=True))
-    except MetricError:  # what is broken there leaves no unique solution
+    except MetricError:  # broken triangles there make the block singular
         return inverse
 
 
 def conjugate_gradients(
     matrix: csc_matrix, right: FloatArray, inverse: Inverse, accuracy: float
 ) -> FloatArray | None:
-    """Return the solution of a semidefinite system whose right side is in its range; None if that takes too long.
+    """Return the solution of a semidefinite system with a right-hand side in its range; None if it takes too long.
 
-    accuracy: what the residual comes down to, relatively.
+    accuracy: relative residual at which to stop.
     """
-    towards = LinearOperator(matrix.shape, matvec=inverse.solve, dtype=np.float64)
-    solution, failed = cg(matrix, right, rtol=accuracy, atol=0.0, maxiter=inverse.break_even, M=towards)
+    operator = LinearOperator(matrix.shape, matvec=inverse.solve, dtype=np.float64)
+    solution, failed = cg(matrix, right, rtol=accuracy, atol=0.0, maxiter=inverse.break_even, M=operator)
     return None if failed or not np.isfinite(solution).all() else np.asarray(solution)

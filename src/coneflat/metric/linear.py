@@ -1,4 +1,4 @@
-"""The paper's method: a linear system for the scale, lengths by an edge integral, layout by least squares."""
+"""The linear metric of the paper: the log scale solves a linear system, lengths are integrals along edges."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from ..geometry import double_areas, is_broken
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
 from ..stages import ConeSolution, FlatMetric, SolveStatistics
 
-# Layouts square lengths: shorter ones are lost in double precision.
-LEAST_LENGTH = 1e-150
-# |x| below which three terms of a series are sinh(x) / x to rounding.
+# Smallest length whose square, which layouts need, does not underflow in double precision.
+MIN_LENGTH = 1e-150
+# |x| below which three terms of the series equal sinh(x) / x up to rounding.
 SERIES = 1e-3
 
 
 def linear_flat_metric(
     mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, rule: str = "integral"
 ) -> FlatMetric:
-    """Return the paper's metric (Section 2.3) for cones and their log scale, at the area of the input.
+    """Return the linear metric of the paper (Section 2.3) for cones and their log scale, with the area of the input.
 
     Args:
         mesh: connected.
@@ -28,16 +28,16 @@ def linear_flat_metric(
         rule: as in `scaled_lengths`.
 
     Raises:
-        MetricError: scales are so far apart that lengths overflow.
+        MetricError: the range of the scale is so large that lengths overflow or underflow.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         scaled = scaled_lengths(lengths, mesh.faces, solution.log_scale, rule)
         shrink = float(np.sqrt(double_areas(lengths).sum() / double_areas(scaled).sum()))
         scaled *= shrink
-    if not (np.isfinite(scaled).all() and scaled.min() > LEAST_LENGTH):
+    if not (np.isfinite(scaled).all() and scaled.min() > MIN_LENGTH):
         raise MetricError(
-            f"the scale would vary by a factor of e^{np.ptp(solution.log_scale):.4g} over the mesh, more than numbers "
-            f"can hold: {len(solution.cones)} cones are too few, or their curvatures too extreme"
+            f"the scale would vary by a factor of e^{np.ptp(solution.log_scale):.4g} over the mesh, which overflows "
+            f"double precision: {len(solution.cones)} cones are too few, or their curvatures too extreme"
         )
     return FlatMetric(
         mesh=mesh,

@@ -1,4 +1,4 @@
-"""The exact method: no curvature error, seams equal on both sides, no flipped triangle."""
+"""The exact method: the curvature is exact, both sides of a seam have equal lengths, no triangle is flipped."""
 
 from __future__ import annotations
 
@@ -17,52 +17,52 @@ from ..stages import ConeSolution, FlatMetric, SolveStatistics
 from .boundary import BoundaryCurvature
 from .exact import ExactMetric, exact_metric
 
-# The curvature of a round boundary is found from the metric it leads to, over and over: rounds at most, and the
-# largest relative change at a vertex at which to stop. What is solved for in the end is exact in any case.
-ROUNDS, ROUND_CHANGE = 40, 1e-3
-# How much of the change is made in each round on holes. The m-th harmonic of the change answers with -1/m there, so
-# that the first would go back and forth for ever; on the outer loop the answer is 1/m.
+# The curvature of a round boundary depends on the metric, so both are computed alternately: largest number of rounds,
+# and the relative change at a vertex at which to stop. The final curvature is attained exactly in any case.
+MAX_ROUNDS, ROUND_TOLERANCE = 40, 1e-3
+# Fraction of the change that is applied in each round on holes. A change of the m-th harmonic leads to a change of
+# -1/m of it in the next round, so the first harmonic would oscillate forever; on the outer loop the factor is 1/m.
 HOLE_STEP = 0.5
-# Relative errors of lengths that rounding cannot make.
+# Relative error of lengths that is larger than rounding errors.
 LENGTH_TOLERANCE = 1e-9
-# Curvature, radians, at a vertex of a round boundary that is not part of a circle any more but a corner too sharp to be
-# one: the sides beside it are nearly all of the boundary. Then the round before has to do.
+# Curvature, radians, above which a vertex of a round boundary is a sharp corner and not part of a circle: its two sides
+# make up nearly all of the boundary. The result of the previous round is then used.
 TOO_SHARP = 0.99 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
 class ExactChoices:
-    """What is prescribed for an exact metric, and how it is laid out.
+    """Conditions of an exact metric.
 
     Attributes:
-        scale_at_cones: phi = 0 at the cones, whose curvatures come out; else their curvatures are prescribed.
-        boundary: curvature wanted on the boundary; None leaves it free, phi = 0 there.
-        kept: (n,) boundary vertices between which lengths are kept: phi = 0 there whatever is wanted, and
-            untangling does not move them. None for none.
-        keep_area: scale the metric to the area of the input; else phi stays 0 on a free boundary, whose
-            lengths are then kept.
-        accepts_failure: return a metric that did not converge.
-        names: (n,) what the user calls each vertex; None if he has no other numbers.
+        scale_at_cones: prescribe phi = 0 at the cones and compute their curvatures; else prescribe their curvatures.
+        boundary: prescribed curvature of the boundary; None for a free boundary with phi = 0.
+        rigid: (n,) boundary vertices between which lengths are preserved: phi = 0 there, even if `boundary` is given,
+            and untangling does not move them. None for none.
+        keep_area: scale the metric to the area of the input; else phi stays 0 on a free boundary, which preserves
+            its lengths.
+        accepts_failure: return a metric that did not converge instead of raising an error.
+        names: (n,) vertex numbers of the input, for messages; None if they are those of the mesh.
     """
 
     scale_at_cones: bool = True
     boundary: BoundaryCurvature | None = None
-    kept: BoolArray | None = None
+    rigid: BoolArray | None = None
     keep_area: bool = True
     accepts_failure: bool = False
     names: IntArray | None = None
 
     def is_open(self, mesh: TriangleMesh) -> BoolArray:
-        """(n,) boundary vertices whose curvature comes out, as phi = 0 there."""
+        """Return (n,) the boundary vertices with prescribed phi = 0, whose curvature is computed."""
         if self.boundary is None:
             return mesh.is_boundary_vertex.copy()
-        return np.zeros(len(mesh.vertices), dtype=bool) if self.kept is None else self.kept.copy()
+        return np.zeros(len(mesh.vertices), dtype=bool) if self.rigid is None else self.rigid.copy()
 
     def is_held(self, mesh: TriangleMesh) -> BoolArray:
-        """(n,) boundary vertices that must stay where the metric has them."""
+        """Return (n,) the boundary vertices that untangling must not move."""
         if self.boundary is not None:
             return mesh.is_boundary_vertex.copy()
-        return np.zeros(len(mesh.vertices), dtype=bool) if self.kept is None else self.kept.copy()
+        return np.zeros(len(mesh.vertices), dtype=bool) if self.rigid is None else self.rigid.copy()
 
 
 def exact_flat_metric(
@@ -72,17 +72,17 @@ def exact_flat_metric(
     choices: ExactChoices,
     flipped: tuple[IntrinsicTriangulation, IntArray] | None = None,
 ) -> FlatMetric:
-    """Return the exact discrete conformal metric that the linear solution is the first step to.
+    """Return the exact discrete conformal metric; the solve starts from the linear solution.
 
     Args:
         mesh: connected.
         lengths: (m, 3) side lengths, model units.
         solution: cones, target curvatures and the linear log scale.
         choices: what is prescribed.
-        flipped: the intrinsic Delaunay triangulation and the half-edges flipped for it, if something has them already.
+        flipped: the intrinsic Delaunay triangulation and the half-edges flipped for it, if known.
 
     Raises:
-        ConvergenceError: the solve ends short of its tolerance, unless that is accepted.
+        ConvergenceError: the solve did not reach its tolerance, and `accepts_failure` is False.
         CurvatureError: no metric has the curvatures.
     """
     is_open = choices.is_open(mesh)
@@ -107,13 +107,13 @@ def exact_flat_metric(
         is_open=is_open,
         is_held=choices.is_held(mesh),
         statistics=statistics_of(solved),
-        notes=_lengths_missed(mesh, lengths, solved, triangles, choices),
+        notes=_length_notes(mesh, lengths, solved, triangles, choices),
         triangles=triangles,
     ).scaled(area_factor(lengths, solved) if choices.keep_area else 1.0)
 
 
 def statistics_of(solved: ExactMetric) -> SolveStatistics:
-    """Return how a metric was found."""
+    """Return the statistics of the solve of a metric."""
     return SolveStatistics(
         newton_steps=solved.steps,
         euclidean_flips=solved.euclidean_flips,
@@ -122,30 +122,33 @@ def statistics_of(solved: ExactMetric) -> SolveStatistics:
     )
 
 
-def _lengths_missed(
+def _length_notes(
     mesh: TriangleMesh,
     lengths: FloatArray,
     solved: ExactMetric,
     flat: FlatTriangles,
     choices: ExactChoices,
 ) -> tuple[str, ...]:
-    """Return how many lengths on the boundary could not be kept, if so: flipped edges are none of the metric."""
-    if choices.kept is None or not solved.doubled:
+    """Return a note with the number of rigid boundary edges whose lengths changed; empty if there are none.
+
+    This happens if the surface was doubled, as boundary edges are then flipped and not edges of the metric.
+    """
+    if choices.rigid is None or not solved.doubled:
         return ()
-    sides = mesh.edge_halfedges[mesh.is_boundary_edge & choices.kept[mesh.edges].all(axis=1), 0]
+    sides = mesh.edge_halfedges[mesh.is_boundary_edge & choices.rigid[mesh.edges].all(axis=1), 0]
     off = np.abs(np.abs(flat.sides[sides]) / lengths.ravel()[sides] - 1)
     missed = int(np.count_nonzero(off > LENGTH_TOLERANCE))
     if not missed:
         return ()
     return (
         f"{plural(missed, 'edge')} of {len(sides):,} on the boundary or on marked seams could not keep their lengths, "
-        f"which are off by up to {off.max():.2g} of them: triangles are too coarse there for the curvature around. "
+        f"with relative errors of up to {off.max():.2g}: the triangles there are too coarse for the curvature nearby. "
         "Remesh there, or allow more cones.",
     )
 
 
 def area_factor(lengths: FloatArray, solved: ExactMetric) -> float:
-    """Return the factor of lengths that brings a metric to the area of a mesh with given (m, 3) side lengths."""
+    """Return the factor of lengths that scales a metric to the area of a mesh with given (m, 3) side lengths."""
     flat = solved.triangulation.length.reshape(-1, 3)
     copies = len(flat) / len(lengths)  # 2 where the surface was doubled
     return float(np.sqrt(copies * double_areas(lengths).sum() / double_areas(flat).sum()))
@@ -159,7 +162,7 @@ def _solve(
     fixed: BoolArray,
     flipped: tuple[IntrinsicTriangulation, IntArray] | None,
 ) -> tuple[ExactMetric, FloatArray]:
-    """Return the metric and the curvature it was solved for; a round boundary follows from the metric."""
+    """Return the metric and its target curvature (n,), which for a round boundary depends on the metric."""
     boundary = choices.boundary
 
     inverse = solution.inverse
@@ -176,13 +179,13 @@ def _solve(
         return solve(inside, solution.log_scale), inside
     wanted = boundary.target(lengths, solution.log_scale)
     if _is_too_sharp(boundary, wanted):
-        # By the linear scale one side of the boundary is nearly all of it, as on a field of spikes.
+        # With the linear scale, one side makes up nearly all of the boundary, as on a surface of many spikes.
         wanted = boundary.target(lengths, np.zeros_like(solution.log_scale))
     solved = solve(inside + wanted, solution.log_scale)
     step = np.where(wanted < 0, HOLE_STEP, 1.0)
-    for _ in range(ROUNDS if boundary.has_round_loops else 0):
+    for _ in range(MAX_ROUNDS if boundary.has_round_loops else 0):
         change = boundary.target(lengths, solved.log_scale) - wanted
-        if not solved.converged or not (np.abs(change) > ROUND_CHANGE * np.abs(wanted)).any():
+        if not solved.converged or not (np.abs(change) > ROUND_TOLERANCE * np.abs(wanted)).any():
             break
         rounder = wanted + step * change
         if _is_too_sharp(boundary, rounder):
@@ -195,5 +198,5 @@ def _solve(
 
 
 def _is_too_sharp(boundary: BoundaryCurvature, wanted: FloatArray) -> bool:
-    """Whether a round boundary would have a corner; those that the user gives do not count."""
+    """Return whether a round boundary would have a sharp corner that the user did not prescribe."""
     return boundary.has_round_loops and bool((wanted[boundary.corners == 0] >= TOO_SHARP).any())

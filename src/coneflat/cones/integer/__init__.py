@@ -1,1 +1,1 @@
-"""Cones whose curvatures are whole multiples of a quantum."""
+"""Cones whose curvatures are integer multiples of a quantum."""

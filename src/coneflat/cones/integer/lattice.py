@@ -1,4 +1,4 @@
-"""Sets of cones whose curvatures are whole multiples of a quantum, on a dense model, and how they are improved."""
+"""Sets of cones with integer multiples of a quantum as curvatures, on a dense model, and moves that improve them."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
-from ..sparse.dense_model import MIN_RELATIVE_GAIN, BestSets, DenseModel, above_rounding
+from ..sparse.dense_model import MIN_RELATIVE_GAIN, BestSets, DenseModel, nonnegative
 from ..sparse.fit_curvatures import fit_curvatures
 from .moves import Quanta, best_merge, best_pair, best_split, descend, energy_of
 
-# Exchanges tried at a time: for more than a hundred cones, what comes later gains little.
+# Largest number of exchanges that are tried in a call; with more than a hundred cones, later ones gain little.
 MAX_EXCHANGES = 100
 
 
 @dataclass(frozen=True, eq=False)
 class IndexedCones:
-    """Cones with their indices.
+    """A set of cones with integer indices.
 
     Attributes:
         energy: E^2.
         members: (s,) candidates, the required ones first.
-        indices: (s,) quanta of each, none of them 0.
+        indices: (s,) curvature of each cone in quanta, not 0.
     """
 
     energy: float
@@ -35,13 +35,13 @@ class IndexedCones:
 
 @dataclass(eq=False)
 class Lattice:
-    """Indexed cones on the candidates of a dense model, and the best that were found.
+    """Sets of indexed cones on the candidates of a dense model, and the best ones found.
 
     Attributes:
-        model: the energies.
-        quanta: bounds of the indices.
-        total: what the indices sum to, None on a bounded mesh.
-        best: by number of cones.
+        model: the dense model with the energies.
+        quanta: the quantum and the bounds of the indices.
+        total: sum of the indices; None on a mesh with boundary.
+        best: the best set found of each number of cones.
     """
 
     model: DenseModel
@@ -51,7 +51,7 @@ class Lattice:
 
     @property
     def fewest(self) -> int:
-        """The least number of cones that can carry the total."""
+        """The smallest number of cones that can carry the total curvature."""
         if not self.total:
             return 0
         return -(-self.total // (self.quanta.most if self.total > 0 else self.quanta.least))
@@ -61,16 +61,16 @@ class Lattice:
         return (self.quanta.quantum * cones.indices).astype(np.float64)
 
     def descended(self, members: IntArray, indices: IntArray) -> IndexedCones:
-        """Return cones after moves have come to rest; their number stays."""
+        """Return cones (s,) improved by moves until none lowers E^2; their number stays the same."""
         model, members, indices = self.model, members.copy(), indices.copy()
         fixed = len(model.fixed)
         energy = descend(
             model.gram, model.slope, model.constant, members, indices, fixed, self.quanta, model.usable
         )
-        return IndexedCones(above_rounding(energy), members, indices)
+        return IndexedCones(nonnegative(energy), members, indices)
 
     def grown(self, cones: IndexedCones) -> IndexedCones | None:
-        """Return cones with one more (two more, of opposite sign, if there were none and the sum is 0)."""
+        """Return cones with one cone more (two more, of opposite sign, if there was none and the sum is 0), or None."""
         if not len(cones) and self.total is not None:
             return self.grown_by_pair(cones)
         model, indices = self.model, cones.indices
@@ -85,7 +85,7 @@ class Lattice:
         return self.descended(np.append(cones.members, chosen), indices)
 
     def grown_by_pair(self, cones: IndexedCones) -> IndexedCones | None:
-        """Return cones with two more, of a quantum each and of opposite sign."""
+        """Return cones with two cones more, of one quantum each and opposite sign, or None."""
         model, (quantum, least, most, _) = self.model, self.quanta
         if least > -1 or most < 1:
             return None
@@ -94,24 +94,24 @@ class Lattice:
             return None
         return self.descended(np.append(cones.members, pair), np.append(cones.indices, [1, -1]))
 
-    def without(self, cones: IndexedCones, place: int) -> IndexedCones | None:
-        """Return cones with the one at a place merged into the one that takes its quanta best."""
+    def merged(self, cones: IndexedCones, place: int) -> IndexedCones | None:
+        """Return cones without the one at an index; the best other cone takes its quanta. None if there is none."""
         model = self.model
-        can_go, heir = best_merge(model.gram, model.slope, cones.members, cones.indices, place, self.quanta)
+        can_go, taker = best_merge(model.gram, model.slope, cones.members, cones.indices, place, self.quanta)
         if not can_go:
             return None
         indices = cones.indices.copy()
-        if heir >= 0:
-            indices[heir] += indices[place]
+        if taker >= 0:
+            indices[taker] += indices[place]
         members, indices = np.delete(cones.members, place), np.delete(indices, place)
         energy = energy_of(model.gram, model.slope, model.constant, members, indices, self.quanta.quantum)
-        return IndexedCones(above_rounding(energy), members, indices)
+        return IndexedCones(nonnegative(energy), members, indices)
 
     def shrunk(self, cones: IndexedCones) -> IndexedCones | None:
-        """Return cones with one less, the best after moves."""
+        """Return the best set with one cone less, after moves, or None."""
         found = None
         for place in range(len(self.model.fixed), len(cones)):
-            rest = self.without(cones, place)
+            rest = self.merged(cones, place)
             if rest is not None:
                 rest = self.descended(rest.members, rest.indices)
                 if found is None or rest.energy < found.energy:
@@ -119,13 +119,13 @@ class Lattice:
         return found
 
     def exchanged(self, cones: IndexedCones) -> IndexedCones:
-        """Return cones after merging and splitting, one pair at a time, has come to rest, or has taken long."""
+        """Return cones improved by removing one cone and adding another, until there is no gain or the limit."""
         fixed = len(self.model.fixed)
         place, unchanged = fixed, 0
         for _ in range(MAX_EXCHANGES):
             if unchanged >= len(cones) - fixed:
                 break
-            rest = self.without(cones, place)
+            rest = self.merged(cones, place)
             again = None if rest is None or not len(rest) else self.grown(rest)
             if again is not None and again.energy < cones.energy * (1 - MIN_RELATIVE_GAIN):
                 cones, unchanged = again, 0
@@ -135,10 +135,10 @@ class Lattice:
         return cones
 
     def rounded(self, members: IntArray) -> IndexedCones | None:
-        """Return cones with indices by rounding their best curvatures, the surest first, the others refitted.
+        """Return cones with indices from rounding the best curvatures of members (s,); None if the sum is wrong.
 
-        This is Babai's nearest plane in an order of its own. Members that round to nothing are left out, unless
-        required. None if the sum is missed.
+        The curvature nearest to a multiple is rounded first, and the others are refitted: this is Babai's nearest plane
+        algorithm in a special order. Members that are rounded to 0 are left out unless they are required.
         """
         model, (quantum, least, most, _) = self.model, self.quanta
         indices = np.zeros(len(members), dtype=np.int64)
@@ -155,8 +155,8 @@ class Lattice:
             if not feasible:
                 return None
             nearest = np.round(curvatures / quantum)
-            surest = int(np.argmin(np.abs(curvatures / quantum - nearest)))
-            place, value = places[surest], int(np.clip(nearest[surest], least, most))
+            closest = int(np.argmin(np.abs(curvatures / quantum - nearest)))
+            place, value = places[closest], int(np.clip(nearest[closest], least, most))
             is_open[place] = False
             indices[place] = value if value or place >= len(model.fixed) else 1
         if self.total is not None and indices.sum() != self.total:
@@ -164,8 +164,8 @@ class Lattice:
         keep = indices != 0
         return self.descended(members[keep], indices[keep]) if keep.any() or self.total in (0, None) else None
 
-    def any_of(self, count: int) -> IndexedCones | None:
-        """Return so many cones that keep sum and bounds, to start from."""
+    def initial_cones(self, count: int) -> IndexedCones | None:
+        """Return initial cones, at most `count`, that satisfy sum and bounds; None if there are none."""
         model, (_, least, most, _) = self.model, self.quanta
         steepest = np.flatnonzero(model.usable)[np.argsort(model.slope[model.usable], kind="stable")]
         members = np.concatenate([model.fixed, steepest])[:count]

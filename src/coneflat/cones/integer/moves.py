@@ -1,7 +1,7 @@
-"""Moves of cones whose curvatures are whole multiples of a quantum.
+"""Moves of cones whose curvatures are integer multiples of a quantum.
 
-All moves transfer d quanta from cone s to vertex t, which changes E^2 by
-2 d q (slope_t - slope_s) + d^2 q^2 (gram_ss + gram_tt - 2 gram_st), slopes taken at the current curvatures.
+All moves transfer d quanta q from cone s to vertex t, which changes E^2 by
+2 d q (slope_t - slope_s) + d^2 q^2 (gram_ss + gram_tt - 2 gram_st), with the slopes at the current curvatures.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ import numpy as np
 from ...base.arrays import BoolArray, FloatArray, IntArray
 from ...base.compiled import compiled
 from ..solution import TIE_TOLERANCE
-from ..sparse.dense_model import first_least
+from ..sparse.dense_model import argmin_tied
 
-# Transfers of up to so many quanta at once, either way: of the quarter turns there is room for no more in a cone.
+# Largest number of quanta that are transferred at once; a cone cannot hold more quarter turns.
 MAX_QUANTA = 3
 
 
 class Quanta(NamedTuple):
-    """What the cone indices may be.
+    """The quantum and the bounds of cone indices.
 
     Attributes:
         quantum: radians.
         least, most: bounds of each index.
-        has_sum: whether the indices have a sum to keep.
+        has_sum: whether the sum of the indices is prescribed.
     """
 
     quantum: float
@@ -38,7 +38,7 @@ class Quanta(NamedTuple):
 def energy_of(
     gram: FloatArray, slope: FloatArray, constant: float, members: IntArray, indices: IntArray, quantum: float
 ) -> float:
-    """Return E^2."""
+    """Return E^2 of cones with given indices."""
     energy = constant
     for i in range(len(members)):
         k = quantum * indices[i]
@@ -62,20 +62,20 @@ def slopes(
 
 @compiled
 def transfer(gram: FloatArray, gradient: FloatArray, s: int, t: int, k: float) -> float:
-    """Return the change of E^2 if curvature k goes from vertex s to vertex t."""
+    """Return the change of E^2 if curvature k is moved from vertex s to vertex t."""
     norm = gram[s, s] + gram[t, t] - 2 * gram[s, t]
     return (2 * (gradient[t] - gradient[s]) + k * norm) * k
 
 
 @compiled
 def is_within(index: int, quanta: Quanta) -> bool:
-    """Whether a cone may have this index."""
+    """Return whether a cone may have an index."""
     return index != 0 and quanta.least <= index <= quanta.most
 
 
 @compiled
 def without_members(usable: BoolArray, members: IntArray) -> BoolArray:
-    """Return a mask of the usable candidates that are not members."""
+    """Return (m,) a mask of the usable candidates that are not members."""
     free = usable.copy()
     for member in members:
         free[member] = False
@@ -93,15 +93,22 @@ def descend(
     quanta: Quanta,
     usable: BoolArray,
 ) -> float:
-    """Make the best move over and over, in place, until none lowers E^2; return it. The number of cones stays.
+    """Apply the best move repeatedly, in place, until none lowers E^2; return E^2. The number of cones is unchanged.
 
-    Moves: quanta go from one cone to another; a cone goes to another candidate; without a sum to keep, a cone gains
-    or loses quanta.
+    The moves are: transfer quanta from one cone to another, move a cone to another candidate, and, without a prescribed
+    sum, add quanta to a cone or remove them.
+
+    Args:
+        gram, slope, constant: the energy, see `DenseModel`.
+        members, indices: (s,) the cones and their quanta; changed in place.
+        fixed: number of required cones, which come first and stay at their vertices.
+        quanta: the quantum and the bounds of the indices.
+        usable: (m,) mask of the candidates.
     """
     size, count, quantum = len(members), len(slope), quanta.quantum
     energy = energy_of(gram, slope, constant, members, indices, quantum)
     free = without_members(usable, members)
-    for _ in range(100 + 20 * size):  # comes to rest in a few per cone
+    for _ in range(100 + 20 * size):  # converges after a few moves per cone
         gradient = slopes(gram, slope, members, quantum, indices)
         best, kind, one, other, amount = -TIE_TOLERANCE * abs(energy), 0, -1, -1, 0
         for i in range(size):
@@ -150,9 +157,9 @@ def best_split(
     quanta: Quanta,
     usable: BoolArray,
 ) -> tuple[int, int, int]:
-    """Return the best further cone: the candidate, its index, and the place of the cone it takes that from.
+    """Return the best additional cone: the candidate, its index, and the position of the cone that gives the quanta.
 
-    The place is -1 where there is no sum to keep. The candidate is -1 if nothing can be split.
+    The position is -1 if the sum is not prescribed. The candidate is -1 if no cone can be split.
     """
     free = without_members(usable, members)
     gradient = slopes(gram, slope, members, quanta.quantum, indices)
@@ -183,7 +190,7 @@ def best_pair(
     quantum: float,
     usable: BoolArray,
 ) -> tuple[int, int] | None:
-    """Return the two further cones, of a quantum and of minus that, which lower E^2 most; None if there is no room."""
+    """Return the two candidates for additional cones of plus and minus one quantum that lower E^2 most, or None."""
     free = np.flatnonzero(without_members(usable, members))
     if len(free) < 2:
         return None
@@ -192,7 +199,7 @@ def best_pair(
     norms = gram.diagonal()[:, None] + gram.diagonal() - 2 * gram
     changes = (2 * (gradient - gradient[:, None]) + quantum * norms) * quantum
     np.fill_diagonal(changes, np.inf)
-    giver, taker = divmod(first_least(changes.ravel()), len(free))
+    giver, taker = divmod(argmin_tied(changes.ravel()), len(free))
     return int(free[taker]), int(free[giver])
 
 
@@ -200,9 +207,9 @@ def best_pair(
 def best_merge(
     gram: FloatArray, slope: FloatArray, members: IntArray, indices: IntArray, place: int, quanta: Quanta
 ) -> tuple[bool, int]:
-    """Return whether all quanta of the cone at `place` can go, and the place of the cone that best takes them.
+    """Return whether the cone at `place` can be removed, and the position of the cone that best takes its quanta.
 
-    The place is -1 if it is best that they just go, without a sum to keep.
+    The position is -1 if the sum is not prescribed and it is best that no cone takes them.
     """
     gradient = slopes(gram, slope, members, quanta.quantum, indices)
     s = members[place]

@@ -1,7 +1,7 @@
-"""The fewest cones whose curvatures are multiples of a quantum.
+"""Search for the fewest cones whose curvatures are multiples of a quantum.
 
-For given positions this is an integer least squares problem in a few unknowns; here positions and indices are searched
-together, by moves that keep the sum.
+For given positions this is an integer least-squares problem in a few unknowns. Here, positions and indices are searched
+together, by moves that preserve the sum.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from ..sparse.search import COARSE_MODEL_ERROR, ConeSearch
 from .lattice import IndexedCones, Lattice
 from .moves import Quanta
 
-# Vertices around each cone among which it may move, and moves of one or two cones at most.
+# Number of vertices around each cone to which it may move, and largest number of moves of one or two cones.
 MAX_NEIGHBOURS, MAX_MOVES = 60, 30
-# How often to compare the linear model with the metric that it stands for.
+# Largest number of comparisons of the linear model with the exact metric.
 MAX_COMPARISONS = 4
-# Radians below which nothing is gained.
+# Error of the rotations, radians, at which moving cones stops.
 MIN_GAIN = 1e-4
 
 
-# Curvature, radians, that stands for "no bound": more than that of any cone worth having.
+# Curvature, radians, that represents "no bound"; larger than that of any useful cone.
 UNBOUNDED = 2000 * math.pi
-# The survey ends so many sizes after the goal is met, or after E has ceased to fall: more cones of whole quanta need
-# not be better.
+# The search on the coarse model ends this number of sizes after the goal is met, or after E has stopped decreasing:
+# with integer quanta, more cones are not always better.
 SIZES_PAST_GOAL, SIZES_PAST_STALL = 2, 5
-# Fewer cones are not sought from a number whose E^2 is more than so many times the goal.
+# Sets with fewer cones are not searched for from sets whose E^2 exceeds the goal by more than this factor.
 MAX_ENERGY_RATIO = 4.0
 
 
@@ -45,21 +45,21 @@ def align_handles(
     search: ConeSearch,
     quantised: QuantisedCones,
     by_scale: FloatArray,
-    turned: Callable[[ConeSolution], FloatArray],
+    holonomy: Callable[[ConeSolution], FloatArray],
     bound: float,
 ) -> QuantisedCones:
-    """Return quantised cones moved so that loops turn by near multiples of the quantum.
+    """Return quantised cones that are moved so that the holonomy of loops is close to multiples of the quantum.
 
     Args:
-        search: that found the cones.
+        search: the search that found the cones.
         quantised: the cones.
-        by_scale: (2 genus, n) derivative of the loops' turning by the log scale.
-        turned: returns (2 genus,) what the loops turn by in the metric with given cones, radians.
-        bound: the E allowed.
+        by_scale: (2 genus, n) derivative of the rotation along loops by the log scale.
+        holonomy: function that returns (2 genus,) the rotations along loops in the metric with given cones, radians.
+        bound: the allowed E.
     """
     operator = search.operator
     by_curvature = operator.solve(np.ascontiguousarray(by_scale[:, operator.vertices].T))
-    best, best_off = quantised, off_multiple(turned(quantised.solution), quantised.quantum)
+    best, best_off = quantised, off_multiple(holonomy(quantised.solution), quantised.quantum)
     trial, off = best, best_off
     for _ in range(MAX_COMPARISONS):
         if np.abs(best_off).max() <= MIN_GAIN:
@@ -67,7 +67,7 @@ def align_handles(
         moved = moved_cones(search, trial, by_curvature, off, bound)
         if np.array_equal(moved.solution.cones, trial.solution.cones):
             break
-        trial, off = moved, off_multiple(turned(moved.solution), quantised.quantum)
+        trial, off = moved, off_multiple(holonomy(moved.solution), quantised.quantum)
         if (off**2).sum() < (best_off**2).sum():
             best, best_off = trial, off
     return best
@@ -76,40 +76,40 @@ def align_handles(
 def moved_cones(
     search: ConeSearch, quantised: QuantisedCones, by_curvature: FloatArray, off: FloatArray, bound: float
 ) -> QuantisedCones:
-    """Move cones, one or two at a time, as long as what loops are off, by the linear model, gets less.
+    """Return cones moved one or two at a time while the error of the holonomy decreases in the linear model.
 
     Args:
-        search: that found the cones.
+        search: the search that found the cones.
         quantised: the cones.
-        by_curvature: (f, 2 genus) derivative of the turning by curvature.
-        off: (2 genus,) what the loops are off by now, radians.
-        bound: of E.
+        by_curvature: (f, 2 genus) derivative of the rotation along loops by curvature.
+        off: (2 genus,) current difference of the rotations from multiples of the quantum, radians.
+        bound: the allowed E.
     """
     operator = search.operator
     places = search.unknowns_of(quantised.solution.cones)
     curvatures = quantised.quantum * quantised.indices.astype(np.float64)
-    before, caution = (places, off), 1.0
+    before, penalty = (places, off), 1.0
     for _ in range(MAX_MOVES):
         here = search.solution_of(places, curvatures).log_scale[operator.vertices]
         slack = bound**2 - float(here @ operator.weighted(here))
         if slack < 0 and places is not before[0]:
-            # The coarse model promised more than there was.
-            (places, off), caution = before, 2 * caution
+            # The coarse model underestimated E: undo the move and increase its penalty.
+            (places, off), penalty = before, 2 * penalty
             continue
         score = operator.solve(operator.weighted(here))
         cones, targets = _moves(search, places)
         if not len(cones):
             break
         k, old = curvatures[cones], places[cones]
-        turned = k[:, None] * (by_curvature[targets] - by_curvature[old])
-        bending = np.concatenate(
+        turns = k[:, None] * (by_curvature[targets] - by_curvature[old])
+        distances = np.concatenate(
             [search.exact.squared_distances(places[c], targets[cones == c]) for c in np.unique(cones)]
         )
-        costlier = 2 * k * (score[targets] - score[old]) + caution * k**2 * bending
-        # The last stands for no move.
-        cones, turned, costlier = np.append(cones, -1), np.vstack([turned, 0 * off]), np.append(costlier, 0.0)
-        missing = ((off + turned) ** 2).sum(axis=1)
-        pairs = missing[:, None] + missing - (off**2).sum() + 2 * turned @ turned.T
+        costlier = 2 * k * (score[targets] - score[old]) + penalty * k**2 * distances
+        # The last entry represents no move.
+        cones, turns, costlier = np.append(cones, -1), np.vstack([turns, 0 * off]), np.append(costlier, 0.0)
+        missing = ((off + turns) ** 2).sum(axis=1)
+        pairs = missing[:, None] + missing - (off**2).sum() + 2 * turns @ turns.T
         pairs[(costlier[:, None] + costlier > max(slack, 0.0)) | (cones[:, None] == cones)] = np.inf
         one, two = np.unravel_index(np.argmin(pairs), pairs.shape)
         if not pairs[one, two] < 0.9 * (off**2).sum():
@@ -118,7 +118,7 @@ def moved_cones(
         for move in (one, two):
             if cones[move] >= 0:
                 places[cones[move]] = targets[move]
-        off = off + turned[one] + turned[two]
+        off = off + turns[one] + turns[two]
     solution = search.solution_of(places, curvatures)
     inner = solution.log_scale[operator.vertices]
     energy = float(np.sqrt(inner @ operator.weighted(inner)))
@@ -126,7 +126,7 @@ def moved_cones(
 
 
 def _moves(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray]:
-    """Return which cone, and whereto, of all moves to usable vertices nearby; required cones stay."""
+    """Return the cone and the target of all moves to usable vertices nearby; required cones are not moved."""
     cones, targets = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for i in range(len(search.coarse.fixed), len(places)):
         near = search.exact.near(int(places[i]), MAX_NEIGHBOURS)
@@ -138,12 +138,12 @@ def _moves(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray]:
 
 @dataclass(frozen=True, eq=False)
 class QuantisedCones:
-    """Cones with integers of quanta.
+    """Cones whose curvatures are integer multiples of a quantum.
 
     Attributes:
         solution: the cones.
-        indices: (s,) quanta of each.
-        quantum: radians, made exact where 2 pi is a multiple of it but for rounding.
+        indices: (s,) curvature of each cone in quanta.
+        quantum: radians; corrected if 2 pi is a multiple of it up to rounding.
         distortion: E of the linear model.
     """
 
@@ -161,25 +161,25 @@ def quantise_cones(
     count: int | None = None,
     most: int | None = None,
 ) -> QuantisedCones:
-    """Find the fewest cones with curvatures that are multiples of a quantum and E <= distortion.
+    """Return the fewest cones with curvatures that are multiples of a quantum and E <= distortion.
 
     Args:
-        search: of the mesh; cones it has found serve as starts.
+        search: the search of the mesh; cones that it has found are used as initial sets.
         quantum: radians.
-        distortion: the E allowed.
-        count: a number of cones instead: the least distortion with at most so many.
-        most: of the fewest, the limit.
+        distortion: the allowed E.
+        count: minimise E with at most this number of cones instead; None to find the fewest.
+        most: largest number of cones; None for no limit.
 
     Raises:
-        OptionError: the quantum makes no sense.
+        OptionError: the quantum or the distortion is not valid.
         CurvatureError: no multiples within the bounds sum to 2 pi chi.
     """
-    lattice = open_lattice(search, quantum)
+    lattice = make_lattice(search, quantum)
     goal = 0.0 if count is not None else distortion * distortion
     if not goal >= 0 or (count is None and not 0 < distortion < math.inf):
         raise OptionError(f"the distortion allowed must be a positive number, not {distortion:g}")
     most = min(search.most_cones, *(limit for limit in (count, most) if limit is not None), search.most_cones)
-    survey(search, lattice, goal, most)
+    search_coarse(search, lattice, goal, most)
     exact = Lattice(search.exact, lattice.quanta, lattice.total)
     sizes = [size for size in lattice.best.sizes if size <= most]
     if not sizes:
@@ -192,11 +192,11 @@ def quantise_cones(
         (size for size in sizes if lattice.best.energy(size) <= goal), min(sizes, key=lattice.best.energy)
     )
     for size in sizes[sizes.index(first) :]:
-        if polish(search, lattice, exact, size) <= goal:
+        if refine(search, lattice, exact, size) <= goal:
             break
     for size in reversed(sizes[: sizes.index(first)]):
         near = lattice.best.energy(size) <= goal * COARSE_MODEL_ERROR
-        if not near or not polish(search, lattice, exact, size) <= goal:
+        if not near or not refine(search, lattice, exact, size) <= goal:
             break
     found = exact.best.fewest(goal)
     order = _order_to_round_in(search, found.members)
@@ -205,8 +205,13 @@ def quantise_cones(
     return QuantisedCones(solution, found.indices[order], lattice.quanta.quantum, math.sqrt(found.energy))
 
 
-def open_lattice(search: ConeSearch, quantum: float) -> Lattice:
-    """Return the lattice of multiples of a quantum that a search's limits allow, without cones yet."""
+def make_lattice(search: ConeSearch, quantum: float) -> Lattice:
+    """Return the lattice of multiples of a quantum within the limits of a search, without cones yet.
+
+    Raises:
+        OptionError: the quantum is out of range.
+        CurvatureError: no multiples within the bounds have the required sum.
+    """
     if not LEAST_QUANTUM <= quantum <= FULL_TURN * (1 + TYPED_TOLERANCE):
         raise OptionError(f"quantum must be from {LEAST_QUANTUM:g} radians to 2 pi, not {quantum:g}")
     parts = round(FULL_TURN / quantum)
@@ -230,17 +235,17 @@ def open_lattice(search: ConeSearch, quantum: float) -> Lattice:
     ):
         raise CurvatureError(
             f"no multiple of {quantum / np.pi:.4g} pi lies within the bounds of cone curvatures, {limits.text()}, and "
-            "helps to their sum"
+            "contributes to their sum"
         )
     return Lattice(search.coarse, Quanta(float(quantum), least, most, total is not None), total)
 
 
 def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
-    """Return the order (s,) of cones: the required ones, and then from where curvature is not wanted to where it is.
+    """Return (s,) the order of cones: first the required ones, then the others by descending slope of E^2.
 
-    To which grid they are rounded depends on it, by chance: of eight orders that were tried this was among the three
-    with which the sample and a scan had grids of about the size asked for. Where cones are wanted alike but for
-    rounding, the order is that of the search's vertices.
+    Integer grids depend on this order by chance: of eight orders that were tried, this was among the three for which
+    the sample and a scan had grids of about the requested size. If slopes are equal up to rounding, the order is that
+    of the vertices of the search.
     """
     order, required = search.exact.in_order(members), len(search.exact.fixed)
     slope = search.exact.slope[members[order[required:]]]
@@ -248,8 +253,8 @@ def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
     return np.append(order[:required], order[required:][np.argsort(-steps, kind="stable")])
 
 
-def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None:
-    """Find good cones of all numbers up to the one that is needed, and a little on, on the coarse model."""
+def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None:
+    """Find good sets of cones on the coarse model, of all sizes up to slightly more than needed."""
     model, best = search.coarse, lattice.best
     fewest = max(lattice.fewest, len(model.fixed))
     most = min(most + 1, search.most_cones)
@@ -257,7 +262,7 @@ def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None
     for found in model.best:
         _offer(lattice, lattice.rounded(found.members))
     if not best.sizes:
-        start = lattice.any_of(fewest)
+        start = lattice.initial_cones(fewest)
         if start is None:
             return
         best.offer(lattice.exchanged(start))
@@ -275,7 +280,7 @@ def survey(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None
 
 
 def _offer(lattice: Lattice, cones: IndexedCones | None, most: float = math.inf) -> None:
-    """Keep cones after exchanges, if these are worth the time."""
+    """Improve cones by exchanges and store them, unless they are too far from the best set of their size."""
     if (
         cones is not None
         and len(cones) <= most
@@ -284,8 +289,8 @@ def _offer(lattice: Lattice, cones: IndexedCones | None, most: float = math.inf)
         lattice.best.offer(lattice.exchanged(cones))
 
 
-def polish(search: ConeSearch, lattice: Lattice, exact: Lattice, size: int) -> float:
-    """Move the coarse model's cones of a number over the mesh until E comes to rest; return E^2."""
+def refine(search: ConeSearch, lattice: Lattice, exact: Lattice, size: int) -> float:
+    """Move the cones of the best coarse set of a size over the mesh until E converges; return E^2."""
     model, start = search.exact, lattice.best[size]
     members = model.insert(search.places[start.members])
     cones = exact.exchanged(exact.descended(members, start.indices))

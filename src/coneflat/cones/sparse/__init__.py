@@ -1,4 +1,4 @@
-"""The fewest cones for the distortion allowed: `ConeSearch`."""
+"""Search for the fewest cones of an allowed distortion: `ConeSearch`."""
 
 from .search import ConeSearch, SparseCones
 

@@ -1,4 +1,4 @@
-"""A coarse model of a Laplacian, found algebraically: smoothed aggregation.
+"""Algebraic coarsening of a Laplacian by smoothed aggregation.
 
 Reference: P. Vanek, J. Mandel, M. Brezina, "Algebraic multigrid by smoothed aggregation for second and fourth
 order elliptic problems", Computing 56, 1996.
@@ -15,30 +15,32 @@ from ...base.arrays import FloatArray, IntArray
 from ...base.compiled import compiled
 from ..solution import TIE_TOLERANCE
 
-# Largest factor by which one level shrinks the model: an aggregate is a vertex and its neighbours.
+# Largest coarsening factor of a level: an aggregate is a vertex with its neighbours.
 LARGEST_AGGREGATE = 7.0
-# Couplings below this share of the geometric mean of the diagonals do not join vertices: across slivers, and to hubs,
-# whose aggregates would swallow all around them.
+# Couplings below this fraction of the geometric mean of the diagonals do not join vertices. Such couplings are across
+# slivers, and to vertices of high valence, whose aggregates would otherwise absorb all their neighbours.
 MIN_COUPLING = 0.02
 # Damping of the Jacobi step that smooths the aggregates: 4/3 over the largest eigenvalue of D^-1 L, about 2.
 DAMPING = 2 / 3
-# Entries below this share of what is large in their row are rounding.
+# Entries below this fraction of the size of their row are rounding errors.
 RELATIVE_ROUNDING = 1e-12
-# Functions that meet at an unknown at most, or it is not smoothed: a hub, which would join all of them to one another.
+# Largest number of functions that meet at an unknown which is smoothed. An unknown of higher valence would couple all
+# of them with one another.
 MAX_MEETING_FUNCTIONS = 100
-# The last level has at most so many times the number of functions wanted, if smaller aggregates can do it.
+# Largest number of functions on the last level, relative to the requested number, if larger aggregates can attain it.
 MAX_SIZE_RATIO = 1.05
-# A level with more than this share of the unknowns of the one before is no progress.
+# Fraction of the unknowns of the previous level above which a level is rejected, as it hardly reduces them.
 MAX_LEVEL_SHARE = 0.9
 
 
 @dataclass(frozen=True, eq=False)
 class CoarseBasis:
-    """Basis functions and what they make of the operators of the mesh.
+    """Coarse basis functions, and the operators of the mesh in this basis.
 
     Attributes:
-        functions: (n, m); None for the identity, whose products take their time.
-        laplacian, mass: (m, m) the same between basis functions; no mass, the areas, for the identity.
+        functions: (n, m) basis functions; None for the identity, which saves products with it.
+        laplacian, mass: (m, m) Laplacian and mass matrix between basis functions; `mass` is None for the identity, as
+            it is then given by the areas.
     """
 
     functions: csr_matrix | None
@@ -47,12 +49,12 @@ class CoarseBasis:
 
 
 def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseBasis:
-    """Return basis functions, about `size`, that reproduce smooth functions on the mesh.
+    """Return about `size` basis functions that approximate smooth functions on the mesh.
 
     Args:
-        laplacian: (n, n) positive (semi)definite; vertices are taken as centres of aggregates in its order.
+        laplacian: (n, n) positive (semi)definite; vertices become centres of aggregates in its order.
         areas: (n,) vertex areas.
-        size: the number of basis functions wanted.
+        size: requested number of basis functions.
     """
     functions: csr_matrix | None = None
     level, mass = laplacian, None
@@ -62,13 +64,13 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
         ratio = level.shape[0] / size
         steps = max(1, round(np.log(ratio) / np.log(LARGEST_AGGREGATE)))
         most = size if steps == 1 else None
-        for weak in (MIN_COUPLING, 0.0):  # all couplings may be weak, as on slivers
-            part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most, weak)
+        for min_coupling in (MIN_COUPLING, 0.0):  # 0 if all couplings are weak, as on slivers
+            part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most, min_coupling)
             if part.shape[1] <= MAX_LEVEL_SHARE * level.shape[0]:
                 break
         else:
-            # Hardly anything is coupled, as on a strip between two boundaries: whatever is next in order.
-            part = _pieces(np.argsort(order, kind="stable") * size // len(order), size)
+            # Hardly any unknowns are coupled, as on a strip between two boundaries: aggregate consecutive unknowns.
+            part = _indicators(np.argsort(order, kind="stable") * size // len(order), size)
         transposed = csr_matrix(part.T)
         level = csr_matrix(transposed @ (level @ part))
         weighted = mass @ part if mass is not None else _with_scaled_rows(part, areas)
@@ -83,30 +85,30 @@ def _with_scaled_rows(matrix: csr_matrix, factors: FloatArray) -> csr_matrix:
     return csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
-def _pieces(labels: IntArray, number: int) -> csr_matrix:
-    """Return (n, number) the functions that are 1 on the unknowns of one label each."""
+def _indicators(labels: IntArray, number: int) -> csr_matrix:
+    """Return (n, number) the indicator functions of the labels 0 to number - 1 of n unknowns."""
     count = len(labels)
     return csr_matrix((np.ones(count), (np.arange(count), labels)), shape=(count, number))
 
 
 def _smoothed_aggregates(
-    level: csr_matrix, order: IntArray, size: float, most: int | None, weak: float
+    level: csr_matrix, order: IntArray, size: float, most: int | None, min_coupling: float
 ) -> csr_matrix:
-    """Return basis functions made of about `size` vertices each, `most` of them if that can be had.
+    """Return basis functions of about `size` vertices each, and about `most` functions if that is possible.
 
-    Couplings below the share `weak` do not join vertices.
+    Couplings below the fraction `min_coupling` do not join vertices.
     """
     count = level.shape[0]
     diagonal = np.maximum(level.diagonal(), 1e-300)
     rows = level.indptr.astype(np.int64), level.indices.astype(np.int64), level.data, diagonal, order
-    labels, number = aggregate(*rows, size, weak)
+    labels, number = aggregate(*rows, size, min_coupling)
     before = count + 1
     while most is not None and most * MAX_SIZE_RATIO < number < before:
-        # Vertices left over make aggregates smaller than wished, and another level for that little makes all dense.
+        # Leftover vertices make aggregates smaller than requested; another level instead would make the matrix dense.
         size *= number / most
         before = number
-        labels, number = aggregate(*rows, size, weak)
-    pieces = _pieces(labels, number)
+        labels, number = aggregate(*rows, size, min_coupling)
+    pieces = _indicators(labels, number)
     image = csr_matrix(level @ pieces)
     damping = np.where(np.diff(image.indptr) > MAX_MEETING_FUNCTIONS, 0.0, DAMPING / diagonal)
     smoothed = csr_matrix(pieces - diags(damping) @ image)
@@ -114,10 +116,10 @@ def _smoothed_aggregates(
 
 
 def _without_rounding(matrix: csr_matrix, sizes: FloatArray) -> csr_matrix:
-    """Return a matrix without the entries that are rounding, given the (n,) sizes of its rows.
+    """Return a matrix without the entries that are rounding errors, given the sizes (n,) of its rows.
 
-    Edges across right angles have a weight of 0 or nearly so. SciPy drops it or not, as it comes out, and the order in
-    which aggregates are made must not depend on that.
+    Edges opposite right angles have weights of about 0. Whether SciPy drops such an entry depends on rounding, and the
+    order of the aggregates must not depend on it.
     """
     kept = matrix.copy()
     kept.data[np.abs(kept.data) <= RELATIVE_ROUNDING * np.repeat(sizes, np.diff(kept.indptr))] = 0.0
@@ -133,12 +135,13 @@ def aggregate(
     diagonal: FloatArray,
     order: IntArray,
     size: float,
-    weak: float,
+    min_coupling: float,
 ) -> tuple[IntArray, int]:
-    """Return (n,) the aggregate of each vertex, and their number.
+    """Return (n,) the aggregate of each vertex, and the number of aggregates.
 
-    A vertex whose neighbours are mostly free takes those that are coupled most strongly; leftovers join their strongest
-    neighbour's aggregate. Couplings below the share `weak` of the geometric mean of the diagonals do not count.
+    A vertex whose neighbours are mostly free forms an aggregate with those that are coupled most strongly. Remaining
+    vertices join the aggregate of their most strongly coupled neighbour. Couplings below the fraction `min_coupling` of
+    the geometric mean of the diagonals do not count.
     """
     count = len(diagonal)
     labels = np.full(count, -1, np.int64)
@@ -150,7 +153,7 @@ def aggregate(
         taken = 0
         for e in range(indptr[vertex], indptr[vertex + 1]):
             other = indices[e]
-            if other != vertex and -weights[e] > weak * np.sqrt(diagonal[vertex] * diagonal[other]):
+            if other != vertex and -weights[e] > min_coupling * np.sqrt(diagonal[vertex] * diagonal[other]):
                 if labels[other] < 0:
                     free += 1
                 else:
@@ -158,11 +161,11 @@ def aggregate(
         if free + 1 < 0.6 * size and taken > 0:
             continue
         labels[vertex] = number
-        room = size - 1 if free + 1 > size else free
-        # A fractional size is met on average: the remainder decides for every so many aggregates.
-        room = np.floor((number + 1) * room) - np.floor(number * room) if room != free else free
-        while room >= 1:
-            strongest, best = -1, weak
+        space = size - 1 if free + 1 > size else free
+        # A fractional size is attained on average, by rounding the cumulative size.
+        space = np.floor((number + 1) * space) - np.floor(number * space) if space != free else free
+        while space >= 1:
+            strongest, best = -1, min_coupling
             for e in range(indptr[vertex], indptr[vertex + 1]):
                 other = indices[e]
                 if other != vertex and labels[other] < 0:
@@ -172,7 +175,7 @@ def aggregate(
             if strongest < 0:
                 break
             labels[strongest] = number
-            room -= 1
+            space -= 1
         number += 1
     joined = labels.copy()
     for vertex in order:
@@ -192,7 +195,7 @@ def aggregate(
 
 
 def _order_of_aggregates(part: csr_matrix, order: IntArray) -> IntArray:
-    """Return the aggregates in the order of their first members."""
+    """Return the order of aggregates by their first members."""
     place = np.empty(len(order), dtype=np.int64)
     place[order] = np.arange(len(order))
     columns = part.tocsc()
@@ -201,9 +204,9 @@ def _order_of_aggregates(part: csr_matrix, order: IntArray) -> IntArray:
 
 
 def representatives(basis: csr_matrix, fitness: FloatArray) -> IntArray:
-    """Return for each coarse function the vertex where it is largest, times the fitness, without repetitions.
+    """Return the vertices where a coarse function times the fitness is largest, ascending and without repetitions.
 
-    The first but for ties; none where the function is nowhere positive.
+    Among equal values, the first vertex is taken. Functions that are nowhere positive have none.
     """
     columns = _with_scaled_rows(basis, fitness).tocsc()
     column = np.repeat(np.arange(basis.shape[1]), np.diff(columns.indptr))

@@ -1,4 +1,4 @@
-"""The biharmonic kernel on a coarse basis, dense: cones are searched there first."""
+"""The biharmonic kernel on a coarse basis, as a dense matrix; cones are searched on it first."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .green import GreenOperator
 
 @dataclass(frozen=True, eq=False)
 class CoarseModel:
-    """G A G on functions of a coarse basis.
+    """The kernel G A G on a coarse basis.
 
     Attributes:
-        basis: (f, m); None for the identity, which small meshes have.
-        kernel: (m, m).
-        slope: (m,) minus the kernel times the curvature, which makes E^2 = constant + 2 slope k + k kernel k.
+        basis: (f, m) the m basis functions; None for the identity, which is used for small meshes.
+        kernel: (m, m) G A G between basis functions.
+        slope: (m,) minus the kernel times the curvature, so that E^2 = constant + 2 slope k + k kernel k.
         constant: E^2 without cones.
     """
 
@@ -38,38 +38,38 @@ class CoarseModel:
         return len(self.slope)
 
     def at(self, unknowns: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return kernel and slope at vertices of the mesh."""
+        """Return the kernel (k, k) and the slope (k,) at k unknowns of the mesh."""
         if self.basis is None:
             return self.kernel[np.ix_(unknowns, unknowns)], self.slope[unknowns]
         rows = self.basis[unknowns]
         return np.asarray((rows @ (rows @ self.kernel).T).T), np.asarray(rows @ self.slope)
 
     def scaled_to(self, constant: float) -> CoarseModel:
-        """Return the model whose E^2 without cones is this.
+        """Return the model scaled to a given E^2 without cones.
 
-        Aggregates make a Laplacian that is too stiff by a factor that is nearly the same for all smooth functions, so
-        one number takes most of the error away.
+        Aggregation makes the Laplacian too stiff, by a factor that is nearly the same for all smooth functions, so one
+        scale factor removes most of the error.
         """
-        # A surface that is evenly curved has no E to compare.
+        # On a surface of constant curvature, E is 0 and gives no scale.
         scale = constant / self.constant if min(constant, self.constant) > TIE_TOLERANCE**2 else 1.0
         return CoarseModel(self.basis, self.kernel * scale, self.slope * scale, constant)
 
     def squared_distances(self, one: int, others: IntArray) -> FloatArray:
-        """Return (p,) the squared norm of the difference of two Green's functions, for each of the others."""
+        """Return (p,) the squared norms of the differences of one Green's function and each of the others."""
         basis, kernel = self.basis, self.kernel
         if basis is None:
-            apart = kernel[one, one] - 2.0 * kernel[one, others] + kernel[others, others]
-            return np.maximum(apart, 0.0)
+            squares = kernel[one, one] - 2.0 * kernel[one, others] + kernel[others, others]
+            return np.maximum(squares, 0.0)
         return squared_distances(basis.indptr, basis.indices, basis.data, kernel, one, others)
 
 
 def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> CoarseModel:
-    """Return a coarse model; it needs no factorization.
+    """Return a coarse model of a mesh, computed without a factorization of its Laplacian.
 
     Args:
-        operator: of the mesh.
-        curvature: (f,).
-        size: the number of basis functions, about.
+        operator: the Green operator of the mesh.
+        curvature: (f,) curvature of the unknowns, radians.
+        size: approximate number of basis functions.
     """
     areas = operator.areas
     coarse = coarse_basis(operator.laplacian, areas, size)
@@ -77,7 +77,8 @@ def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> C
     weights = areas if basis is None else basis.T @ areas
     stiffness = coarse.laplacian.toarray()
     if operator.is_closed:
-        # Makes it definite, and means the same: what a source has in sum is taken off in proportion to area.
+        # This makes the matrix definite without changing the result, as the sum of a source is subtracted from it in
+        # proportion to area.
         stiffness += np.outer(weights, weights) * (stiffness.trace() / (weights @ weights) / len(weights))
     green = inverse_of_definite(stiffness)
     weighted = areas[:, None] * green if coarse.mass is None else coarse.mass @ green
@@ -89,9 +90,9 @@ def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> C
 
 
 def candidates(model: CoarseModel, fitness: FloatArray) -> IntArray:
-    """Return the unknowns among which cones are searched: one for each basis function, if any is fit to be one.
+    """Return the unknowns that are candidates for cones: at most one for each basis function.
 
-    `fitness` (f,) is 0 for those that may not be cones; where it is larger they are preferred to their neighbours.
+    `fitness` (f,) is 0 for unknowns that may not be cones; those of larger fitness are preferred to their neighbours.
     """
     if model.basis is None or np.count_nonzero(fitness) <= model.size:
         return np.flatnonzero(fitness)
@@ -104,7 +105,7 @@ def inverse_of_definite(matrix: FloatArray) -> FloatArray:
     Raises:
         MetricError: rounding has made it indefinite.
     """
-    # By columns, as LAPACK wants them, or it would make copies of its own.
+    # In column-major order, as LAPACK requires; otherwise it would copy the matrix.
     factor, failed = lapack.dpotrf(matrix.T.copy(order="F"), lower=0, overwrite_a=1)
     if failed:
         raise MetricError(
@@ -121,13 +122,13 @@ def inverse_of_definite(matrix: FloatArray) -> FloatArray:
 def squared_distances(
     indptr: IntArray, indices: IntArray, data: FloatArray, kernel: FloatArray, one: int, others: IntArray
 ) -> FloatArray:
-    """Return (p,) the squared norm of the difference of row `one` and each other row of a sparse matrix.
+    """Return (p,) the squared norms of the differences of row `one` and other rows of a sparse matrix.
 
-    By products of sparse matrices a whole search for 20 to 50 cones takes 20% longer.
+    With products of sparse matrices, a complete search for 20 to 50 cones takes 20% longer.
 
     Args:
-        indptr, indices, data: the matrix (n, m).
-        kernel: (m, m) the inner product.
+        indptr, indices, data: the matrix (n, m) in CSR form.
+        kernel: (m, m) matrix of the inner product.
         one, others: a row, and (p,) rows.
     """
     found = np.zeros(len(others))

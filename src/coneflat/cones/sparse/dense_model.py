@@ -1,9 +1,9 @@
-"""Energies of cones on a dense model, the moves that improve a set of cones, and the best sets found.
+"""Energies of cones on a dense model, moves that improve a set of cones, and the best sets found.
 
-The distortion of cones S with curvatures k is E^2 = constant + 2 slope_S k + k gram_SS k. With the other cones
-refitted freely, candidate t lowers it by (slope_t + gram_tS k + lambda)^2 / h_t, where h_t is what remains of gram_tt
-after projection (orthogonal matching pursuit: Y. Pati, R. Rezaiifar, P. Krishnaprasad 1993). All candidates are
-scored at once, and the best are fitted exactly, bounds and all.
+The distortion of cones S with curvatures k is E^2 = constant + 2 slope_S k + k gram_SS k. If the other cones are
+refitted without bounds, candidate t lowers it by (slope_t + gram_tS k + lambda)^2 / h_t, where h_t is the remainder of
+gram_tt after projection (orthogonal matching pursuit: Y. Pati, R. Rezaiifar, P. Krishnaprasad 1993). All candidates
+are scored at once. The best of them are fitted exactly, with their bounds.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from ..solution import TIE_TOLERANCE
 from .fit_curvatures import fit_curvatures, inverse_with_sum
 from .limits import Limits
 
-# A set must lower E^2 by this share to replace one of its size: rounding must not decide.
+# Relative decrease of E^2 that a set needs to replace another of the same size, so that rounding does not decide.
 MIN_RELATIVE_GAIN = 1e-6
-# Part of a cone's own energy that the others must leave, or it depends on them.
+# Fraction of the diagonal entry of a cone that must remain after projection off the others; else it depends on them.
 MIN_INDEPENDENT_SHARE = 1e-10
-# So many cones more that bring E^2 down by less than this factor are no use: bounds are in the way.
+# The search stops if this number of additional cones does not lower E^2 below this factor, as bounds prevent it.
 STALL_CONES, STALL_FACTOR = 10, 0.99
 
 
 class Sized(Protocol):
-    """What has E^2 and a number of cones."""
+    """Interface of sets with an energy E^2 and a number of cones."""
 
     @property
     def energy(self) -> float:
@@ -40,10 +40,10 @@ class Sized(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class ConeSet:
-    """Cones on a dense model.
+    """A set of cones on a dense model.
 
     Attributes:
-        energy: E^2, infinite where bounds leave no curvatures.
+        energy: E^2, infinite if no curvatures satisfy the bounds.
         members: (s,) candidates, the required ones first.
     """
 
@@ -74,39 +74,39 @@ class BestSets(Generic[SetT]):
 
     @property
     def sizes(self) -> list[int]:
-        """The sizes of which there is one, upwards."""
+        """The sizes for which there is a set, ascending."""
         return sorted(self._sets)
 
     def energy(self, size: int) -> float:
-        """Return E^2 of the best of a size, infinite if there is none."""
+        """Return E^2 of the best set of a size, infinite if there is none."""
         return self._sets[size].energy if size in self._sets else math.inf
 
     def offer(self, found: SetT) -> bool:
-        """Keep a set if it is the best of its size, and tell so."""
+        """Store a set if it is the best of its size; return whether it is."""
         is_better = found.energy < self.energy(len(found)) * (1 - MIN_RELATIVE_GAIN)
         if is_better:
             self._sets[len(found)] = found
         return is_better
 
     def fewest(self, goal: float, most: float = math.inf) -> SetT:
-        """Return the smallest set, up to a size, with E^2 <= goal; if there is none, that of least E^2."""
+        """Return the smallest set of at most `most` cones with E^2 <= goal; if there is none, that of smallest E^2."""
         known = [found for found in self if len(found) <= most]
         good = [found for found in known if found.energy <= goal]
         return min(good, key=len) if good else min(known, key=lambda found: (found.energy, len(found)))
 
 
-def above_rounding(energy: float) -> float:
-    """Return E^2, which rounding may have made less than nothing: gains are shares of it, and must not be losses."""
+def nonnegative(energy: float) -> float:
+    """Return E^2, or 0 if rounding has made it negative, as relative gains need a nonnegative value."""
     return max(float(energy), 0.0)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """The best curvatures of cones.
+    """The best curvatures of a set of cones.
 
     Attributes:
         curvatures: (s,) radians.
-        multiplier: of their sum; 0 without one.
+        multiplier: multiplier of the sum constraint; 0 without one.
         feasible: whether the bounds allow the sum.
         energy: E^2; infinite if not feasible.
     """
@@ -117,13 +117,13 @@ class Fit:
     energy: float
 
 
-def first_least(values: FloatArray) -> int:
-    """Return the first index whose value is the least but for rounding."""
-    return int(firsts_least(values[None])[0])
+def argmin_tied(values: FloatArray) -> int:
+    """Return the first index whose value equals the minimum up to rounding."""
+    return int(row_argmins(values[None])[0])
 
 
-def firsts_least(values: FloatArray) -> IntArray:
-    """Return (r,) the first column of each row (r, c) whose value is the least but for rounding."""
+def row_argmins(values: FloatArray) -> IntArray:
+    """Return (r,) for each row of values (r, c) the first column whose value equals the minimum up to rounding."""
     least = values.min(axis=1)
     finite = np.where(np.isfinite(least), least, 0.0)
     columns: IntArray = (values <= (least + TIE_TOLERANCE * np.abs(finite))[:, None]).argmax(axis=1)
@@ -135,12 +135,12 @@ class DenseModel:
     """Energies of cones on m candidates, and the best sets that were found.
 
     Attributes:
-        gram, slope, constant: (m, m), (m,) and a number.
+        gram, slope, constant: (m, m), (m,) and a number; see the module.
         usable: (m,) whether a candidate may be chosen; False for required ones, which are in every set.
         fixed: the required candidates, which come first in every set.
-        limits: of the curvatures.
-        least: (m,) bound of the curvature at each candidate, the limit or above.
-        best: by number of cones.
+        limits: bounds and sum of the curvatures.
+        least: (m,) lower bound of the curvature at each candidate, not below that of `limits`.
+        best: the best set found of each number of cones.
     """
 
     gram: FloatArray
@@ -153,44 +153,45 @@ class DenseModel:
     best: BestSets[ConeSet] = field(default_factory=BestSets)
 
     def fit(self, members: IntArray) -> Fit:
-        """Return the best curvatures of a set."""
+        """Return the best curvatures of a set of candidates (s,)."""
         gram, slope = self.gram[members[:, None], members], self.slope[members]
         most = np.full(len(members), self.limits.most)
         fitted = fit_curvatures(gram, slope, self.least[members], most, self.limits.total)
         curvatures, _, feasible = fitted
         energy = float(self.constant + (2 * slope + gram @ curvatures) @ curvatures) if feasible else math.inf
-        return Fit(*fitted, above_rounding(energy))
+        return Fit(*fitted, nonnegative(energy))
 
     def energy(self, members: IntArray) -> float:
-        """Return E^2 of a set, infinite where bounds leave no curvatures."""
+        """Return E^2 of a set, infinite if no curvatures satisfy the bounds."""
         return self.fit(members).energy
 
     def additions(self, members: IntArray) -> FloatArray:
-        """Return (m,) by how much E^2 changes if a candidate joins the members (0 or less), bounds of others aside."""
+        """Return (m,) the change of E^2 (0 or less) if a candidate is added, ignoring the bounds of the members."""
         limits, diagonal = self.limits, self.gram.diagonal()
         if limits.has_sum and not len(members):
             return (2 * self.slope + diagonal * limits.total) * limits.total
         fitted = self.fit(members)
-        # Where the bounds do not allow the sum, none is at one.
-        free = members[self._inside(members, fitted)] if fitted.feasible else members
+        # If the bounds do not allow the sum, they are ignored, and all members are free.
+        free = members[self._between_bounds(members, fitted)] if fitted.feasible else members
         if limits.has_sum and not len(free):
             free = members[:1]
         remain, _, _ = self._project(free)
-        is_apart = remain > TIE_TOLERANCE * diagonal
+        is_independent = remain > TIE_TOLERANCE * diagonal
         gradient = self._gradient(members, fitted)
-        x = -gradient / np.where(is_apart, remain, 1.0)
+        x = -gradient / np.where(is_independent, remain, 1.0)
         if fitted.feasible:
             x = np.clip(x, self.least, limits.most)
-        return np.where(is_apart, (2 * gradient + remain * x) * x, 0.0)
+        return np.where(is_independent, (2 * gradient + remain * x) * x, 0.0)
 
     def swaps(self, members: IntArray, fitted: Fit) -> tuple[FloatArray, IntArray]:
-        """Return (s,) the change of E^2 by each member's best replacement, and which that is; infinite if not known.
+        """Return (s,) the change of E^2 by the best replacement of each member, and (s,) this replacement.
 
-        Removing a member is a rank one change of the inverse, so all members against all candidates cost little more
-        than scoring the candidates once. Members at a bound, and the required, are left out.
+        Removing a member is a rank-one change of the inverse, so scoring all candidates for all members costs little
+        more than scoring the candidates once. Members at a bound and required members are left out: their change is
+        infinite and their replacement -1.
         """
         change, which = np.full(len(members), np.inf), np.full(len(members), -1)
-        diagonal, places = self.gram.diagonal(), np.flatnonzero(self._inside(members, fitted))
+        diagonal, places = self.gram.diagonal(), np.flatnonzero(self._between_bounds(members, fitted))
         remain, rows, kept = self._project(members[places])
         is_moved = (places >= len(self.fixed)) & (kept * diagonal[members[places]] > MIN_INDEPENDENT_SHARE)
         is_open = self.usable.copy()
@@ -203,30 +204,30 @@ class DenseModel:
         k = fitted.curvatures[places, None]
         h = remain[candidates] + w * w * share
         g = self._gradient(members, fitted)[candidates] - w * k * share
-        is_apart = h > TIE_TOLERANCE * diagonal[candidates]
-        x = np.clip(-g / np.where(is_apart, h, 1.0), self.least[candidates], self.limits.most)
-        values = np.where(is_apart, k * k * share + (2 * g + h * x) * x, np.inf)
-        best = firsts_least(values)
+        is_independent = h > TIE_TOLERANCE * diagonal[candidates]
+        x = np.clip(-g / np.where(is_independent, h, 1.0), self.least[candidates], self.limits.most)
+        values = np.where(is_independent, k * k * share + (2 * g + h * x) * x, np.inf)
+        best = row_argmins(values)
         change[places], which[places] = values[np.arange(len(places)), best], candidates[best]
         return change, which
 
-    def _inside(self, members: IntArray, fitted: Fit) -> BoolArray:
-        """Return (s,) which members' curvatures no bound holds."""
+    def _between_bounds(self, members: IntArray, fitted: Fit) -> BoolArray:
+        """Return (s,) whether the curvature of a member is strictly between its bounds."""
         k = fitted.curvatures
         span = TIE_TOLERANCE * (1.0 + np.abs(k))
         inside: BoolArray = (self.least[members] + span < k) & (k < self.limits.most - span)
         return inside
 
     def _gradient(self, members: IntArray, fitted: Fit) -> FloatArray:
-        """Return (m,) half the derivative of E^2, and of what keeps the sum, by the curvature of each candidate."""
+        """Return (m,) half the derivative of the Lagrangian of E^2 and the sum by the curvature of each candidate."""
         return self.slope + fitted.multiplier + fitted.curvatures @ self.gram[members]
 
     def _project(self, free: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Project candidates off the free members, and off the sum if there is one.
+        """Project the candidates off the free members (f,), and off the sum constraint if there is one.
 
         Returns:
-            (m,) what remains of the diagonal of the Gram matrix, (f, m) the coefficients of the projection, and (f,)
-            the diagonal of the inverse of the members' own.
+            (m,) the remainder of the diagonal of the Gram matrix, (f, m) the coefficients of the projection, and (f,)
+            the diagonal of the inverse of the Gram matrix of the members.
         """
         has_sum = self.limits.has_sum and len(free) > 0
         right = self.gram[free]
@@ -238,43 +239,43 @@ class DenseModel:
         return remain, rows[: len(free)], inverse.diagonal()[: len(free)]
 
     def grown(self, members: IntArray) -> IntArray | None:
-        """Return the members and the usable candidate that scores best; None if there is none left."""
+        """Return the members with the usable candidate of the best score added; None if there is none left."""
         is_open = self.usable.copy()
         is_open[members] = False
         if not is_open.any():
             return None
         missing = self.limits.total - self.least[members].sum()
-        if missing < 0:  # too few to carry the total: one that can carry what is missing, or some of it
+        if missing < 0:  # too few to carry the total: prefer candidates that can carry the rest
             for bound in (missing, 0.0):
                 can_carry = is_open & (self.least <= bound) & (self.least < 0)
                 if can_carry.any():
                     is_open = can_carry
                     break
         candidates = np.flatnonzero(is_open)
-        return np.append(members, candidates[first_least(self.additions(members)[candidates])])
+        return np.append(members, candidates[argmin_tied(self.additions(members)[candidates])])
 
     def shrunk(self, members: IntArray) -> IntArray | None:
-        """Return the members without the one that is missed least; None if none can go.
+        """Return the members without the least important one; None if none can be removed.
 
-        The one whose removal costs least while the others are refitted freely.
+        This is the member whose removal increases E^2 least if the others are refitted without bounds.
         """
         fixed = len(self.fixed)
         if len(members) <= fixed:
             return None
         _, _, kept = self._project(members)
         loss = self.fit(members).curvatures ** 2 / np.maximum(kept, 1e-300)
-        rest = np.delete(members, fixed + first_least(loss[fixed:]))
+        rest = np.delete(members, fixed + argmin_tied(loss[fixed:]))
         return rest if self.energy(rest) < math.inf else None
 
     def exchanged(self, members: IntArray) -> ConeSet:
-        """Return the set after members, one at a time, were replaced as long as E^2 falls. The required ones stay."""
+        """Return the set after replacing members one at a time while E^2 decreases; required members stay."""
         fitted = self.fit(members)
         improved = fitted.feasible
         while improved:
             improved = False
             change, which = self.swaps(members, fitted)
             for _ in range(len(members)):
-                place = first_least(change)
+                place = argmin_tied(change)
                 if not change[place] <= -MIN_RELATIVE_GAIN * fitted.energy:
                     break
                 change[place] = np.inf
@@ -287,7 +288,10 @@ class DenseModel:
         return ConeSet(fitted.energy, members)
 
     def climb(self, bound: float, most: int, start: int | None = None) -> None:
-        """Add cones, to the best set of the size `start` if it is given, until E^2 <= bound, or there are `most`."""
+        """Add cones one at a time until E^2 <= bound or there are `most`.
+
+        It starts from the required cones, or from the best set of the size `start`.
+        """
         members: IntArray | None = self.best[start].members if start is not None else self.fixed
         while members is not None:
             found = self.exchanged(members)
@@ -302,7 +306,7 @@ class DenseModel:
             members = self.grown(self.best[size].members if size in self.best else found.members)
 
     def descend(self, least: int, most: int) -> None:
-        """Take cones away one at a time, from the best set of `most` down to one of `least`."""
+        """Remove cones one at a time, from the best set of `most` cones to one of `least`."""
         for size in range(most, max(least, len(self.fixed)), -1):
             shrunk = self.shrunk(self.best[size].members) if size in self.best else None
             if shrunk is not None:

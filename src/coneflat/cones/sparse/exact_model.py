@@ -1,4 +1,4 @@
-"""Exact energies of cones at the vertices tried so far, and where on the mesh cones should go from there."""
+"""Exact energies of cones at the vertices tried so far, and proposals of better vertices on the mesh."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import numpy as np
 
 from ...base.arrays import BoolArray, FloatArray, IntArray
 from ...base.compiled import compiled
-from .dense_model import BestSets, DenseModel, first_least
+from .dense_model import BestSets, DenseModel, argmin_tied
 from .limits import Limits
 from .linear_model import LinearModel
 
-# A move is tried if it promises to lower E^2 by this share.
+# Smallest predicted relative decrease of E^2 for which a move is tried.
 MIN_PROMISED_GAIN = 1e-3
-# Rounds of moves for a set of cones; most come to rest after three or four.
+# Largest number of rounds of moves for a set of cones; most sets converge after three or four.
 MAX_ROUNDS = 12
 
 
@@ -20,7 +20,7 @@ class ExactModel(DenseModel):
     """A dense model on a growing set of vertices, with exact entries.
 
     Attributes:
-        unknowns: (m,) the vertex of each candidate, in the numbering of the operator.
+        unknowns: (m,) the vertex of each candidate, in the numbering of the Green operator.
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class ExactModel(DenseModel):
         self._indptr = operator.laplacian.indptr.astype(np.int64)
         self._indices = operator.laplacian.indices.astype(np.int64)
         self._linear, self._least = linear, least
-        # The Green's functions of the unknowns, in blocks as they came, and their means.
+        # The Green's functions of the unknowns and their means, in blocks in the order in which they were added.
         self._responses: list[FloatArray] = []
         self._means: list[FloatArray] = []
         self.unknowns: IntArray = np.empty(0, dtype=np.int64)
@@ -46,13 +46,13 @@ class ExactModel(DenseModel):
             self._add(required, operator.responses(required))
 
     def restrict(self, usable: BoolArray) -> None:
-        """Let cones move to the (f,) usable unknowns alone, and forget the sets found; energies stay known."""
+        """Restrict cones to the usable unknowns (f,) and delete the sets found; energies stay cached."""
         self._usable = usable
         self.usable = usable[self.unknowns]
         self.best = BestSets()
 
     def insert(self, unknowns: IntArray) -> IntArray:
-        """Add vertices, if they are not in, and return the places of all."""
+        """Add those vertices that are not candidates yet; return the candidate number of each."""
         is_new = np.zeros(len(self._log_scale), dtype=bool)
         is_new[unknowns] = True
         is_new[self.unknowns] = False
@@ -63,9 +63,9 @@ class ExactModel(DenseModel):
         return order[np.searchsorted(self.unknowns, unknowns, sorter=order)]
 
     def in_order(self, members: IntArray) -> IntArray:
-        """Return the order (s,) of members in which cones are given out: the required ones, and then by unknown.
+        """Return (s,) the output order of members: first the required ones, then the others by unknown.
 
-        In which order they were found depends on rounding.
+        The order in which they were found depends on rounding.
         """
         required = len(self.fixed)
         return np.append(np.arange(required), required + np.argsort(self.unknowns[members[required:]]))
@@ -87,7 +87,7 @@ class ExactModel(DenseModel):
         self.least = self._least[self.unknowns]
 
     def _covariances(self, responses: FloatArray) -> FloatArray:
-        """Add the Green's functions (k, f) of k unknowns more; return (k, m + k) their covariances with all."""
+        """Add the Green's functions (k, f) of k new unknowns; return (k, m + k) their covariances with all."""
         areas = self._operator.areas
         means = responses @ areas
         weighted = responses * areas
@@ -100,8 +100,8 @@ class ExactModel(DenseModel):
             ]
         )
 
-    def polish(self, members: IntArray) -> float:
-        """Move cones over the mesh until E comes to rest; return E^2 of the best set of their number."""
+    def refine(self, members: IntArray) -> float:
+        """Move cones over the mesh until E converges; return E^2 of the best set of this number of cones."""
         found = self.exchanged(members)
         self.best.offer(found)
         for _ in range(MAX_ROUNDS):
@@ -116,12 +116,12 @@ class ExactModel(DenseModel):
         return self.best.energy(len(found))
 
     def targets(self, members: IntArray, curvatures: FloatArray, energy: float) -> IntArray:
-        """Return where cones should move by the score and the coarse model's distances.
+        """Return the unknowns to which cones should move, by the score and the distances of the coarse model.
 
-        Moving curvature k from s to t changes E^2 by 2 k (q_t - q_s) + k^2 ||g_s - g_t||^2, q the score.
+        Moving curvature k from s to t changes E^2 by 2 k (q_t - q_s) + k^2 ||g_s - g_t||^2, where q is the score.
         """
         score = self._score(members, curvatures)
-        # Some of the coarse model's functions wide: from there on its distances tell nothing.
+        # The neighbourhood covers a few functions of the coarse model; beyond it, the distances are not accurate.
         size = max(40, 4 * len(self._usable) // self._coarse.size)
         taken = self.unknowns[members]
         is_free = self._usable.copy()
@@ -134,7 +134,7 @@ class ExactModel(DenseModel):
             if not len(near) or k == 0:
                 continue
             change = 2 * k * (score[near] - score[s]) + k * k * self.squared_distances(s, near)
-            best = first_least(change)
+            best = argmin_tied(change)
             if change[best] < -MIN_PROMISED_GAIN * energy:
                 targets.append(int(near[best]))
         return np.unique(np.array(targets, dtype=np.int64))
@@ -150,20 +150,20 @@ class ExactModel(DenseModel):
         return self._operator.solve(self._operator.weighted(log_scale))
 
     def near(self, unknown: int, size: int) -> IntArray:
-        """Return the usable vertices among the `size` nearest to one."""
+        """Return the usable unknowns among the `size` nearest to an unknown."""
         found = ball(self._indptr, self._indices, unknown, size)
         return found[self._usable[found]]
 
     def squared_distances(self, one: int, others: IntArray) -> FloatArray:
-        """Return (p,) about the squared norm of the difference of two Green's functions, for each of the others."""
+        """Return (p,) approximate squared norms of the differences of one Green's function and each of the others."""
         return self._coarse.squared_distances(one, others)
 
 
 @compiled
 def ball(indptr: IntArray, indices: IntArray, centre: int, size: int) -> IntArray:
-    """Return the `size` vertices nearest to a vertex in steps along edges, whole rings of them, itself first.
+    """Return the vertices nearest to a vertex in steps along edges, in complete rings until `size` are found.
 
-    By array operations a whole search for 20 to 50 cones takes 20% longer.
+    The vertex itself comes first. With array operations, a complete search for 20 to 50 cones takes 20% longer.
     """
     seen = {centre}
     found = [centre]

@@ -1,4 +1,4 @@
-"""Curvatures of given cones by a convex quadratic program in a few variables: exact active set methods."""
+"""Curvatures of given cones by a convex quadratic program in a few variables, with exact active set methods."""
 
 from __future__ import annotations
 
@@ -11,26 +11,32 @@ from ...base.arrays import FloatArray, IntArray
 from ...base.compiled import compiled
 from ..solution import TIE_TOLERANCE
 
-# What is added to the diagonal, as a share of its largest entry: cones on neighbouring vertices are nearly dependent.
+# Value added to the diagonal, relative to its largest entry, as cones at neighbouring vertices are nearly dependent.
 SMALLEST_PIVOT = 1e-13
-# What a multiplier may be off by, relative to the largest gradient, before its bound is released.
+# Violation of the sign of a multiplier, relative to the largest gradient, above which its bound is released.
 RELEASE_TOLERANCE = 1e-11
-# Steps after which changing bounds all at once is given up, as it may cycle. One by one alone takes twelve times as
-# long for the 173 cones of 49 handles, most of which are at a bound.
+# Number of steps after which the method that changes all bounds at once is stopped, as it may cycle. Changing them one
+# by one only takes twelve times as long for the 173 cones of 49 handles, most of which are at a bound.
 MAX_STEPS_AT_ONCE = 20
 
 
 def fit_curvatures(
     gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float
 ) -> tuple[FloatArray, float, bool]:
-    """Minimise k gram k / 2 + slope k over least <= k <= most (s,), and sum k = total unless that is NaN.
+    """Return the curvatures k that minimise k gram k / 2 + slope k with bounds and a given sum.
 
-    It ends at the exact optimum, since the program is strictly convex: if changing many bounds at once does not get
-    there, changing them one by one does.
+    The result is the exact optimum, since the program is strictly convex: if changing all bounds at once does not
+    converge, changing them one by one does.
+
+    Args:
+        gram: (s, s) Gram matrix.
+        slope: (s,) linear term.
+        least, most: (s,) bounds, radians.
+        total: sum of the curvatures, radians; NaN for none.
 
     Returns:
-        The curvatures, the multiplier of the sum, and whether the bounds allow the sum. Where they do not, the
-        bounds are left out.
+        (s,) the curvatures, the multiplier of the sum, and whether the bounds allow the sum. If they do not, the
+        bounds are ignored.
     """
     has_sum = not math.isnan(total)
     if not len(slope):
@@ -46,9 +52,9 @@ def fit_curvatures(
 
 
 def inverse_with_sum(gram: FloatArray, has_sum: bool) -> FloatArray:
-    """Return the inverse (s, s) of a Gram matrix, or (s + 1, s + 1) of it bordered by the sum of the unknowns."""
+    """Return the inverse (s, s) of a Gram matrix; with `has_sum`, (s + 1, s + 1) bordered by the sum constraint."""
     size, diagonal = len(gram), gram.diagonal()
-    # The border is as large as the entries, so that rounding is of one size.
+    # The border has the size of the entries, so that rounding errors are of the same size.
     unit = float(diagonal.max(initial=0.0)) or 1.0
     system = np.zeros((size + has_sum, size + has_sum))
     system[:size, :size] = gram
@@ -64,7 +70,7 @@ def inverse_with_sum(gram: FloatArray, has_sum: bool) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _Program:
-    """The program; states (s,) of its variables are -1 held at the least, 1 at the most, 0 free."""
+    """The quadratic program. The states (s,) of its variables are -1 at the lower bound, 1 at the upper, 0 free."""
 
     gram: FloatArray
     slope: FloatArray
@@ -73,12 +79,12 @@ class _Program:
     total: float
 
     def change_one_by_one(self) -> tuple[FloatArray, float]:
-        """Return the optimum and the multiplier by a primal active set method, which always ends."""
+        """Return the optimum (s,) and the multiplier by a primal active set method, which always terminates."""
         size, has_sum, multiplier = len(self.slope), not math.isnan(self.total), 0.0
         state, curvatures = np.zeros(size, dtype=np.int64), self._start()
         for _ in range(20 * size + 20):
             free, best, multiplier = best_free(self.gram, self.slope, self.total, state, curvatures)
-            # As far there as the bounds allow.
+            # Move towards the best values as far as the bounds allow.
             here = curvatures[free]
             bound = np.where(best > here, self.most[free], self.least[free])
             is_beyond = (best > self.most[free]) | (best < self.least[free])
@@ -92,14 +98,14 @@ class _Program:
                 state[blocking] = 1 if best[first] > here[first] else -1
                 curvatures[blocking] = bound[first]
                 continue
-            # Whether one held at a bound would rather leave it.
+            # Find a variable at a bound whose release lowers the objective.
             gradient = self.gram @ curvatures + self.slope
             nothing = RELEASE_TOLERANCE * float(np.abs(gradient).max())
             high = int(np.where(state == 1, gradient, -np.inf).argmax())
             low = int(np.where(state == -1, gradient, np.inf).argmin())
             has_high, has_low = state[high] == 1, state[low] == -1
             if not len(free) and has_sum:
-                # One alone cannot move under the sum: the two that pull most, one from each bound.
+                # A single variable cannot move with a fixed sum: release the best one at each bound.
                 if not (has_high and has_low):
                     return curvatures, -float(gradient[high if has_high else low])
                 multiplier = -float(gradient[high] + gradient[low]) / 2
@@ -115,15 +121,15 @@ class _Program:
         return curvatures, multiplier
 
     def _start(self) -> FloatArray:
-        """Return curvatures within the bounds that sum to the total, as even as can be."""
+        """Return (s,) curvatures within the bounds with the given sum, as uniform as possible."""
         size, has_sum = len(self.slope), not math.isnan(self.total)
         curvatures = np.clip(np.full(size, self.total / size if has_sum else 0.0), self.least, self.most)
         for _ in range(size if has_sum else 0):
             missing = self.total - float(curvatures.sum())
-            room = np.count_nonzero(curvatures < self.most if missing > 0 else curvatures > self.least)
-            if missing == 0.0 or room == 0:
+            movable = np.count_nonzero(curvatures < self.most if missing > 0 else curvatures > self.least)
+            if missing == 0.0 or movable == 0:
                 break
-            curvatures = np.clip(curvatures + missing / room, self.least, self.most)
+            curvatures = np.clip(curvatures + missing / movable, self.least, self.most)
         return curvatures
 
 
@@ -131,9 +137,9 @@ class _Program:
 def best_free(
     gram: FloatArray, slope: FloatArray, total: float, state: IntArray, curvatures: FloatArray
 ) -> tuple[IntArray, FloatArray, float]:
-    """Return the free variables, in state 0, their best values with the others held, and the multiplier of the sum.
+    """Return the free variables (state 0), their best values with the others fixed, and the multiplier of the sum.
 
-    Sets of cones are fitted by the hundred: by array operations, a flattening takes up to a third longer.
+    Hundreds of sets of cones are fitted; with array operations, a flattening takes up to a third longer.
     """
     free = np.flatnonzero(state == 0)
     count, largest, left = len(free), 0.0, total
@@ -145,7 +151,7 @@ def best_free(
                 best[i] -= gram[free[i], j] * curvatures[j]
     for i in range(count):
         largest = max(largest, gram[free[i], free[i]])
-    # The Cholesky factor, and what it makes of both right sides.
+    # Cholesky factorization, and forward substitution of both right-hand sides.
     for i in range(count):
         for j in range(i + 1):
             value = gram[free[i], free[j]]
@@ -176,10 +182,10 @@ def best_free(
 def change_at_once(
     gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float
 ) -> tuple[FloatArray, float] | None:
-    """Return the optimum and the multiplier, by changing all bounds that are in the way, or no longer, at once.
+    """Return the optimum (s,) and the multiplier, by updating all active bounds at once; None if it does not converge.
 
-    The primal-dual active set method (M. Hintermueller, K. Ito, K. Kunisch, "The primal-dual active set strategy
-    as a semismooth Newton method", 2003): a handful of steps where it ends; None where it does not.
+    This is the primal-dual active set method (M. Hintermueller, K. Ito, K. Kunisch, "The primal-dual active set
+    strategy as a semismooth Newton method", 2003). If it converges, it takes a few steps.
     """
     size = len(slope)
     state, curvatures, gradient = np.zeros(size, np.int64), np.zeros(size), np.empty(size)

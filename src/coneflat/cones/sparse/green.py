@@ -1,8 +1,8 @@
-"""The biharmonic kernel of a mesh: what cones at given vertices contribute to the area distortion.
+"""The biharmonic kernel of a mesh, which gives the area distortion of cones.
 
-With G the inverse of the Laplacian and A the covariance under the vertex areas, A = diag(a) - a a^T, the distortion of
-target curvatures k is E^2 = (K - k)^T G A G (K - k). An entry of G A G is a product of two Green's
-functions, a back-substitution each.
+Let G be the inverse of the Laplacian and A = diag(a) - a a^T the covariance with the vertex areas a. The distortion of
+target curvatures k is E^2 = (K - k)^T G A G (K - k). An entry of G A G is a product of two Green's functions, each of
+which takes a back-substitution.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from scipy.sparse import csc_matrix, csr_matrix, diags
 from ...base.arrays import BoolArray, FloatArray, IntArray
 from ...linalg import Factor, aligned, factorize
 
-# Numbers in right-hand sides that are solved at once, at most: more gain nothing and cost memory.
+# Largest number of entries of right-hand sides that are solved at once; more save no time and need more memory.
 MAX_BATCH_NUMBERS = 10_000_000
 
 
 class GreenOperator:
-    """The Laplacian of the vertices off the boundary in an order of choice, factorized when it is first needed.
+    """The Laplacian of the inner vertices in a given order, factorized when it is first needed.
 
     Attributes:
         vertices: (f,) the vertex of each unknown.
-        laplacian: (f, f).
-        areas: (f,) weights that sum to 1 together with those of the boundary.
+        laplacian: (f, f) the Laplacian of the unknowns.
+        areas: (f,) area weights; together with those of the boundary, their sum is 1.
         is_closed: whether there is no boundary.
     """
 
@@ -39,11 +39,11 @@ class GreenOperator:
         self.is_closed = len(self.vertices) == len(order)
         self._share = areas
 
-    def weighing(self, areas: FloatArray) -> GreenOperator:
-        """Return the operator with other weights (n,); the factorization is the same."""
+    def with_weights(self, areas: FloatArray) -> GreenOperator:
+        """Return the operator with other area weights (n,); the factorization is shared."""
         if np.array_equal(areas, self._share):
             return self
-        _ = self._factor  # which the copy has, too
+        _ = self._factor  # computed here, so that the copy shares it
         other = copy(self)
         other.areas, other._share = areas[self.vertices], areas
         return other
@@ -55,17 +55,17 @@ class GreenOperator:
 
     @property
     def break_even(self) -> int:
-        """How many solutions take as long as another factorization."""
+        """Number of solves that take as long as a factorization."""
         return self._factor.break_even
 
     def solve(self, source: FloatArray) -> FloatArray:
-        """Return G source for (f,) or (f, k): zero on the boundary; without one, mean-free.
+        """Return G source for a source (f,) or (f, k); without a boundary, the solution has mean zero.
 
-        What a closed surface's source has in sum is taken off in proportion to area.
+        On a closed surface, the sum of the source is subtracted from it in proportion to area.
         """
         if not self.is_closed:
             return self._factor.solve(source)
-        # By rows, each in one piece: what sources look like as columns.
+        # One source per row, so that each is contiguous.
         rows = np.atleast_2d(source.T)
         rows = rows - np.outer(rows.sum(axis=1), self.areas)
         rows[:, 0] = 0.0
@@ -74,13 +74,13 @@ class GreenOperator:
         return solution[0] if source.ndim == 1 else solution.T
 
     def weighted(self, values: FloatArray) -> FloatArray:
-        """Return (f,) A values."""
+        """Return (f,) the product of A and values (f,)."""
         return self.areas * (values - self.areas @ values)
 
     def solve_at_vertices(self, source: FloatArray) -> FloatArray:
-        """Return (n,) G source for (n,), both in the numbering of vertices.
+        """Return (n,) G source for a source (n,), both in the numbering of vertices.
 
-        Without a boundary the source must sum to 0, and the solution is one of those that differ by a constant.
+        Without a boundary, the source must sum to 0, and the solution is unique up to a constant only.
         """
         inside = source[self.vertices]
         if self.is_closed:
@@ -90,12 +90,12 @@ class GreenOperator:
         return solution
 
     def batches(self, unknowns: IntArray) -> list[IntArray]:
-        """Return unknowns in sets of as many as are best solved for at once."""
+        """Return the unknowns in batches of the largest size that is solved at once."""
         size = max(1, MAX_BATCH_NUMBERS // max(1, len(self.vertices)))
         return [unknowns[start : start + size] for start in range(0, len(unknowns), size)]
 
     def responses(self, unknowns: IntArray) -> FloatArray:
-        """Return (k, f) the Green's functions of sources at k unknowns; on a closed surface, each up to a constant."""
+        """Return (k, f) the Green's functions of k unknowns; on a closed surface, each up to a constant."""
         sources = aligned((len(unknowns), len(self.vertices)))
         sources[:] = -self.areas if self.is_closed else 0.0
         sources[np.arange(len(unknowns)), unknowns] += 1.0
@@ -105,13 +105,13 @@ class GreenOperator:
 
 
 def renumbered(matrix: csc_matrix, order: IntArray) -> csr_matrix:
-    """Return the rows and columns of a matrix (n, n) that are named in an order (f,), by rows with sorted columns."""
+    """Return (f, f) the rows and columns of a matrix (n, n) in an order (f,), in CSR form with sorted indices."""
     picked = csr_matrix(csr_matrix(matrix)[order][:, order])
     picked.sort_indices()
     return picked
 
 
 def _grounded(matrix: csr_matrix) -> csr_matrix:
-    """Return a matrix, by rows with sorted columns, whose first row and column are those of the identity."""
+    """Return a CSR matrix with the first row and column replaced by those of the identity."""
     first = np.arange(matrix.shape[0]) == 0
     return csr_matrix(diags(~first * 1.0) @ matrix @ diags(~first * 1.0) + diags(first * 1.0))

@@ -1,4 +1,4 @@
-"""What curvatures cones may have, what they must sum to, and so how many cones it takes at least."""
+"""Bounds and sum of the curvatures of cones, and the smallest number of cones that satisfies them."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from ...base.text import plural
 from ...errors import CurvatureError, OptionError
 from ..solution import FULL_TURN, TIE_TOLERANCE
 
-# More cones than these, beside the required ones, are not searched for: a seam through them all is no use.
-MOST_SEARCHED = 200
+# Largest number of cones searched for, in addition to the required ones: seams through more cones are useless.
+MAX_SEARCHED = 200
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds and sum of curvatures.
+    """Bounds and sum of the curvatures of cones.
 
     Attributes:
-        least, most: bounds of each cone's curvature, radians.
-        total: what they sum to, radians; NaN on a bounded mesh, whose boundary takes the rest.
+        least, most: bounds of the curvature of each cone, radians.
+        total: sum of the curvatures, radians; NaN on a mesh with boundary, which absorbs the remaining curvature.
     """
 
     least: float
@@ -37,10 +37,15 @@ class Limits:
         max_cone_angle: float | None,
         positive_only: bool,
     ) -> Limits:
-        """Return the limits for cone angles, radians; no Euler characteristic is given for a mesh with a boundary.
+        """Return the limits for bounds of the cone angles.
+
+        Args:
+            euler_characteristic: chi of a closed mesh; None for a mesh with boundary.
+            min_cone_angle, max_cone_angle: radians; None for no upper bound.
+            positive_only: allow positive curvatures only.
 
         Raises:
-            OptionError: the angles leave nothing.
+            OptionError: no angle satisfies the bounds.
             CurvatureError: cones of these angles cannot have the sum of curvatures of the surface.
         """
         if not 0 < min_cone_angle < math.inf:
@@ -54,7 +59,7 @@ class Limits:
             least = max(least, 0.0)
         most = FULL_TURN - min_cone_angle
         if positive_only and most <= 0:
-            raise OptionError("cones of positive curvature only have angles below 2 pi: allow smaller angles")
+            raise OptionError("cones of positive curvature have angles below 2 pi: allow smaller angles")
         if euler_characteristic is None:
             return cls(least, most, math.nan)
         total = FULL_TURN * euler_characteristic
@@ -68,12 +73,12 @@ class Limits:
 
     @property
     def has_sum(self) -> bool:
-        """Whether the curvatures have a sum to keep."""
+        """Whether the sum of the curvatures is prescribed."""
         return not math.isnan(self.total)
 
     @property
     def fewest(self) -> int:
-        """The least number of cones that can carry the total."""
+        """The smallest number of cones that can carry the total curvature."""
         if not self.has_sum or abs(self.total) < TIE_TOLERANCE:
             return 0
         bound = self.most if self.total > 0 else self.least
@@ -81,23 +86,23 @@ class Limits:
 
     @property
     def largest(self) -> int | None:
-        """The largest number of cones that the total leaves room for, None for any."""
+        """The largest number of cones that the total curvature allows; None for any."""
         if self.has_sum and self.total > 0 and self.least > 0:
             return int(self.total / self.least + 1e-9)
         return None
 
     def text(self) -> str:
-        """Return the bounds for a message."""
+        """Return the bounds as text for a message."""
         if not math.isfinite(self.least):
             return f"up to {self.most / math.pi:.4g} pi"
         return f"{self.least / math.pi:.4g} pi to {self.most / math.pi:.4g} pi"
 
     def check_available(self, usable: BoolArray, required: IntArray) -> None:
-        """Raise CurvatureError if cones at (n,) usable vertices and the required ones cannot carry the curvature."""
-        if self.fewest > MOST_SEARCHED + len(required):
+        """Raise CurvatureError if cones at the usable (n,) and the required vertices cannot carry the curvature."""
+        if self.fewest > MAX_SEARCHED + len(required):
             raise CurvatureError(
                 f"a total curvature of {self.total / np.pi:.4g} pi needs {self.fewest:,} cones or more within these "
-                f"bounds, and the sparse search finds {MOST_SEARCHED} at most: allow other angles, or choose the "
+                f"bounds, and the sparse search finds {MAX_SEARCHED} at most: allow other angles, or choose the "
                 "greedy search (--cones greedy), which has no bounds"
             )
         available = np.count_nonzero(usable) + np.count_nonzero(~usable[required])
@@ -108,7 +113,7 @@ class Limits:
             )
 
     def check_count(self, count: int, required: int) -> None:
-        """Raise an error if so many cones, `required` of them given, cannot carry the curvature."""
+        """Raise an error if `count` cones, of which `required` are given, cannot carry the curvature."""
         if isinstance(count, bool) or count != int(count) or count < 0:
             raise OptionError(f"the number of cones must be an integer and not negative, not {count!r}")
         if count < required:

@@ -1,4 +1,4 @@
-"""The linear model of a mesh, phi = phi_0 + sum_s k_s g_s: all of it that no cone has a part in."""
+"""The linear model of a mesh, phi = phi_0 + sum_s k_s g_s: the data that do not depend on the cones."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from ..solution import target_from_log_scale
 from .coarse_model import CoarseModel, coarse_model
 from .green import GreenOperator
 
-# Unknowns of the coarse model: one for so many vertices, within bounds that keep its dense inverse cheaper than the
-# factorization of the mesh's own Laplacian.
-VERTICES_PER_UNKNOWN, LEAST_SIZE, MOST_SIZE = 12, 600, 1200
+# Number of vertices per unknown of the coarse model, and bounds of the number of unknowns, for which the dense inverse
+# is cheaper than the factorization of the Laplacian of the mesh.
+VERTICES_PER_UNKNOWN, MIN_SIZE, MAX_SIZE = 12, 600, 1200
 
 
 class LinearModel:
-    """What the log scales of all sets of cones on a connected mesh have in common; each part is found when needed.
+    """The data shared by the log scales of all sets of cones on a connected mesh; computed when first needed.
 
     Attributes:
         laplacian: (n, n) cotangent Laplacian.
         curvature: (n,) angle defect, radians.
-        is_boundary: (n,) vertices at phi = 0 that take what the cones leave.
-        operator: the Laplacian off the boundary, factorized once.
+        is_boundary: (n,) vertices with phi = 0 that absorb the remaining curvature.
+        operator: the Laplacian of the inner vertices, factorized once.
     """
 
     def __init__(
@@ -47,48 +47,48 @@ class LinearModel:
         """Return the model of a mesh.
 
         Args:
-            laplacian, curvature, is_boundary: see above.
-            share: (n,) what each vertex counts in E; they sum to 1.
-            tie_key: (n,) in whose order unknowns come; None: that of areas and curvatures.
+            laplacian, curvature, is_boundary: see the class.
+            share: (n,) weight of each vertex in E; the sum is 1.
+            tie_key: (n,) the unknowns are sorted by this key; None: by area and curvature.
         """
         order = np.lexsort((curvature, share)) if tie_key is None else np.argsort(tie_key, kind="stable")
         return cls(laplacian, curvature, is_boundary, GreenOperator(laplacian, share, is_boundary, order))
 
-    def weighing(self, share: FloatArray) -> LinearModel:
-        """Return the model of the same mesh whose vertices (n,) count otherwise; the factorization serves both."""
-        operator = self.operator.weighing(share)
+    def with_weights(self, share: FloatArray) -> LinearModel:
+        """Return the model of the same mesh with other weights (n,) of the vertices; the factorization is shared."""
+        operator = self.operator.with_weights(share)
         if operator is self.operator:
             return self
         return LinearModel(self.laplacian, self.curvature, self.is_boundary, operator)
 
     @property
     def inner(self) -> FloatArray:
-        """(f,) curvature of the unknowns."""
+        """(f,) curvature of the unknowns, radians."""
         return self.curvature[self.operator.vertices]
 
     @cached_property
     def log_scale(self) -> FloatArray:
-        """(f,) phi_0: without cones."""
+        """(f,) phi_0, the log scale without cones."""
         return -self.operator.solve(self.inner)
 
     @cached_property
     def score(self) -> FloatArray:
-        """(f,) half the derivative of E^2 by the curvature of a cone at each vertex, before there is one."""
+        """(f,) half the derivative of E^2 by the curvature of a cone at each unknown, without any cones."""
         return self.operator.solve(self.operator.weighted(self.log_scale))
 
     @cached_property
     def coarse(self) -> CoarseModel:
         """The kernel of E on a coarse basis."""
         operator = self.operator
-        size = min(max(len(operator.vertices) // VERTICES_PER_UNKNOWN, LEAST_SIZE), MOST_SIZE)
+        size = min(max(len(operator.vertices) // VERTICES_PER_UNKNOWN, MIN_SIZE), MAX_SIZE)
         modelled = partial(coarse_model, operator, self.inner, size)
-        # Beside the factorization: 10 to 13% of the time of 29,000 to 97,000 triangles on two threads.
+        # Computed during the factorization: saves 10 to 13% of the time of 29,000 to 97,000 triangles on two threads.
         with concurrently(modelled, 2 * len(operator.vertices)) as modelling:
             constant = float(self.log_scale @ operator.weighted(self.log_scale))
             return modelling.result().scaled_to(constant)
 
     def solution_of(self, cones: IntArray, curvatures: FloatArray) -> ConeSolution:
-        """Return the solution of cones (s,) off the boundary with given curvatures (s,), radians."""
+        """Return the solution of cones at inner vertices (s,) with given curvatures (s,), radians."""
         operator, target = self.operator, np.zeros(len(self.curvature))
         target[cones] = curvatures
         log_scale = np.zeros(len(target))

@@ -1,12 +1,12 @@
-"""The fewest cones for the area distortion allowed: a search on one mesh, for any number of questions.
+"""Search for the fewest cones of an allowed area distortion; a search of a mesh is reused for any number of queries.
 
-In the linear model phi = phi_0 + sum_s k_s g_s with the Green's functions g_s of the cones, so choosing cones for a
-small norm of phi is sparse approximation. The literature goes from relaxations (Y. Soliman, D. Slepcev, K. Crane,
+In the linear model, phi = phi_0 + sum_s k_s g_s with the Green's functions g_s of the cones, so choosing cones for a
+small norm of phi is a sparse approximation. The literature has relaxations (Y. Soliman, D. Slepcev, K. Crane,
 "Optimal cone singularities for conformal flattening", 2018; Q. Fang, W. Ouyang, M. Li, L. Liu, X.-M. Fu, "Computing
-sparse cones with bounded distortion for conformal parameterizations", 2021) to moving given cones (M. Li, Q. Fang,
-Z. Zhang, L. Liu, X.-M. Fu, "Efficient cone singularity construction for conformal parameterizations", 2023). Here
-positions are exchanged, as in subset selection, on a dense coarse model, where that is cheap, and finished
-with exact energies.
+sparse cones with bounded distortion for conformal parameterizations", 2021) and moves of given cones (M. Li, Q. Fang,
+Z. Zhang, L. Liu, X.-M. Fu, "Efficient cone singularity construction for conformal parameterizations", 2023). Here,
+positions are exchanged as in subset selection, first on a dense coarse model, where this is cheap, and then with exact
+energies.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ from ..solution import FULL_TURN, TIE_TOLERANCE
 from .coarse_model import candidates
 from .dense_model import ConeSet, DenseModel
 from .exact_model import ExactModel
-from .limits import MOST_SEARCHED, Limits
+from .limits import MAX_SEARCHED, Limits
 from .linear_model import LinearModel
 
-# How far, as a factor of E^2, the coarse model is trusted: sets within are looked at on the mesh itself.
+# Error of the coarse model as a factor of E^2; sets within this factor of the goal are evaluated on the mesh.
 COARSE_MODEL_ERROR = 1.35
-# Where the best set of a size misses by less than this factor of E^2, moves on the mesh may make up for it.
+# Factor of the goal for E^2 up to which moves on the mesh may bring a set below the goal.
 MAX_REFINED_RATIO = 1.15
 
 
 @dataclass(frozen=True)
 class SparseCones:
-    """What a search for cones found.
+    """The result of a search for cones.
 
     Attributes:
         solution: the cones.
-        distortion: E of the linear model: the standard deviation of its log scale by area.
+        distortion: E of the linear model, the area-weighted standard deviation of its log scale.
     """
 
     solution: ConeSolution
@@ -56,10 +56,10 @@ class SparseCones:
 
 
 class ConeSearch:
-    """A search for cones on a connected mesh: one factorization of its Laplacian answers any number of questions.
+    """A search for cones on a connected mesh; the Laplacian is factorized once for any number of queries.
 
-    The distortion E is the area-weighted standard deviation of the linear log scale. A boundary is held at phi = 0
-    and takes what the cones leave.
+    The distortion E is the area-weighted standard deviation of the linear log scale. A boundary has phi = 0 and absorbs
+    the remaining curvature.
 
         search = ConeSearch.from_mesh(mesh)
         search.fewest(0.2).solution.cones
@@ -68,23 +68,24 @@ class ConeSearch:
         laplacian: (n, n) cotangent Laplacian.
         curvature: (n,) angle defect, radians.
         areas: (n,) vertex areas, any unit.
-        is_boundary: (n,) mask of the vertices that take curvature without being cones. Without any, the mesh
+        is_boundary: (n,) mask of the vertices that absorb curvature without being cones. If there are none, the mesh
             counts as closed.
         euler_characteristic: chi of the mesh.
-        tie_key: (n,) breaks ties, the lowest first; None: areas and curvatures do.
-        min_cone_angle, max_cone_angle: bounds of the cones' angles 2 pi - k, radians.
+        tie_key: (n,) breaks ties, the smallest key first; None: areas and curvatures break ties.
+        min_cone_angle, max_cone_angle: bounds of the cone angles 2 pi - k, radians.
         positive_only: no cones of negative curvature (angles above 2 pi).
-        weights: (n,) importance of each vertex, 1 where nothing is said.
-        required: vertices that are cones in any case.
+        weights: (n,) importance of each vertex; None: 1.
+        required: vertices that are always cones.
         allowed: (n,) mask of the other vertices that may be cones; None: all.
-        room: (n,) the widest angle of a cone at each vertex, radians; None: as far as `max_cone_angle` goes.
-        linear: the linear model of these, with these weights, if something has it already.
+        room: (n,) largest cone angle at each vertex, radians, in addition to `max_cone_angle`; None: no further
+            bound.
+        linear: the linear model of these arrays, with these weights, if it is known.
 
     Attributes:
-        tell: called with what is being tried.
+        tell: function that is called with a text on the progress.
 
     Raises:
-        OptionError: an option makes no sense.
+        OptionError: an option is not valid.
         CurvatureError: no curvatures within the bounds have the sum that the surface needs.
     """
 
@@ -123,7 +124,7 @@ class ConeSearch:
             self._least = np.maximum(self._least, np.minimum(FULL_TURN - room[vertices], 0.0))
         self._required = self.unknowns_of(cones)
         self.exact = ExactModel(linear, self._required, limits, self._least)
-        # The exact model needs the score next, the coarse one does not.
+        # The exact model will need the score; it is computed while the coarse model is set up.
         with concurrently(lambda: linear.score, 2 * len(vertices)):
             self.restrict(usable)
 
@@ -133,8 +134,8 @@ class ConeSearch:
 
         Args:
             mesh: see `coneflat.check_mesh`.
-            lengths: (m, 3) side lengths; None: those of the vertices, mollified.
-            options: those of the class.
+            lengths: (m, 3) side lengths; None: those of the vertex positions, mollified.
+            options: keyword arguments of the class.
         """
         lengths = mollify(edge_lengths(mesh.vertices, mesh.faces))[0] if lengths is None else lengths
         count, is_boundary = len(mesh.vertices), mesh.is_boundary_vertex
@@ -148,24 +149,24 @@ class ConeSearch:
         )
 
     def unknowns_of(self, vertices: IntArray) -> IntArray:
-        """Return the unknowns of vertices off the boundary."""
+        """Return the unknowns of inner vertices; -1 for boundary vertices."""
         unknown = np.full(len(self.curvature), -1, dtype=np.int64)
         unknown[self.operator.vertices] = np.arange(len(self.operator.vertices))
         return unknown[vertices]
 
     def restrict(self, usable: BoolArray) -> None:
-        """Search on among the (n,) usable vertices, with what is known about the mesh.
+        """Restrict the search to the usable vertices (n,); cached results for the mesh stay valid.
 
         Raises:
-            CurvatureError: they cannot carry the curvature.
+            CurvatureError: cones at these vertices cannot carry the curvature.
         """
         required, operator = self._required, self.operator
         self.limits.check_available(usable, operator.vertices[required])
         is_usable = usable[operator.vertices]
         is_usable[required] = False
-        # Of vertices side by side, those with room for wide cones represent the others on the coarse model.
-        room = np.maximum(-self._least, 0.0)
-        fitness = 0.5 + 0.5 * room / room.max() if 0 < room.max(initial=0.0) < math.inf else 1.0
+        # On the coarse model, a neighbourhood is represented by a vertex that can hold a wide cone.
+        excess = np.maximum(-self._least, 0.0)
+        fitness = 0.5 + 0.5 * excess / excess.max() if 0 < excess.max(initial=0.0) < math.inf else 1.0
         self.places = np.concatenate([required, candidates(self._coarse_model, is_usable * fitness)])
         kernel, slope = self._coarse_model.at(self.places)
         mask = np.arange(len(self.places)) >= len(required)
@@ -183,15 +184,19 @@ class ConeSearch:
     @property
     def most_cones(self) -> int:
         """The largest number of cones searched for."""
-        most = min(MOST_SEARCHED + len(self._required), len(self.places))
+        most = min(MAX_SEARCHED + len(self._required), len(self.places))
         return most if self.limits.largest is None else min(most, self.limits.largest)
 
     def fewest(self, distortion: float = DISTORTION, most: int | None = None) -> SparseCones:
-        """Return the fewest cones found with E <= distortion; where they are more than `most`, the best of so many.
+        """Return the fewest cones found with E <= distortion; if more than `most` are needed, the best `most` cones.
+
+        Args:
+            distortion: the allowed E, positive.
+            most: largest number of cones; None for no limit.
 
         Raises:
-            OptionError: distortion or number make no sense.
-            CurvatureError: so many cones cannot carry the curvature.
+            OptionError: `distortion` or `most` is not valid.
+            CurvatureError: `most` cones cannot carry the curvature.
         """
         if not 0 < distortion < math.inf:
             raise OptionError(f"the distortion allowed must be a positive number, not {distortion:g}")
@@ -199,34 +204,34 @@ class ConeSearch:
             self.limits.check_count(most, len(self._required))
         most = self.most_cones if most is None else min(most, self.most_cones)
         goal = distortion * distortion
-        count = self._survey(goal, most)
-        count = self._reach(count, goal, most)
+        count = self._search_coarse(goal, most)
+        count = self._find_sufficient(count, goal, most)
         self._reduce(count, goal, most)
         return self._cones(self.exact.best.fewest(goal, most))
 
     def best_of(self, count: int) -> SparseCones:
-        """Return the cones of least E that were found, at most `count` of them.
+        """Return the cones of smallest E that were found, at most `count` of them.
 
         Raises:
-            OptionError: the number makes no sense.
-            CurvatureError: so many cones cannot carry the curvature.
+            OptionError: `count` is not valid.
+            CurvatureError: `count` cones cannot carry the curvature.
         """
         self.limits.check_count(count, len(self._required))
         count = min(count, self.most_cones)
         self._climb(0.0, count + 1, count)
         self.coarse.descend(count - 2, count + 1)
         for size in [size for size in self.coarse.best.sizes if size <= count][-2:]:
-            self._on_mesh(size)
+            self._refine(size)
         return self._cones(self.exact.best.fewest(-1.0, count))
 
     def curve(self, most: int) -> list[SparseCones]:
-        """Return the best cones found of each number up to `most`, where they have a lower E than fewer."""
+        """Return the best cones found for each number up to `most`, if their E is below that of fewer cones."""
         most = min(most, self.most_cones)
         self.coarse.climb(0.0, most)
         self.coarse.descend(1, most)
-        # Upwards and once more down: a set may be best without one of the cones of the next larger.
+        # First upwards, then downwards: the best set may be the next larger set without one of its cones.
         for count in (*range(most + 1), *range(most, -1, -1)):
-            self._on_mesh(count)
+            self._refine(count)
         found: list[SparseCones] = []
         for count in self.exact.best.sizes:
             cones = self._cones(self.exact.best[count])
@@ -234,42 +239,46 @@ class ConeSearch:
                 found.append(cones)
         return found
 
-    def _survey(self, goal: float, most: int) -> int:
-        """Find good sets of all sizes up to the one that is needed, and a little on, on the coarse model; return it."""
+    def _search_coarse(self, goal: float, most: int) -> int:
+        """Find good sets on the coarse model, of all sizes up to slightly more than needed; return the needed size."""
         self._climb(goal / COARSE_MODEL_ERROR, most, most)
         count = len(self.coarse.best.fewest(goal, most))
         self.coarse.descend(count - 3, count + 1)
         return len(self.coarse.best.fewest(goal, most))
 
-    def _reach(self, count: int, goal: float, most: int) -> int:
-        """Return a number of cones, from one on, with which E^2 <= goal on the mesh; or beyond which there is no gain.
+    def _find_sufficient(self, count: int, goal: float, most: int) -> int:
+        """Return a number of cones, at least `count`, with E^2 <= goal on the mesh, or above which there is no gain.
 
-        Where the coarse model is off, it is off by nearly the same factor for more cones: straight to where that goes.
+        The error factor of the coarse model is nearly the same for more cones. So the next number tried is the first
+        for which the coarse model, multiplied by this factor, reaches the goal.
         """
         coarse = self.coarse.best
-        # Where there is nothing left on the coarse model, more cones bring nothing.
-        while self._on_mesh(count) > goal and count < most and coarse.energy(count) > 0:
+        # If E is 0 on the coarse model, more cones gain nothing.
+        while self._refine(count) > goal and count < most and coarse.energy(count) > 0:
             off = max(self.exact.best.energy(count) / coarse.energy(count), 1.0)
             self.coarse.climb(goal / off, most, count)
             larger = [size for size in coarse.sizes if size > count]
             if not larger:
                 break
             count = next((size for size in larger if coarse.energy(size) * off <= goal), larger[-1])
-            if coarse.energy(count) * off > goal:  # more cones bring nothing
+            if coarse.energy(count) * off > goal:  # more cones gain nothing
                 break
         return count
 
     def _reduce(self, count: int, goal: float, most: int) -> None:
-        """Try one cone more if need be, and one less as long as it does and may do."""
+        """Try sets with more cones until the goal is reached, then sets with fewer as long as they reach it."""
         most = min(most, max(self.coarse.best.sizes))
         while self.exact.best.energy(count) > goal and count < most:
             count += 1
-            self._on_mesh(count)
-        while self._may_do(count - 1, goal) and self._on_mesh(count - 1) <= goal:
+            self._refine(count)
+        while self._may_suffice(count - 1, goal) and self._refine(count - 1) <= goal:
             count -= 1
 
-    def _may_do(self, count: int, goal: float) -> bool:
-        """Whether so many cones may do, by the sets tried, or as the coarse model is off by what it is for one more."""
+    def _may_suffice(self, count: int, goal: float) -> bool:
+        """Return whether `count` cones may reach the goal.
+
+        This is estimated from the sets tried, and from the coarse model with its error factor for one cone more.
+        """
         if count < max(self.limits.fewest, len(self._required)):
             return False
         coarse, exact = self.coarse.best, self.exact.best
@@ -279,19 +288,19 @@ class ConeSearch:
         ) <= MAX_REFINED_RATIO * goal or expected <= MAX_REFINED_RATIO * goal * coarse.energy(count + 1)
 
     def _climb(self, bound: float, most: int, count: int) -> None:
-        """Find sets on the coarse model, of at most `most` cones; it is an error if none has `count` or fewer."""
+        """Find sets of at most `most` cones on the coarse model; raise CurvatureError if none has at most `count`."""
         self.coarse.climb(bound, most)
         if min(self.coarse.best.sizes, default=count + 1) > count:
             raise CurvatureError(
-                f"no {count} cones were found that carry a total curvature of {self.limits.total / np.pi:.4g} pi "
-                "within their bounds: allow more of them or other angles, or choose the greedy search "
-                "(--cones greedy), which has no bounds"
+                f"no set of {count} cones was found that carries a total curvature of "
+                f"{self.limits.total / np.pi:.4g} pi within their bounds: allow more cones or other angles, or choose "
+                "the greedy search (--cones greedy), which has no bounds"
             )
 
-    def _on_mesh(self, count: int) -> float:
-        """Return E^2 of the best set of a size on the mesh, infinite if there is none.
+    def _refine(self, count: int) -> float:
+        """Refine the best set of a size on the mesh; return its E^2, infinite if there is none.
 
-        It starts from the coarse model's set, or from the next larger without a cone if that is better.
+        It starts from the set of the coarse model, or from the next larger set without one cone if that is better.
         """
         self.tell(plural(count, "cone"))
         exact, starts = self.exact, []
@@ -301,11 +310,11 @@ class ConeSearch:
             shrunk = exact.shrunk(exact.best[count + 1].members)
             starts += [] if shrunk is None else [shrunk]
         if starts:
-            exact.polish(min(starts, key=exact.energy))
+            exact.refine(min(starts, key=exact.energy))
         return exact.best.energy(count)
 
     def _cones(self, found: ConeSet) -> SparseCones:
-        """Return the cones of a set on the mesh, those of no curvature left out unless they are required."""
+        """Return the cones of a set on the mesh; cones of zero curvature are left out unless they are required."""
         unknowns, required = self.exact.unknowns, len(self._required)
         members = found.members[self.exact.in_order(found.members)]
         curvatures = self.exact.fit(members).curvatures
@@ -313,17 +322,17 @@ class ConeSearch:
         keep[:required] = True
         kept = curvatures[keep]
         if self.limits.has_sum and len(kept):
-            # What rounding and those left out have taken from the sum: no metric has another one.
+            # Correct the sum for rounding and for the cones left out: a metric must have exactly this sum.
             kept += (self.limits.total - kept.sum()) / len(kept)
         return SparseCones(self.solution_of(unknowns[members[keep]], kept), math.sqrt(found.energy))
 
     def solution_of(self, unknowns: IntArray, curvatures: FloatArray) -> ConeSolution:
-        """Return the solution of given cones and curvatures."""
+        """Return the solution of cones at unknowns (s,) with given curvatures (s,), radians."""
         return self._linear.solution_of(self.operator.vertices[unknowns], curvatures)
 
 
 def required_vertices(required: Iterable[int], is_boundary: BoolArray) -> IntArray:
-    """Return the required cones as an array, checked."""
+    """Return the required cones as an array of vertices; raise OptionError if one is not valid."""
     cones = np.array(list(required), dtype=np.int64)
     bad = cones[(cones < 0) | (cones >= len(is_boundary))]
     if len(bad):
