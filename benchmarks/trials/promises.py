@@ -31,7 +31,7 @@ SENTENCES = {
     "sides": r"The two sides of seams differ in length",
     "lengths": r"Lengths along the boundary are not preserved",
     "round": r"The boundary is not quite round",
-    "rotations": r"Seam rotations differ by up to .* from multiples of [\d.e+-]+ rad",
+    "rotations": r"Seam rotations are .* rad off multiples of [\d.e+-]+ rad",
     "cone count": r"[\d,]+ cones? instead of the [\d,]+ asked for",
 }
 

@@ -19,7 +19,7 @@ from .measure.seam_data import Rotations, measure_rotations
 from .mesh.connectivity import TriangleMesh
 from .options import Options, settings
 from .result import Flattening
-from .source.input_mesh import result_numbering, turn_corners
+from .source.input_mesh import reorder_corners, result_numbering
 from .stages import SolveStatistics
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def evaluate(
         layout = _pack(layouts, triangles, numbering.positions, mesh, options)
     source, face_corners = prepared.given.source, prepared.given.face_corners
     if face_corners is not None and source is not None:
-        face_corners = turn_corners(checked, face_corners)
+        face_corners = reorder_corners(checked, face_corners)
     curvature = _curvature(prepared, layouts, numbering)
     cones = numbering.renumber([one.cones for one in layouts])
     with watch("measure"):

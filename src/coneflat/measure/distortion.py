@@ -18,7 +18,7 @@ from ..geometry.straight import place_triangles
 from ..mesh.charts import both_sides, joined_edges, label_charts
 from ..mesh.connectivity import TriangleMesh
 
-ZERO_AREA = 1e-12  # twice the area over the longest side squared; below it, rounding leaves no digit of the shape
+ZERO_AREA = 1e-12  # twice the area over the longest side squared; smaller ones are rounding errors
 
 
 @dataclass(frozen=True, eq=False)

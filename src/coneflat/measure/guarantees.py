@@ -227,8 +227,8 @@ def _seam_rotations(result: Flattening, unit: float) -> Iterator[str]:
     off = np.where(rotations.binds(off), off, 0.0)
     if (off * shorter > EXACT_TOLERANCE * shorter + MAX_ROUNDINGS * unit).any():
         along = np.abs(rotations.handles).max(initial=0.0) > EXACT_TOLERANCE
-        deviation, advice = f"{rotations.worst:.2g}", ", also along handles: use correct_handles=True" if along else ""
-        yield f"Seam rotations differ by up to {deviation} rad from multiples of {rotations.quantum:.4g} rad{advice}."
+        advice = ", also along handles: use correct_handles=True" if along else ""
+        yield f"Seam rotations are {rotations.worst:.2g} rad off multiples of {rotations.quantum:.4g} rad{advice}."
 
 
 def _distortion(result: Flattening) -> Iterator[str]:

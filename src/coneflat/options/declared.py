@@ -124,8 +124,8 @@ def declarations(group: Any) -> dict[str, Declaration]:
             if name in known and name not in found:
                 of = known[name]
                 doc = " ".join(docs.get(name, "").split())
-                text_and_type = {"name": name, "group": title, "doc": doc, "type": of.type, "default": of.default}
-                found[name] = replace(of.metadata["declared"], **text_and_type)
+                data = {"name": name, "group": title, "doc": doc, "type": of.type, "default": of.default}
+                found[name] = replace(of.metadata["declared"], **data)
     return found
 
 
