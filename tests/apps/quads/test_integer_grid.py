@@ -7,7 +7,7 @@ import pytest
 import shapes
 
 from coneflat import errors, flatten, integer_grid
-from coneflat.apps.quads.layout import aligned, between_whole, split_edges
+from coneflat.apps.quads.layout import aligned, between_nodes, split_edges
 from coneflat.apps.quads.transitions import find_transitions
 from coneflat.mesh.connectivity import TriangleMesh
 
@@ -200,7 +200,7 @@ def test_charts_stay_joined_where_edges_between_them_are_split(shared, distortio
     options = {**QUARTER, "charts": "atlas", "correct_handles": True, "distortion": distortion}
     result = flatten(shared("knight.off"), **options)
     layout = aligned(result, 1000, None)
-    is_split = between_whole(layout)
+    is_split = between_nodes(layout)
     assert result.distortion.charts > 1
     assert is_split.any()
     split = split_edges(layout, is_split)

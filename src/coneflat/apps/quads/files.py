@@ -168,8 +168,8 @@ _LINE_MATERIAL: dict[str, Any] = {
 def _write_glb(mesh: QuadMesh, stream: IO[bytes]) -> None:
     """Write a quad mesh as GLB: two triangles for each quad, and the edges of quads as visible lines.
 
-    The first primitive has the vertices in their order, and for each quad the two triangles at its shorter diagonal. The
-    second has the edges, raised above the quads by a hundredth of the mean edge length; closer lines
+    The first primitive has the vertices in their order, and for each quad the two triangles at its shorter diagonal.
+    The second has the edges, raised above the quads by a hundredth of the mean edge length; closer lines
     appear dashed in viewers. Coordinates are 32-bit floats.
 
     Raises:

@@ -19,8 +19,8 @@ from ...options import WordOrVertices
 from .integer_map import IntegerGrid
 from .layout import GRID_TOLERANCE, aligned
 from .options import QUADS, QuadOptions
-from .round_layout import grid_near, grid_of, noted
-from .sharp import not_taken, sharp_layouts
+from .round_layout import grid_near, grid_of, with_note
+from .sharp import sharp_layouts, unsupported
 
 # Options of the flattening for a grid: three, five or six quads at a cone, and rotations by quarter turns.
 OPTIONS = {
@@ -143,7 +143,7 @@ class _Search:
             return self._of_flattening("straight", all_sides=True)
         except (CurvatureError, MetricError) as error:
             why = f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {error}."
-        return noted(self._of_flattening("free"), why)
+        return with_note(self._of_flattening("free"), why)
 
     def with_lines(self, sharp_angle: float | str, boundary: Any) -> IntegerGrid:
         """Return a grid with the boundary and as many sharp edges as possible on grid lines."""
@@ -152,7 +152,7 @@ class _Search:
             found, why = self._along_axes({**self.options, "sharp_angle": sharp_angle, "boundary": boundary})
         if found is not None:
             return found
-        return noted(self._of_flattening(boundary), f"No sharp edge is on a grid line: {why}.")
+        return with_note(self._of_flattening(boundary), f"No sharp edge is on a grid line: {why}.")
 
     def _has_boundary(self) -> bool:
         given, repair = as_input(self.mesh, self.faces), bool(self.options.get("repair", False))
@@ -197,14 +197,14 @@ class _Search:
                 if not is_straight:
                     raise
                 layout, why = None, str(error)
-            if options is not None and not not_taken(options, OPTIONS):
+            if options is not None and not unsupported(options, OPTIONS):
                 # Relaxing rotates the sides, which is not conformal.
-                turned, _ = self._along_axes(options)
-                if turned is not None:
-                    return turned
+                rotated, _ = self._along_axes(options)
+                if rotated is not None:
+                    return rotated
             if all_sides or layout is None:
                 raise GridError(why)
-            return noted(grid_of(layout, self.energy), f"{why}.")
+            return with_note(grid_of(layout, self.energy), f"{why}.")
 
     def _along_axes(self, options: dict[str, Any]) -> tuple[IntegerGrid | None, str]:
         """Return a grid with the boundary and as many sharp edges as possible on grid lines; or None and the reason."""
