@@ -36,11 +36,11 @@ def grid_of(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
     wanted = layout.area
     if found is None:
         most = 4
-        advice = f"nor with up to {2**most} times as many"
+        advice = f"none was found with up to {2**most} times as many"
         for k in range(1, most + 1):
             finer = layout.scaled(2**k)
             if grid_near(finer, energy)[0] is not None:
-                advice = f"with {finer.area:,.0f} there is one"
+                advice = f"{finer.area:,.0f} quads are possible"
                 break
         raise GridError(f"no grid of about {wanted:,.0f} quads was found: {why}; {advice}")
     factor, last = 1.0, _squares(found)
