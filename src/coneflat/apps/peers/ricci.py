@@ -121,7 +121,7 @@ class Packing:
     def of(
         cls, mesh: TriangleMesh, lengths: FloatArray, target: FloatArray, border: BoolArray, pinned: BoolArray
     ) -> Packing:
-        """Return circles on the input, flipped to Delaunay and then to weighted Delaunay; the surface does not change."""
+        """Return circles on the input, flipped to Delaunay and weighted Delaunay; the surface does not change."""
         triangulation, flips = intrinsic_delaunay(mesh, lengths)
         radii = packed_radii(triangulation.length.reshape(-1, 3), triangulation.faces)
         more = flip_to_weighted_delaunay(triangulation, radii, has_lengths=True)
