@@ -133,7 +133,7 @@ def test_a_fault_that_its_own_note_names_is_no_breach(ball):
     for notes, is_breach in (
         ((), True),
         (("2 cones too wide for the triangles around: that at vertex 3 has an angle of 3 pi.",), True),
-        (("5 pairs of triangles overlap in the atlas, 0.1 of the area that it covers.",), True),
+        (("5 pairs of triangles overlap in the atlas, on 0.1 of the covered area.",), True),
         (("There is 1 flipped triangle in the plane: refine the mesh there.",), False),
     ):
         assert (cause in breaches_of(replace(turned, notes=notes), options, *mesh)) == is_breach

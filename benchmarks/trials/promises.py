@@ -27,11 +27,11 @@ SENTENCES = {
     "flipped": r"There (is|are) [\d,]+ flipped triangles? .*in the plane",
     "collapsed": r"There (is|are) ([\d,]+ flipped triangles? and )?[\d,]+ degenerate triangles? in the plane",
     "overlap": r"[\d,]+ pairs? of triangles overlaps? in the atlas",
-    "angles": r"Around [\d,]+ (vertex|vertices) the angles do not sum to what they are to be",
+    "angles": r"Around [\d,]+ (vertex|vertices) the angle sum differs from its target",
     "sides": r"The two sides of seams differ in length",
-    "lengths": r"Lengths along the boundary are not kept",
+    "lengths": r"Lengths along the boundary are not preserved",
     "round": r"The boundary is not quite round",
-    "rotations": r"Seams turn by up to .* beside multiples of [\d.e+-]+ rad",
+    "rotations": r"Seam rotations are .* rad off multiples of [\d.e+-]+ rad",
     "cone count": r"[\d,]+ cones? instead of the [\d,]+ asked for",
 }
 

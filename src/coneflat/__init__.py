@@ -1,9 +1,9 @@
 """Conformal flattening of triangle meshes with automatic cone singularities.
 
-Names are imported on first use, so that `import coneflat` takes no time.
+Names are imported on first use, so that `import coneflat` is fast.
 
 Examples:
-    A file is flattened, and every triangle corner has a point of the plane:
+    Flatten a file. Every triangle corner gets a point in the plane:
 
     >>> import coneflat
     >>> result = coneflat.flatten(coneflat.sample_path())
@@ -19,7 +19,7 @@ Examples:
     >>> coneflat.flatten(vertices, faces, **coneflat.PAPER).settings["method"]
     'linear'
 
-    `__version__` is the version of the package, as text:
+    `__version__` is the version of the package as a string:
 
     >>> len(coneflat.__version__.split("."))
     3
@@ -34,6 +34,7 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.2.0"
 
+# Module of each public name.
 _HOMES = {
     "flatten": "flatten",
     "Flattener": "flattener",
@@ -64,7 +65,7 @@ _HOMES = {
     "ConeflatError": "errors",
 }
 
-#: Modules by name: first those in `__all__`, then the packages whose functions can be called alone.
+#: Modules by name: first those in `__all__`, then the packages whose functions can be called directly.
 _MODULES = {"errors": "errors", "peers": "apps.peers"}
 _PACKAGES = (
     "atlas",
@@ -140,7 +141,7 @@ if TYPE_CHECKING:
 
 
 class _Package(ModuleType):
-    """The package: `coneflat.flatten` is the function also after the module of that name has been imported."""
+    """The package; `coneflat.flatten` remains the function when the module of the same name is imported."""
 
     def __setattr__(self, name: str, value: object) -> None:
         if not (name in _HOMES and isinstance(value, ModuleType)):

@@ -1,4 +1,4 @@
-"""`python -m coneflat`."""
+"""Entry point of `python -m coneflat`."""
 
 from .apps.cli.main import main
 

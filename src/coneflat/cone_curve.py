@@ -1,4 +1,4 @@
-"""Area distortion against the number of cones, so that the knee can be chosen."""
+"""Search for cones without flattening, and the curve of area distortion against the number of cones."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class FoundCones:
     Attributes:
         vertices: (s,) in the input's numbering.
         curvatures: (s,) radians.
-        distortion: E of the linear model with them: the standard deviation of the log of the scale, by area.
+        distortion: area distortion E of the linear model: standard deviation of the log scale, weighted by area.
     """
 
     vertices: IntArray
@@ -41,10 +41,10 @@ class FoundCones:
 
 @dataclass(frozen=True, eq=False)
 class ConeCurve:
-    """The best cones found for each number of them.
+    """The best set of cones found for each number of cones.
 
     Attributes:
-        sets: the cones, fewer first; the distortion falls.
+        sets: sets of cones in the order of their size; the distortion decreases.
 
     Examples:
         >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
@@ -65,7 +65,7 @@ class ConeCurve:
 
     @property
     def distortions(self) -> FloatArray:
-        """(k,) E of the linear model with so many."""
+        """(k,) area distortion E of the linear model with each set of cones."""
         return np.array([each.distortion for each in self.sets])
 
     @property
@@ -76,12 +76,12 @@ class ConeCurve:
 
 @dataclass(frozen=True, eq=False)
 class WholeCurve:
-    """The area distortion of a whole mesh with up to so many cones in each of its parts.
+    """The area distortion of a whole mesh against the largest number of cones in each of its parts.
 
     Attributes:
-        counts: (k,) cones in each part: as many are allowed as `cone_count` allows.
-        distortions: (k,) E of the linear model of all parts, which falls.
-        parts: how many there are: components, and what marked seams divide them into.
+        counts: (k,) largest number of cones in each part, as the option `cone_count` sets it.
+        distortions: (k,) area distortion E of the linear model of all parts, decreasing.
+        parts: number of parts: components, and the pieces into which marked seams divide them.
     """
 
     counts: IntArray
@@ -108,16 +108,16 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
         options: see below.
 
     Returns:
-        Vertices in the input's numbering, their curvatures in radians, and the area distortion that is left; without
-        cones the arrays are empty.
+        Vertices in the input's numbering, their curvatures in radians, and the remaining area distortion. The arrays
+        are empty if there are no cones.
 
     Raises:
         MeshError: the mesh cannot be flattened; see `coneflat.errors` for its kinds.
         MeshFileError: its file cannot be read.
         CurvatureError: no cones that are allowed carry the curvature of the surface.
-        OptionError: an option is unknown or makes no sense.
+        OptionError: an option is unknown or invalid.
         MetricError: the computation found no finite result.
-        TooLargeError: it does not fit into the memory that is free.
+        TooLargeError: the mesh does not fit into the free memory.
 
     Examples:
         >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
@@ -128,8 +128,8 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
         >>> np.round(found.curvatures / np.pi, 6)
         array([1., 1., 1., 1.])
     """
-    asked = read_options(options, FindOptions)
-    chosen = Options(**vars(asked))
+    parsed = read_options(options, FindOptions)
+    chosen = Options(**vars(parsed))
     stages = Stopwatch(chosen.progress)
     with using_threads():
         part = _largest(mesh, faces, chosen, stages)
@@ -139,28 +139,28 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
         with stages("cones"):
             count = chosen.cone_count
             found = search.fewest(chosen.distortion) if count is None else search.best_of(count)
-    return _named(found.solution, found.distortion, part)
+    return _found_cones(found.solution, found.distortion, part)
 
 
 @takes(CurveOptions)
 def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> ConeCurve:
-    """Search for the best cones of every number of them, on the largest component of a mesh.
+    """Search for the best set of cones of each size, on the largest component of a mesh.
 
     Args:
         mesh, faces: as for `coneflat.flatten`.
         options: see below.
 
     Returns:
-        One set of cones for each number that has one, up to `most`, fewer first. Vertices are in the input's
-        numbering, curvatures in radians.
+        One set of cones for each feasible number of cones up to `most`, in ascending order. Vertices are in the
+        input's numbering, curvatures in radians.
 
     Raises:
         MeshError: the mesh cannot be flattened; see `coneflat.errors` for its kinds.
         MeshFileError: its file cannot be read.
         CurvatureError: no cones that are allowed carry the curvature of the surface.
-        OptionError: an option is unknown or makes no sense, or no set of up to `most` cones carries the curvature.
+        OptionError: an option is unknown or invalid, or no set of up to `most` cones has the required total curvature.
         MetricError: the computation found no finite result.
-        TooLargeError: it does not fit into the memory that is free.
+        TooLargeError: the mesh does not fit into the free memory.
 
     Examples:
         >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
@@ -171,20 +171,26 @@ def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Con
         3 0.785
         4 0.000
     """
-    asked = read_options(options, CurveOptions)
-    chosen = Options(**{name: value for name, value in vars(asked).items() if name != "most"})
+    parsed = read_options(options, CurveOptions)
+    chosen = Options(**{name: value for name, value in vars(parsed).items() if name != "most"})
     stages = Stopwatch(chosen.progress)
     with using_threads():
-        return _curve(_largest(mesh, faces, chosen, stages), asked.most, stages)[0]
+        return _curve(_largest(mesh, faces, chosen, stages), parsed.most, stages)[0]
 
 
 def whole_curve(mesh: Any, faces: ArrayLike | None, options: Options, most: int) -> WholeCurve:
-    """Search for the best cones of every number of them, on all parts of a mesh.
+    """Search for the best set of cones of each size, on all parts of a mesh.
 
     Args:
-        mesh, faces: as for `coneflat.flatten`, and so are the errors.
-        options: of `coneflat.flatten`, that have been read; their number of cones does not matter.
-        most: the largest number of cones, in each part.
+        mesh, faces: as for `coneflat.flatten`.
+        options: parsed options of `coneflat.flatten`; `cone_count` is ignored.
+        most: largest number of cones in each part.
+
+    Returns:
+        The area distortion of the whole mesh against the number of cones.
+
+    Raises:
+        The errors of `coneflat.flatten`.
     """
     stages = Stopwatch(options.progress)
     with using_threads(options.threads):
@@ -198,7 +204,7 @@ def whole_curve(mesh: Any, faces: ArrayLike | None, options: Options, most: int)
     least = max(curve.counts[0] for curve, _ in curves)
     counts = np.unique(np.concatenate([[least], *(curve.counts for curve, _ in curves)]))
     counts = counts[counts >= least]
-    # With so many cones allowed a part has the best set of so many or fewer.
+    # If up to c cones are allowed, a part uses its best set of at most c cones.
     each = [curve.distortions[np.searchsorted(curve.counts, counts, side="right") - 1] for curve, _ in curves]
     areas = [area for _, area in curves]
     whole = np.sqrt(np.average(np.square(each), axis=0, weights=areas))
@@ -206,7 +212,7 @@ def whole_curve(mesh: Any, faces: ArrayLike | None, options: Options, most: int)
 
 
 def _largest(mesh: Any, faces: ArrayLike | None, options: Options, stages: Stopwatch) -> Part:
-    """Return the largest component of a mesh, which then is all that there is to do."""
+    """Return the largest component of a mesh; progress counts this component alone."""
     with stages("check"):
         part = max(Source(as_input(mesh, faces)).prepared(options).parts, key=lambda each: len(each.faces))
     stages.share = 1.0
@@ -214,7 +220,7 @@ def _largest(mesh: Any, faces: ArrayLike | None, options: Options, stages: Stopw
 
 
 def _curve(part: Part, most: int, stages: Stopwatch) -> tuple[ConeCurve, float]:
-    """Return the curve of a component, and its area, twice."""
+    """Return the curve of a component and twice its area."""
     area, search = float(double_areas(part.lengths).sum()), _open(part, stages)
     if isinstance(search, FoundCones):
         return ConeCurve((search,)), area
@@ -222,19 +228,19 @@ def _curve(part: Part, most: int, stages: Stopwatch) -> tuple[ConeCurve, float]:
         found = search.curve(most)
     if not found:
         raise OptionError(f"no set of up to {most} cones carries this surface's curvature; allow more")
-    return ConeCurve(tuple(_named(each.solution, each.distortion, part) for each in found)), area
+    return ConeCurve(tuple(_found_cones(each.solution, each.distortion, part) for each in found)), area
 
 
 def _open(part: Part, stages: Stopwatch) -> ConeSearch | FoundCones:
-    """Return a search on a component, or what there is where no vertex of it may be a cone."""
+    """Return a cone search on a component, or the only possible set of cones if there is nothing to search."""
     surface = Surface.of(part.mesh, part.lengths)
     only = only_choice(surface, part.cones)
     if only is not None:
         share = weighted_areas(surface.areas, part.cones.weights)
-        return _named(only, area_distortion(only.log_scale, share), part)
+        return _found_cones(only, area_distortion(only.log_scale, share), part)
     with stages("cones", 0.3):
         return open_search(surface, part.cones, stages)
 
 
-def _named(solution: ConeSolution, distortion: float, part: Part) -> FoundCones:
+def _found_cones(solution: ConeSolution, distortion: float, part: Part) -> FoundCones:
     return FoundCones(part.cones.names[solution.cones], solution.curvatures, distortion)

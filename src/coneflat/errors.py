@@ -1,6 +1,6 @@
-"""The package's exceptions; every failure a user can cause ends in one of these.
+"""Exceptions of the package; every failure that a user can cause raises one of these.
 
-All derive from `ConeflatError`. Messages are one line: what is wrong, where, and what to do about it.
+All derive from `ConeflatError`. A message is one line: what is wrong, where, and what to do about it.
 
 Examples:
     >>> try:
@@ -30,11 +30,11 @@ class ConeflatError(Exception):
 
 
 class MeshError(ConeflatError, ValueError):
-    """The mesh is not one that can be flattened."""
+    """The mesh cannot be flattened."""
 
 
 class EmptyMeshError(MeshError):
-    """There is no vertex or no face."""
+    """The mesh has no vertices or no faces."""
 
 
 class ArrayShapeError(MeshError):
@@ -46,7 +46,7 @@ class NonFiniteError(MeshError):
 
 
 class FaceIndexError(MeshError):
-    """A face names a vertex that does not exist."""
+    """A face has the index of a vertex that does not exist."""
 
 
 class DegenerateFaceError(MeshError):
@@ -54,7 +54,7 @@ class DegenerateFaceError(MeshError):
 
 
 class NonManifoldError(MeshError):
-    """An edge has more than two faces, or a vertex more than one fan of faces."""
+    """An edge has more than two faces, or the faces at a vertex form more than one fan."""
 
 
 class NonOrientableError(MeshError):
@@ -62,7 +62,7 @@ class NonOrientableError(MeshError):
 
 
 class LengthError(MeshError):
-    """Side lengths are not a metric: they make no triangles, or differ between the two sides of an edge."""
+    """Side lengths are not a metric: they break the triangle inequality, or differ between the two sides of an edge."""
 
 
 class MissingUVError(MeshError):
@@ -70,15 +70,15 @@ class MissingUVError(MeshError):
 
 
 class OptionError(ConeflatError, ValueError):
-    """An option has a value that makes no sense."""
+    """An option is unknown, has an invalid value, or contradicts another option."""
 
 
 class CurvatureError(ConeflatError, ValueError):
-    """The curvatures asked for belong to no metric (Gauss-Bonnet, or a cone of 2 pi and more)."""
+    """No metric has the required curvatures (Gauss-Bonnet is violated, or a curvature is 2 pi or more)."""
 
 
 class SeamError(ConeflatError, ValueError):
-    """The seams asked for cannot be had."""
+    """The required seams are impossible."""
 
 
 class MetricError(ConeflatError, ArithmeticError):
@@ -86,11 +86,11 @@ class MetricError(ConeflatError, ArithmeticError):
 
 
 class ConvergenceError(MetricError):
-    """The solve ended short of its tolerance."""
+    """A solver stopped before it reached its tolerance."""
 
 
 class TooLargeError(ConeflatError, MemoryError):
-    """The mesh needs more memory than is free."""
+    """The computation needs more memory than is free."""
 
 
 class GridError(MetricError):
@@ -98,16 +98,16 @@ class GridError(MetricError):
 
 
 class MeshFileError(ConeflatError, OSError):
-    """A file cannot be read or written, or is not what its name says."""
+    """A file cannot be read or written, or its content does not match its format."""
 
 
 class UnknownFormatError(MeshFileError):
-    """The file's ending names no format that coneflat knows."""
+    """The file extension does not belong to a supported format."""
 
 
 class ProjectError(ConeflatError, ValueError):
-    """A project of the studio cannot be read, or its mesh is not the one that it was made with."""
+    """A studio project cannot be read, or its mesh has changed since it was saved."""
 
 
 class StudioError(ConeflatError, ValueError):
-    """The studio cannot do what it is asked for."""
+    """The studio cannot perform a request."""

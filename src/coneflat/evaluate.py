@@ -1,4 +1,4 @@
-"""From flattened components to one result."""
+"""Assembly of the result from the layouts of all parts: numbering, packing and measures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .measure.seam_data import Rotations, measure_rotations
 from .mesh.connectivity import TriangleMesh
 from .options import Options, settings
 from .result import Flattening
-from .source.input_mesh import result_numbering, turn_corners
+from .source.input_mesh import reorder_corners, result_numbering
 from .stages import SolveStatistics
 
 if TYPE_CHECKING:
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class _Numbering:
-    """The vertices of the result: those of the input as it numbers them, then those that a repair added.
+    """The r vertices of the result: those of the input in its order, then the vertices that a repair added.
 
     Attributes:
         positions: (r, 3).
-        vertex_origin: (r,) the vertex of the input.
-        of_checked: (n,) the number of each vertex of the checked mesh.
-        of_parts: the number of each vertex of each component.
+        vertex_origin: (r,) the input vertex of each.
+        of_checked: (n,) the index in the result of each vertex of the checked mesh.
+        of_parts: the index in the result of each vertex, for each component.
     """
 
     positions: FloatArray
@@ -44,14 +44,14 @@ class _Numbering:
     of_parts: list[IntArray]
 
     def spread(self, values: Sequence[FloatArray]) -> FloatArray:
-        """Return (r,) values at the vertices of components, NaN at vertices that are of none."""
+        """Return (r,) the values of all components at the vertices of the result, NaN at unused vertices."""
         every = np.full(len(self.positions), np.nan)
         for ids, value in zip(self.of_parts, values, strict=True):
             every[ids] = value
         return every
 
     def renumber(self, vertices: Sequence[IntArray]) -> IntArray:
-        """Return the numbers of vertices of the components, one component after the other."""
+        """Return the indices in the result of vertices of the components, concatenated by component."""
         return np.concatenate([ids[own] for ids, own in zip(self.of_parts, vertices, strict=True)])
 
 
@@ -60,9 +60,9 @@ class _Triangles:
     """The triangles of the result, in the order of the input's faces.
 
     Attributes:
-        order: (m,) which triangle each is, of those of all components; None where they are in order as they are.
+        order: (m,) index of each triangle in the concatenation of all components; None for the identity.
         faces: (m, 3) vertices of the result.
-        face_origin: (m,) the face of the input.
+        face_origin: (m,) the input face of each.
     """
 
     order: IntArray | None
@@ -70,7 +70,7 @@ class _Triangles:
     face_origin: IntArray
 
     def sorted(self, values: IntArray) -> IntArray:
-        """Return values, (m,) or (m, 3), of the triangles of all components in the order of the result."""
+        """Return values (m,) or (m, 3) of the concatenated components, reordered to the result's triangles."""
         return values if self.order is None else rows_of(values, self.order)
 
 
@@ -81,9 +81,9 @@ class _Layout:
     Attributes:
         uv: (u, 2) points.
         corners: (m, 3) the point of each triangle corner, in the order of the result.
-        own: (m, 3) the same, component after component.
+        own: (m, 3) the same, concatenated by component.
         scale: UV units per unit of length of the checked mesh.
-        efficiency: part of the square that is covered.
+        efficiency: covered fraction of the square.
     """
 
     uv: FloatArray
@@ -98,9 +98,9 @@ class _Curvature:
     """Curvature at the vertices of the result, radians.
 
     Attributes:
-        target: (r,) what was wanted of the metric.
-        prescribed: (r,) what vertices are to have in the plane; NaN where it is free.
-        residual: (r,) the target less what was reached.
+        target: (r,) target curvature of the metric.
+        prescribed: (r,) prescribed curvature in the plane; NaN where it is free.
+        residual: (r,) target minus the curvature of the metric.
     """
 
     target: FloatArray
@@ -110,33 +110,34 @@ class _Curvature:
 
 def evaluate(
     prepared: Prepared,
-    laid_out: Sequence[Layout],
+    layouts: Sequence[Layout],
     options: Options,
     watch: Stopwatch,
     overlaps: Overlaps | None = None,
 ) -> Flattening:
-    """Return the result: charts packed, numbered as the input, measured, with a note on each unmet guarantee.
+    """Return the result of a flattening: packed, in the input's numbering, measured, with notes on unmet guarantees.
 
     Args:
         prepared: the input.
-        laid_out: the layouts of its parts.
-        options, watch: what the result tells about itself.
-        overlaps: of its triangles; None where they are to be found.
+        layouts: the layouts of its parts.
+        options: the options; the result records them.
+        watch: the stopwatch; the result records its times.
+        overlaps: overlapping pairs of the result's triangles; None to compute them.
     """
     checked = prepared.checked
     numbering = _number_vertices(prepared)
     triangles = _sort_triangles(prepared, numbering)
     mesh = _known_or_new(checked.mesh, np.ldexp(numbering.positions, checked.exponent), triangles.faces)
     with watch("pack"):
-        layout = _pack(laid_out, triangles, numbering.positions, mesh, options)
+        layout = _pack(layouts, triangles, numbering.positions, mesh, options)
     source, face_corners = prepared.given.source, prepared.given.face_corners
     if face_corners is not None and source is not None:
-        face_corners = turn_corners(checked, face_corners)
-    curvature = _curvature(prepared, laid_out, numbering)
-    cones = numbering.renumber([one.cones for one in laid_out])
+        face_corners = reorder_corners(checked, face_corners)
+    curvature = _curvature(prepared, layouts, numbering)
+    cones = numbering.renumber([one.cones for one in layouts])
     with watch("measure"):
         layout, distortion = _measure(prepared, mesh, layout, curvature, cones, options, overlaps)
-        rotations = _rotations(laid_out, layout.uv[layout.own], options)
+        rotations = _rotations(layouts, layout.uv[layout.own], options)
     result = Flattening(
         vertices=numbering.positions,
         faces=triangles.faces,
@@ -146,22 +147,22 @@ def evaluate(
         packing_efficiency=layout.efficiency,
         cones=cones,
         curvatures=curvature.target[cones],
-        log_scale=numbering.spread([one.log_scale for one in laid_out]),
+        log_scale=numbering.spread([one.log_scale for one in layouts]),
         prescribed=curvature.prescribed,
         curvature_residual=curvature.residual,
         seams=np.concatenate(
-            [numbering.of_checked[prepared.seams], numbering.renumber([one.seams for one in laid_out])]
+            [numbering.of_checked[prepared.seams], numbering.renumber([one.seams for one in layouts])]
         ),
         distortion=distortion.rescaled(checked.exponent * np.log(2)),
         seconds=dict(watch.seconds),
         notes=(
             *checked.notes,
             *prepared.notes,
-            *dict.fromkeys(note for one in laid_out for note in one.notes),
+            *dict.fromkeys(note for one in layouts for note in one.notes),
         ),
         settings=settings(options),
         solve=SolveStatistics.of_all(
-            [one.statistics for one in laid_out], [one.area if len(laid_out) > 1 else 1.0 for one in laid_out]
+            [one.statistics for one in layouts], [one.area if len(layouts) > 1 else 1.0 for one in layouts]
         ),
         rotations=rotations,
         vertex_origin=numbering.vertex_origin,
@@ -174,7 +175,7 @@ def evaluate(
 
 
 def _number_vertices(prepared: Prepared) -> _Numbering:
-    """Return the numbers of vertices."""
+    """Return the numbering of the result's vertices."""
     points = np.asarray(prepared.given.vertices, dtype=np.float64)
     number, vertex_origin = result_numbering(prepared.checked, len(points))
     of_parts = [number[part.vertices] for part in prepared.parts]
@@ -193,14 +194,14 @@ def _sort_triangles(prepared: Prepared, numbering: _Numbering) -> _Triangles:
 
 
 def _pack(
-    laid_out: Sequence[Layout],
+    layouts: Sequence[Layout],
     triangles: _Triangles,
     positions: FloatArray,
     mesh: TriangleMesh,
     options: Options,
 ) -> _Layout:
-    """Return the charts of all components, packed."""
-    points, own, chart, component = _all_charts(laid_out)
+    """Return the packed charts of all components."""
+    points, own, chart, component = _all_charts(layouts)
     corners = triangles.sorted(own)
     packed = arrange_charts(
         rows_of(points, corners),
@@ -215,18 +216,18 @@ def _pack(
         edge_halfedges=mesh.edge_halfedges,
     )
     uv = np.empty_like(points)
-    # Both coordinates at once: so NumPy is several times as fast.
+    # Assigning both coordinates as one complex number is several times as fast in NumPy.
     uv.view(np.complex128)[:, 0][corners] = packed.corner_uv.view(np.complex128)[..., 0]
     return _Layout(uv, corners, own, packed.scale, packed.efficiency)
 
 
-def _curvature(prepared: Prepared, laid_out: Sequence[Layout], numbering: _Numbering) -> _Curvature:
-    """Return the curvature wanted, prescribed and missed."""
-    target = numbering.spread([one.target for one in laid_out])
-    prescribed = numbering.spread([one.prescribed for one in laid_out])
-    # What was opened there has several copies of a vertex.
+def _curvature(prepared: Prepared, layouts: Sequence[Layout], numbering: _Numbering) -> _Curvature:
+    """Return the target, the prescribed and the residual curvature at the vertices of the result."""
+    target = numbering.spread([one.target for one in layouts])
+    prescribed = numbering.spread([one.prescribed for one in layouts])
+    # A vertex on a marked seam has several copies in the plane.
     prescribed[numbering.of_checked[prepared.seams]] = np.nan
-    return _Curvature(target, prescribed, target - numbering.spread([one.curvature for one in laid_out]))
+    return _Curvature(target, prescribed, target - numbering.spread([one.curvature for one in layouts]))
 
 
 def _measure(
@@ -238,7 +239,7 @@ def _measure(
     options: Options,
     overlaps: Overlaps | None,
 ) -> tuple[_Layout, Distortion]:
-    """Return the measures of a layout, and the layout, in which triangles of an atlas that only touch are apart."""
+    """Return the layout and its measures; in an atlas, triangles that overlap by rounding alone are separated."""
     residual = curvature.residual
     measured = partial(
         measure,
@@ -250,42 +251,39 @@ def _measure(
     )
     distortion = measured(rows_of(layout.uv, layout.corners), overlaps=overlaps)
     if options.charts == "atlas" and distortion.overlapping_pairs:
-        parted, left = part_touching(layout.uv, layout.corners)
+        separated, left = part_touching(layout.uv, layout.corners)
         if len(left.pairs) < distortion.overlapping_pairs:
-            return replace(layout, uv=parted), measured(parted[layout.corners], overlaps=left)
+            return replace(layout, uv=separated), measured(separated[layout.corners], overlaps=left)
     return layout, distortion
 
 
-def _rotations(laid_out: Sequence[Layout], corner_uv: FloatArray, options: Options) -> Rotations | None:
-    """Return the rotations of seams against the quantum, if there is one; those between components turn freely.
+def _rotations(layouts: Sequence[Layout], corner_uv: FloatArray, options: Options) -> Rotations | None:
+    """Return how far seam rotations within components are from multiples of the quantum; None without a quantum.
 
-    corner_uv: (m, 3, 2) points of the triangle corners, component after component.
+    corner_uv: (m, 3, 2) points of the triangle corners, concatenated by component.
     """
     if options.quantise is None:
         return None
-    flat = np.split(corner_uv, np.cumsum([len(one.corners) for one in laid_out])[:-1])
+    flat = np.split(corner_uv, np.cumsum([len(one.corners) for one in layouts])[:-1])
     return Rotations.of_all(
-        measure_rotations(one.mesh, own, options.quantise) for one, own in zip(laid_out, flat, strict=True)
+        measure_rotations(one.mesh, own, options.quantise) for one, own in zip(layouts, flat, strict=True)
     )
 
 
 def _known_or_new(known: TriangleMesh, positions: FloatArray, faces: IntArray) -> TriangleMesh:
-    """Return a mesh, with the edges of the known one if it is that: they have been found."""
+    """Return a mesh of positions and faces; reuse the connectivity of a known mesh if the faces are equal."""
     is_known = len(known.vertices) == len(positions) and np.array_equal(known.faces, faces)
     return known.moved_to(positions) if is_known else TriangleMesh(positions, faces)
 
 
-def _all_charts(laid_out: Sequence[Layout]) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
-    """Return the points, corners and charts of all components, numbered one after the other.
-
-    And (k,) the component of each chart.
-    """
+def _all_charts(layouts: Sequence[Layout]) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
+    """Return the points, corners and charts of all components, concatenated, and (k,) the component of each chart."""
     corners, charts, component, points, count = [], [], [], 0, 0
-    for i, one in enumerate(laid_out):
+    for i, one in enumerate(layouts):
         found = int(one.chart.max()) + 1
         corners.append(one.corners + points)
         charts.append(one.chart + count)
         component += [i] * found
         points, count = points + len(one.points), count + found
-    every = np.concatenate([one.points for one in laid_out])
+    every = np.concatenate([one.points for one in layouts])
     return every, np.concatenate(corners), np.concatenate(charts), np.array(component, dtype=np.int64)

@@ -32,23 +32,23 @@ from .source.copies import Copy, copied, find_copies
 from .source.parts import Part, Source
 from .stages import ConeSolution, ConeSpec, FlatMetric, Layout, MetricSpec, RelaxSpec, Surface
 
-#: Receives the layout before triangles are relaxed and overlaps are separated.
+#: Receives the first layout, before triangles are relaxed and overlaps are separated.
 Preview: TypeAlias = Callable[[Flattening], object]
-#: Returns a connected mesh with the operators of its (m, 3) lengths, on flips of edges if a metric may make them.
+#: Returns a connected mesh with the operators of its (m, 3) lengths; the flag allows edge flips.
 SurfaceOf: TypeAlias = Callable[[TriangleMesh, FloatArray, bool], Surface]
 #: Returns the flat metric of a connected mesh for its cones.
 FindMetric: TypeAlias = Callable[[Surface, ConeSolution, MetricSpec], FlatMetric]
 
-# Searches for cones at most, if some of them are too wide for the triangles around.
+# Largest number of cone searches per part. A search is repeated if the triangles around a cone cannot hold its angle.
 MAX_SEARCHES = 4
-# Radians by which such a cone misses its angle: a full turn, less what rounding and untangled neighbours make.
+# Curvature error of an infeasible cone, radians: ideally a full turn; rounding and untangled neighbours reduce it.
 INFEASIBLE_ERROR = 1.0
-# A log scale that varies by less is constant: the surface is a polyhedron, which opens along its edges.
+# A log scale that varies by less is constant: the surface is a polyhedron with vertices as cones, cut along its edges.
 CONSTANT_SCALE = 1e-9
-# Parts of at most so many triangles are relaxed together, as one mesh of about so many: 13% of the time of 60 spheres
-# of 320 triangles.
+# Parts with at most SMALL_TRIANGLES triangles are relaxed together, as one mesh of about GROUP_TRIANGLES: 13% of the
+# time of 60 spheres of 320 triangles.
 SMALL_TRIANGLES, GROUP_TRIANGLES = 500, 40_000
-# Share of the work until there are layouts; the rest relaxes and separates them.
+# Fractions of the work: computing the layouts, then relaxing and separating them.
 LAYING_OUT, FINISHING = 0.8, 0.2
 
 
@@ -59,17 +59,20 @@ def flatten(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatte
     Args:
         mesh: vertices (n, 3) if `faces` is given; else a path, a `MeshFile`, a pair (vertices, faces), or
             a mesh of trimesh, meshio or pyvista.
-        faces: (m, 3) vertex indices from 0. Options that name vertices name the input's.
+        faces: (m, 3) vertex indices from 0. Vertices in options are indices of the input's vertices.
         options: see below.
+
+    Returns:
+        The layout in the unit square with its cones, seams and measures.
 
     Raises:
         MeshError: the mesh cannot be flattened; see `coneflat.errors` for its kinds.
         MeshFileError: its file cannot be read.
-        CurvatureError: no metric has the curvatures asked for.
-        OptionError: an option makes no sense.
+        CurvatureError: no metric has the prescribed curvatures.
+        OptionError: an option is unknown or invalid.
         SeamError: every set of seams needs forbidden edges.
         MetricError: the computation found no finite result.
-        TooLargeError: it does not fit into the memory that is free.
+        TooLargeError: the mesh does not fit into the free memory.
 
     Examples:
         >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
@@ -90,9 +93,9 @@ class Method:
     Attributes:
         relax: which triangles are relaxed.
         separates: overlaps are separated into charts.
-        quantum: seams turn by multiples of it, radians; None for any rotation.
+        quantum: rotations across seams are multiples of it, radians; None for any rotation.
         watch: the stopwatch.
-        surface_of, find_metric: the two steps that callers may replace.
+        surface_of, find_metric: the two steps that a caller can replace.
     """
 
     relax: RelaxSpec
@@ -110,15 +113,18 @@ def flatten_source(
     find_metric: FindMetric = find_metric,
     on_preview: Preview | None = None,
 ) -> Flattening:
-    """Flatten a mesh by options that have been parsed; see `flatten`.
+    """Return the flattening of a mesh by parsed options; see `flatten`.
 
     Args:
         source: the mesh.
         o: the options.
         surface_of: returns a part with the operators of its metric; they may be cached.
         find_metric: returns the flat metric for the cones of a part.
-        on_preview: called with the first layout: one chart for each part, before triangles are relaxed and overlaps are
+        on_preview: called with the first layout: one chart per part, before triangles are relaxed and overlaps are
             separated; its overlaps are not measured.
+
+    Raises:
+        The errors of `flatten`.
     """
     watch = Stopwatch(o.progress)
     with watch("check"):
@@ -133,14 +139,14 @@ def flatten_source(
             preview = _with_copies(layouts, prepared.parts, copies)
             on_preview(evaluate(prepared, preview, replace(o, charts="one"), Stopwatch(), NOT_LOOKED_FOR))
         finished = finish_parts(originals, layouts, method)
-        # Notes name vertices, so that copies of parts with notes are laid out, too.
+        # Notes contain vertex indices, so copies of parts with notes are computed, too.
         noted = {i: prepared.parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
         finished |= finish_parts(noted, lay_out_parts(noted, method), method)
     return evaluate(prepared, _with_copies(finished, prepared.parts, copies), o, watch)
 
 
 def lay_out_parts(parts: Mapping[int, Part], method: Method) -> dict[int, Layout]:
-    """Return each part laid out in one chart."""
+    """Return the layout of each part in one chart."""
     layouts = {}
     for i, part in parts.items():
         with _at(part, parts, method.watch, LAYING_OUT):
@@ -149,18 +155,18 @@ def lay_out_parts(parts: Mapping[int, Part], method: Method) -> dict[int, Layout
 
 
 def lay_out_part(part: Part, method: Method) -> Layout:
-    """Return a part laid out in one chart.
+    """Return the layout of a part in one chart.
 
-    Triangles may have no room for the angle of a cone, which is known after the layout. Then other cones are searched:
-    each search forbids the cones that were infeasible in those before. It may find more of them before it finds none,
-    so that the best layout is taken.
+    The triangles around a cone may be unable to hold its angle, which is known only after the layout. Then other cones
+    are searched for: each search forbids the cones that were infeasible before. A later search may have more infeasible
+    cones, so the best layout of all searches is returned.
     """
     with method.watch("cones", 0.1):
         surface = method.surface_of(part.mesh, part.lengths, part.is_exact)
     best, wanted = None, part.cones
     for _ in range(MAX_SEARCHES):
         tried, was_searched = lay_out_once(surface, part, wanted, method)
-        best = tried if best is None or _shortfall(tried) < _shortfall(best) else best
+        best = tried if best is None or _failures(tried) < _failures(best) else best
         infeasible = infeasible_cones(tried)
         if not (was_searched and part.is_exact and len(infeasible)):
             break
@@ -171,16 +177,17 @@ def lay_out_part(part: Part, method: Method) -> Layout:
 
 
 def lay_out_once(surface: Surface, part: Part, wanted: ConeSpec, method: Method) -> tuple[Layout, bool]:
-    """Return a part laid out with the cones found for it, and whether they were searched."""
+    """Return a layout of a part with the cones found for it, and whether the sparse search found them."""
     watch, mesh = method.watch, part.mesh
     with watch("cones", 0.5):
         holonomy = None if wanted.quantum is None else loop_rotations(surface, part.metric)
-        # What the metric needs of the surface alone is found meanwhile.
+        # The second thread prepares what the metric needs from the surface alone.
         with concurrently(partial(surface.prepare, part.metric.method), len(mesh.faces)):
             cones = find_cones(surface, wanted, watch, holonomy)
         is_polyhedron = bool(np.ptp(cones.log_scale) < CONSTANT_SCALE)
         costs = seam_costs(mesh, part.lengths, part.seams, is_polyhedron)
-    # The cut depends on the cones alone: 9% of the time of 97,000 triangles on two threads, 10% of 29,000.
+    # The cut depends on the cones alone. Computing it next to the metric saves 9% of the time with 97,000 triangles on
+    # two threads, 10% with 29,000.
     cutting = partial(cut_to_disk, mesh, cones.cones, costs, part.seams)
     with concurrently(cutting, len(mesh.faces)) as cut:
         with watch("metric", 0.8):
@@ -196,7 +203,7 @@ def lay_out_once(surface: Surface, part: Part, wanted: ConeSpec, method: Method)
 def finish_parts(
     parts: Mapping[int, Part], layouts: Mapping[int, Layout], method: Method
 ) -> dict[int, Layout]:
-    """Return layouts relaxed, without inverted triangles, and without overlaps if charts are to have none."""
+    """Return relaxed layouts without inverted triangles, and without overlaps if the method separates them."""
     watch, finished = method.watch, dict[int, Layout]()
     for group in _groups(parts, method.relax):
         watch.share = 0.0
@@ -210,7 +217,7 @@ def finish_parts(
 
 
 def finish_part(part: Part, layout: Layout, method: Method) -> Layout:
-    """Return a relaxed layout without inverted triangles, and without overlaps if charts are to have none."""
+    """Return a relaxed layout without inverted triangles, and without overlaps if the method separates them."""
     if part.is_exact:
         with method.watch("relax", 0.2):
             names, stretch = part.cones.names, method.relax.stretch
@@ -223,13 +230,13 @@ def finish_part(part: Part, layout: Layout, method: Method) -> Layout:
 
 
 def infeasible_cones(layout: Layout) -> IntArray:
-    """Return the cones that the triangles around them have no room for, each having an angle below pi."""
+    """Return the infeasible cones: the triangles around them, with angles below pi, cannot hold their angle."""
     error = (layout.target - layout.curvature)[layout.cones]
     return layout.cones[np.abs(error) > INFEASIBLE_ERROR]
 
 
-def _shortfall(layout: Layout) -> tuple[int, int]:
-    """Return how many wishes are unmet, and how many cones are infeasible."""
+def _failures(layout: Layout) -> tuple[int, int]:
+    """Return the number of notes and the number of infeasible cones, by which layouts are compared."""
     return len(layout.notes), len(infeasible_cones(layout))
 
 
@@ -246,7 +253,7 @@ def _infeasible_notes(layout: Layout, part: Part) -> Iterator[str]:
 def _with_copies(
     known: Mapping[int, Layout], parts: Sequence[Part], copies: Sequence[Copy | None]
 ) -> list[Layout]:
-    """Return the layouts of all parts, those that are not known as copies."""
+    """Return the layouts of all parts; a missing layout is copied from the part of which it is a copy."""
     return [
         copied(known[copy.first], parts[i], copy.scale) if copy and i not in known else known[i]
         for i, copy in enumerate(copies)
@@ -254,26 +261,26 @@ def _with_copies(
 
 
 def _groups(parts: Mapping[int, Part], relax: RelaxSpec) -> list[list[int]]:
-    """Return the numbers of the parts, those together that are relaxed at the same time: small ones."""
+    """Return groups of part indices; small parts share a group and are relaxed together."""
     groups: list[list[int]] = []
     small: list[int] = []
-    room = 0
+    capacity = 0
     for i, part in parts.items():
         size = len(part.faces)
         if relax.is_off or size > SMALL_TRIANGLES:
             groups.append([i])
             continue
-        if room < size:
+        if capacity < size:
             groups.append(small := [])
-            room = GROUP_TRIANGLES
+            capacity = GROUP_TRIANGLES
         small.append(i)
-        room -= size
+        capacity -= size
     return groups
 
 
 @contextmanager
 def _at(part: Part, parts: Mapping[int, Part], watch: Stopwatch, portion: float) -> Iterator[None]:
-    """Do a portion of the work on a part inside; errors say which part it is, if there are several."""
+    """Run a portion of the work on a part; errors name the part if there are several."""
     watch.share = portion * len(part.faces) / sum(len(each.faces) for each in parts.values())
     try:
         yield

@@ -1,4 +1,4 @@
-"""One mesh flattened again and again."""
+"""Repeated flattening of one mesh with cached operators."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from .stages import Surface
 
 
 class Flattener:
-    """Flattens one mesh again and again: what depends on it alone is found once, and kept.
+    """Flattens one mesh repeatedly and caches everything that depends on the mesh alone.
 
-    That is the checked mesh, its intrinsic Delaunay triangulation, its Laplacian, factorized, and the Green's functions
-    of the cones used last. Results are those of `coneflat.flatten`, to the last bit. Other marked seams, a repair, or
-    other lengths make another mesh of it, and what was kept goes. It serves one thread at a time.
+    The cache holds the checked mesh, its intrinsic Delaunay triangulation, its factorized Laplacian, and the Green's
+    functions of the cones used last. Results are bitwise equal to those of `coneflat.flatten`. Other marked seams,
+    other lengths or a different repair change the mesh and clear the cache. An object is not thread-safe.
 
         flattener = Flattener(vertices, faces)
         for curvature in (1.0, 1.5, 2.0):
             flattener.flatten(cones={7: curvature, 12: None, 80: None})
 
     Args:
-        mesh, faces: as of `coneflat.flatten`; arrays must not change afterwards.
+        mesh, faces: as for `coneflat.flatten`; arrays must not be modified afterwards.
 
     Raises:
-        MeshError: it is not a mesh.
+        MeshError: the input is not a mesh.
         MeshFileError: its file cannot be read.
 
     Examples:
@@ -49,18 +49,21 @@ class Flattener:
         self._threads: int | None = None
 
     def flatten(self, *, on_preview: Preview | None = None, **options: Any) -> Flattening:
-        """Return the flattening by the options, and with the errors, of `coneflat.flatten`.
+        """Return the flattening for the given options.
 
         Args:
-            on_preview: called with the first layout: one chart for each part, before triangles are relaxed and
-                overlaps are separated; its own overlaps are not measured.
+            on_preview: called with the first layout: one chart per part, before triangles are relaxed and overlaps
+                are separated; its overlaps are not measured.
             options: those of `coneflat.flatten`.
+
+        Raises:
+            The errors of `coneflat.flatten`.
         """
         return self.flatten_as(read_options(options), on_preview)
 
     def flatten_as(self, options: Options, on_preview: Preview | None = None) -> Flattening:
-        """Return the flattening by options that have been parsed; see `flatten`."""
-        # The last digits depend on the number of threads.
+        """Return the flattening for parsed options; see `flatten`."""
+        # The last digits of cached values depend on the number of threads.
         if options.threads != self._threads:
             self._surfaces, self._threads = {}, options.threads
         meshes = {id(part.mesh) for part in self._source.prepared(options).parts}

@@ -1,4 +1,4 @@
-"""Measures of UVs that a mesh already has, whatever made them."""
+"""Measures of the existing UVs of a mesh, made by any program."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from .mesh.check import CheckedMesh, check_mesh, left_out
 from .mesh.connectivity import TriangleMesh, corner_fans, end_corners
 from .source.input_mesh import at_unit_size
 
-#: Pairs of triangles that overlap, for each triangle and at least: beyond them areas are counted in pixels, as every
-#: triangle may lie on every other one.
-MOST_PAIRS, FEW_PAIRS = 8, 10_000
+#: Limit of overlapping pairs, per triangle and at least. With more pairs, areas are counted in pixels, because the
+#: number of pairs can be quadratic.
+MAX_PAIRS_EACH, MIN_PAIRS = 8, 10_000
 
-#: A power of two beyond which there are no numbers.
-MOST_EXPONENT = 1100
+#: Powers of two beyond it are not finite.
+MAX_EXPONENT = 1100
 
-#: What is measured besides.
+#: Measures in addition to those of a map.
 COUNTS = (
     "vertices",
     "polygons",
@@ -55,12 +55,12 @@ class UVMeasures:
     """Measures of the UVs of a mesh.
 
     Attributes:
-        mesh: (m triangles) what was measured: the triangles that have UVs, as a manifold.
+        mesh: the measured mesh: the m triangles that have UVs, as a manifold.
         corner_uv: (m, 3, 2) their UVs.
-        distortion: as of a flattening, but for errors of curvature.
-        counts: the other measures by their names; see `report`.
-        notes: what is left out of the measures, and what was done to the mesh, one sentence each.
-        path: of the file, if there is one.
+        distortion: as for a flattening, without curvature errors.
+        counts: the other measures by name; see `report`.
+        notes: what the measures leave out, and repairs of the mesh, one sentence each.
+        path: path of the file, if there is one.
 
     Examples:
         >>> vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -78,13 +78,14 @@ class UVMeasures:
     path: Path | None = None
 
     def report(self) -> dict[str, Any]:
-        """Return all measures as plain Python values, ready for JSON; what is not known is None.
+        """Return all measures as plain Python values, ready for JSON; unknown values are None.
 
-        Besides those of `Flattening.report` that are of the map: `triangles_without_uv`, and among the corners of
-        polygons `corners_without_uv` and `corners_not_finite`; `outside`, triangles that reach out of the unit
-        square; `tiles`, unit squares that hold triangles; `packing_efficiency`, what is covered of them;
-        `box_efficiency`, the area of all triangles over that of the smallest upright square around them;
-        `angle_sum_error`, the most by which the angles around a point inside a chart miss a full turn, radians.
+        In addition to the measures of the map in `Flattening.report`, these are: `triangles_without_uv`;
+        `corners_without_uv` and `corners_not_finite`, numbers of polygon corners; `outside`, the number of triangles
+        that are not inside the unit square; `tiles`, the number of unit squares that contain charts;
+        `packing_efficiency`, the covered fraction of these; `box_efficiency`, the area of all triangles over the area
+        of the smallest axis-aligned square around them; `angle_sum_error`, the largest difference between the angle
+        sum at a point inside a chart and a full turn, radians.
         """
         return {
             "input": None if self.path is None else path_text(self.path),
@@ -93,7 +94,7 @@ class UVMeasures:
         }
 
     def values(self) -> dict[str, float]:
-        """Return the measures by their names; NaN where one is not known."""
+        """Return the measures by name; unknown values are NaN."""
         return {**self.counts, **{name: getattr(self.distortion, name) for name in MAP_MEASURES}}
 
     def __repr__(self) -> str:
@@ -112,10 +113,10 @@ def measure_uv(
     weld: bool | None = None,
     strict: bool = False,
 ) -> UVMeasures:
-    """Measure the UVs that a mesh has, of any tool.
+    """Measure the existing UVs of a mesh, made by any program.
 
-    Polygons are measured as the fans of triangles that other programs see. A mesh that is not manifold is measured
-    with the repair of `flatten`, but overlaps are those of all triangles; corners without UVs are counted.
+    Polygons are measured as fans of triangles, as most programs split them. A mesh that is not manifold is repaired as
+    in `flatten` before it is measured, but overlaps are those of all triangles. Corners without UVs are counted.
 
     Args:
         mesh: a path (.obj, .ply, .gltf, .glb with UVs, or a result as .npz), a `MeshFile`, a `Flattening`; or vertices
@@ -124,11 +125,15 @@ def measure_uv(
         corner_uv: (m, 3, 2) the UV of every triangle corner, v upwards; NaN where there is none.
         weld: of a path: True merges all vertices at the same position, False none; None merges them in formats that
             cannot share vertices, and joins coinciding borders in the others.
-        strict: refuse a mesh that is not manifold.
+        strict: raise an error for a mesh that is not manifold.
+
+    Returns:
+        The measures.
 
     Raises:
-        MissingUVError: there are no UVs, or none that are finite.
-        MeshError, MeshFileError: it is not a mesh, or cannot be read.
+        MissingUVError: there are no UVs, or no finite ones.
+        MeshError: the input is not a mesh.
+        MeshFileError: the file cannot be read.
 
     Examples:
         >>> vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -144,7 +149,7 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
 
     Raises:
         MissingUVError: no triangle has finite UVs at all corners.
-        MeshError: there is no mesh to measure; in particular, if strict, none that is manifold.
+        MeshError: there is no mesh to measure, or, if strict, it is not manifold.
     """
     known = mapped.has_uv
     checked, corner_uv = surface_of(mapped, strict=strict)
@@ -155,8 +160,8 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
     every = mapped.corner_uv[known]
     cover = _cover(np.ldexp(every, -exponent))
     tiles = len(_tiles(checked.mesh, unit, exponent))
-    with np.errstate(over="ignore"):  # What is not a number is not known.
-        covered = float(np.ldexp(cover.once, min(2 * exponent, MOST_EXPONENT)))
+    with np.errstate(over="ignore"):  # A value that is not finite is reported as unknown.
+        covered = float(np.ldexp(cover.area, min(2 * exponent, MAX_EXPONENT)))
     counts = {
         "vertices": len(np.unique(mapped.faces)),
         "polygons": mapped.polygons,
@@ -181,16 +186,16 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
 
 
 def surface_of(mapped: Mapped, *, strict: bool = False) -> tuple[CheckedMesh, FloatArray]:
-    """Return the triangles that have UVs as a manifold, repaired unless strict, and their (m, 3, 2) UVs.
+    """Return the triangles with UVs as a manifold mesh, repaired unless strict, and their (m, 3, 2) UVs.
 
     Raises:
-        MissingUVError: there are none.
-        MeshError: they are not a mesh.
+        MissingUVError: no triangle has UVs.
+        MeshError: the triangles are not a mesh.
     """
     known = np.flatnonzero(mapped.has_uv)
     if not len(known):
         raise MissingUVError(
-            f"none of {plural(len(mapped.faces), 'triangle')} has UVs that are finite at all its corners"
+            f"none of {plural(len(mapped.faces), 'triangle')} has finite UVs at all its corners"
         )
     checked = check_mesh(mapped.vertices, mapped.faces[known], repair=not strict)
     corner_uv = mapped.corner_uv[known][checked.face_origin]
@@ -199,7 +204,7 @@ def surface_of(mapped: Mapped, *, strict: bool = False) -> tuple[CheckedMesh, Fl
 
 
 def uv_points(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return (u, 2) points of charts, and (m, 3) those of the corners: one where triangles are joined, else several."""
+    """Return (u, 2) the points of the layout and (m, 3) the point of each corner; joined triangles share points."""
     count, fan = corner_fans(mesh.faces, *mesh.edge_halfedges[joined_edges(mesh, corner_uv)].T)
     points = np.empty((count, 2))
     points[fan] = corner_uv
@@ -207,9 +212,9 @@ def uv_points(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[FloatArray, In
 
 
 def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
-    """Return the most by which the angles around a point inside a chart miss 2 pi, radians; 0 if there is none inside.
+    """Return the largest difference between 2 pi and the angle sum at a point inside a chart, radians; 0 if none.
 
-    A triangle that is flipped, or folds that wind around a point twice, make it large.
+    It is large at flipped triangles, and where triangles wind around a point twice.
     """
     from .measure.distortion import sum_angles
 
@@ -220,15 +225,15 @@ def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
     for end in end_corners(np.flatnonzero(~joined)):
         inside[fan.reshape(-1)[end]] = False
     sums, change = sum_angles(fan, np.ascontiguousarray(corner_uv), len(points))
-    # A side without length has no direction.
+    # The angles at a side of zero length are undefined.
     inside &= np.isfinite(change)
     return float(np.abs(sums[inside] - 2 * np.pi).max(initial=0.0))
 
 
 def _tiles(mesh: TriangleMesh, unit: FloatArray, exponent: int) -> FloatArray:
-    """Return (k, 2) the unit squares in which the middles of charts lie, one of UDIM tiles each.
+    """Return (k, 2) the lower left corners of the unit squares (UDIM tiles) that contain the centroids of charts.
 
-    unit: (m, 3, 2) UVs over two to the power of the exponent.
+    unit: (m, 3, 2) UVs divided by 2**exponent.
     """
     charts, chart = label_charts(mesh, joined_edges(mesh, unit))
     weights = np.abs(signed_double_areas(unit)) + np.finfo(np.float64).tiny
@@ -238,47 +243,47 @@ def _tiles(mesh: TriangleMesh, unit: FloatArray, exponent: int) -> FloatArray:
 
 
 class _Cover(NamedTuple):
-    """How triangles cover the plane: how many pairs overlap, the share and the area of what is covered, ..."""
+    """How triangles cover the plane: number of overlapping pairs, overlap, covered area, box efficiency, notes."""
 
     pairs: int
     overlap: float
-    once: float
+    area: float
     box_efficiency: float
     notes: tuple[str, ...] = ()
 
 
 def _cover(corner_uv: FloatArray) -> _Cover:
-    """Return how triangles (m, 3, 2) cover the plane, exactly, or where that would take too long, in pixels."""
+    """Return how triangles (m, 3, 2) cover the plane: exactly, or counted in pixels if there are too many pairs."""
     total = float(np.abs(signed_double_areas(corner_uv)).sum()) / 2
     side = float(np.ptp(corner_uv, axis=(0, 1)).max())
     box_efficiency = total / side**2 if side > 0 else float("nan")
-    limit = max(FEW_PAIRS, MOST_PAIRS * len(corner_uv))
+    limit = max(MIN_PAIRS, MAX_PAIRS_EACH * len(corner_uv))
     found = find_overlaps(corner_uv, limit=limit)
     if np.isfinite(found.fraction):
-        once = found.area / found.fraction if found.fraction > 0 else total
-        return _Cover(len(found.pairs), found.fraction, once, box_efficiency)
-    twice, once = layers_of_raster(corner_uv)
+        area = found.area / found.fraction if found.fraction > 0 else total
+        return _Cover(len(found.pairs), found.fraction, area, box_efficiency)
+    twice, area = layers_of_raster(corner_uv)
     more = (
         ""
         if found.complete
-        else f"More than {limit:,} pairs of triangles overlap, which were not counted further. "
+        else f"More than {limit:,} pairs of triangles overlap; the rest was not counted. "
     )
     note = f"{more}The overlap was counted in {MAX_CELLS:,} x {MAX_CELLS:,} pixels."
-    return _Cover(len(found.pairs), twice / once if once > 0 else 0.0, once, box_efficiency, (note,))
+    return _Cover(len(found.pairs), twice / area if area > 0 else 0.0, area, box_efficiency, (note,))
 
 
 def _notes(mapped: Mapped, checked: CheckedMesh) -> tuple[str, ...]:
-    """Return what is left out of the measures."""
+    """Return notes on what the measures leave out, and on repairs of the mesh."""
     corners = ((mapped.without, "no UV"), (mapped.not_finite, "a UV that is not finite"))
     why = " and ".join(f"{plural(count, 'corner')} with {what}" for count, what in corners if count)
     triangles = plural(int(np.count_nonzero(~mapped.has_uv)), "triangle")
     notes = [f"{why}: {triangles} left out of the measures."] if why else []
     repairs = [note for note in checked.notes if note != left_out_of(mapped, checked)]
     if repairs:
-        notes.append(f"Measured on a mesh in which this was done first: {' '.join(repairs)}")
+        notes.append(f"The mesh was repaired before it was measured: {' '.join(repairs)}")
     return tuple(notes)
 
 
 def left_out_of(mapped: Mapped, checked: CheckedMesh) -> str:
-    """Return the note that there are vertices without triangles, which does not matter here."""
+    """Return the note on vertices without triangles, which does not concern the measures."""
     return left_out(len(mapped.vertices) - len(np.unique(checked.vertex_origin)))

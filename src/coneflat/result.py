@@ -1,4 +1,4 @@
-"""What a flattening returns."""
+"""The result of a flattening."""
 
 from __future__ import annotations
 
@@ -28,34 +28,34 @@ class Flattening:
     """A flattened mesh: n vertices, m triangles, u points in the plane.
 
     Attributes:
-        vertices: (n, 3) positions in model units; the input's own, or the repaired mesh's.
-        faces: (m, 3) vertex indices, consistently oriented, in the input's order of faces; of a refinement, its
-            triangles, in the order of the faces that they are parts of.
-        uv: (u, 2) points of the layout, in [0, 1]^2, all charts at one scale; of UDIM tiles, tile i is one of ten in a
-            row, [i % 10, i % 10 + 1] x [i // 10, i // 10 + 1].
+        vertices: (n, 3) positions in model units: those of the input or of the repaired mesh.
+        faces: (m, 3) vertex indices, consistently oriented, in the order of the input's faces. The triangles of a
+            refinement are in the order of the faces that contain them.
+        uv: (u, 2) points of the layout, in [0, 1]^2, all charts at one scale. With several UDIM tiles, tile i is the
+            square [i % 10, i % 10 + 1] x [i // 10, i // 10 + 1].
         uv_faces: (m, 3) index into `uv` of every triangle corner.
-        uv_scale: UV units per model unit; `uv / uv_scale` is the layout at the model's own scale.
+        uv_scale: UV units per model unit; `uv / uv_scale` is the layout at the scale of the model.
         cones: (s,) cone vertices.
         curvatures: (s,) their target curvatures, radians.
-        log_scale: (n,) log conformal factor phi, so that flat lengths are about l * exp(phi) in model
-            units; NaN at vertices without a face.
-        prescribed: (n,) curvature that each vertex is to have in the plane, radians: 0 but for cones and a prescribed
-            boundary; NaN where it is free, on other boundaries and on marked seams.
-        curvature_residual: (n,) target minus curvature of the flat metric, radians; NaN likewise.
+        log_scale: (n,) log conformal factor phi; flat lengths are about l * exp(phi) in model units. NaN at vertices
+            without a face.
+        prescribed: (n,) prescribed curvature of each vertex in the plane, radians: 0 except at cones and on a
+            prescribed boundary; NaN where it is free, on other boundaries and on marked seams.
+        curvature_residual: (n,) target minus curvature of the flat metric, radians; NaN at vertices without a face.
         seams: (k, 2) vertex pairs of the mesh edges that were cut.
-        packing_efficiency: area of the layout over that of the texture, or textures.
-        distortion: the measures of Section 5 of the paper and their like.
+        packing_efficiency: area of the layout over the area of the texture or textures.
+        distortion: the measures of Section 5 of the paper and others.
         seconds: wall time of each stage.
-        notes: what was done to the input, one sentence each.
-        settings: the options it was made with.
-        solve: how the metric and the layout were found: Newton steps, flips, untangled triangles.
-        rotations: of seams, against multiples of the quantum of the cones; None without one.
+        notes: repairs of the input, unmet requests and unmet guarantees, one sentence each.
+        settings: the options of the flattening.
+        solve: statistics of the metric and the layout: Newton steps, flips, untangled triangles.
+        rotations: deviation of seam rotations from multiples of the cones' quantum; None without a quantum.
         vertex_origin: (n,) the input vertex that each vertex came from.
         face_origin: (m,) the input face that each face came from.
         face_corners: (m, 3) for a mesh read from a file: the polygon corner of `source` at each
             triangle corner; else None.
-        source: the file it was read from, if any.
-        lengths: (m, 3) the side lengths that were given as a metric of its own, column i opposite corner i; else None.
+        source: the file that the mesh was read from, if any.
+        lengths: (m, 3) the side lengths given by the option `lengths`, column i opposite corner i; else None.
 
     Examples:
         >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
@@ -93,12 +93,12 @@ class Flattening:
 
     @property
     def corner_uv(self) -> FloatArray:
-        """(m, 3, 2) the point of every triangle corner."""
+        """(m, 3, 2) the UV point of every triangle corner."""
         return rows_of(self.uv, self.uv_faces)
 
     @cached_property
     def seam_data(self) -> SeamData:
-        """The cut as arrays: both sides of every seam edge and the motion between them, charts, cone angles, scales."""
+        """The cut as arrays: both sides of each seam edge and the motion between them, charts, cone angles, scales."""
         from .measure.seam_data import seam_data
 
         return seam_data(self)
@@ -110,38 +110,41 @@ class Flattening:
         return as_dict(self)
 
     def save(self, path: str | PathLike[str], *, texture: str | PathLike[str] | None = None) -> Path:
-        """Write the textured mesh; the format (.obj, .ply, .glb, .npz) follows the path's ending.
+        """Write the mesh with its UVs to a file and return its path.
 
-        texture: of a .glb: "checker" for a checkerboard, or an image file that becomes part of it.
+        Args:
+            path: the file; its extension selects the format (.obj, .ply, .glb, .npz).
+            texture: for a .glb: "checker" for a checkerboard, or an image file to embed.
 
         Raises:
-            UnknownFormatError, MeshFileError: the ending is unknown, or the file cannot be written, or the texture
-                cannot be read.
-            OptionError: files of this ending carry no texture, or Pillow is not installed.
+            UnknownFormatError: the extension is unknown.
+            MeshFileError: the file cannot be written, or the texture cannot be read.
+            OptionError: the format cannot contain a texture, or Pillow is not installed.
         """
         from .io import write_flattening
 
         return write_flattening(self, path, texture)
 
     def as_written(self, ending: str) -> Flattening:
-        """Return the result as a file of a format holds it, with the measures and notes of that.
+        """Return the result as a file of the given format stores it, measured again.
 
-        A .glb has numbers of 32 bits; the polygons of an .obj are measured as the fans of triangles that others read.
+        A .glb stores 32-bit numbers. The polygons of an .obj are measured as fans of triangles, as most programs split
+        them.
 
         Args:
-            ending: ".obj", ".ply", ".glb" or ".npz".
+            ending: the file extension: ".obj", ".ply", ".glb" or ".npz".
 
         Raises:
-            MeshFileError: the file cannot hold numbers so large.
+            MeshFileError: numbers are too large for the format.
         """
         from .io.write import as_written
 
         return as_written(self, ending)
 
     def to_trimesh(self) -> trimesh.Trimesh:
-        """Return a textured mesh of trimesh, the vertices split where UVs are.
+        """Return a textured trimesh mesh, whose vertices are split at seams.
 
-        Vertex attribute `vertex` is the vertex of the result that each came from, face attribute `chart` the chart.
+        The vertex attribute `vertex` is the vertex of the result, the face attribute `chart` the chart.
 
         Raises:
             OptionError: trimesh is not installed.
@@ -151,9 +154,9 @@ class Flattening:
         return to_trimesh(self)
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """Return a surface of PyVista with active texture coordinates, the points split where UVs are.
+        """Return a PyVista surface with active texture coordinates, whose points are split at seams.
 
-        Point data `vertex` is the vertex of the result that each came from, cell data `chart` the chart.
+        The point data `vertex` is the vertex of the result, the cell data `chart` the chart.
 
         Raises:
             OptionError: PyVista is not installed.
@@ -163,9 +166,9 @@ class Flattening:
         return to_pyvista(self)
 
     def to_meshio(self) -> meshio.Mesh:
-        """Return a mesh of meshio, the points split where UVs are, which are its point data `obj:vt`.
+        """Return a meshio mesh, whose points are split at seams; UVs are the point data `obj:vt`.
 
-        Point data `vertex` is the vertex of the result that each came from, cell data `chart` the chart.
+        The point data `vertex` is the vertex of the result, the cell data `chart` the chart.
 
         Raises:
             OptionError: meshio is not installed.
@@ -184,24 +187,24 @@ class Flattening:
         most_triangles: int | None = None,
         color: str | None = None,
     ) -> Path:
-        """Write an interactive page, one HTML file that loads nothing from anywhere, and return its path.
+        """Write an interactive page, one self-contained HTML file, and return its path.
 
-        It shows the model and its layout side by side, linked, with a checkerboard, a picture or quality in
-        colours, seams and cones.
+        It shows the model next to its layout, linked, with a checkerboard, a picture or colour-coded quality, with
+        seams and cones.
 
         Args:
             path: the page, .html; by default a new temporary file, which is opened in the browser.
-            texture: a PNG, JPEG, GIF or WebP file to lay on the model.
+            texture: a PNG, JPEG, GIF or WebP file to map onto the model.
             up: the model's upward axis in the first view, "x", "y" or "z".
             show: what the colours show first: "checker", "picture", "charts", "qc", "area", "curvature" (of the
-                model), "flat" (the curvature left) or "plain".
-            most_triangles: a mesh with more is thinned for display; by default half a million.
-            color: numbers of your own, shown first: a property of the vertices in the mesh's file, or a file .npy or
-                FILE.npz:NAME with one for each vertex or triangle.
+                model), "flat" (the remaining curvature) or "plain".
+            most_triangles: a mesh with more triangles is simplified for display; by default half a million.
+            color: values to show first: the name of a vertex property in the mesh's file, or a file .npy or
+                FILE.npz:NAME with one number per vertex or triangle.
 
         Raises:
-            OptionError: `up` or `show` is none of these; there are no such numbers.
-            ArrayShapeError, MeshError: there are no UVs, or the mesh cannot be thinned to so few triangles.
+            OptionError: `up` or `show` is not one of these; `color` is not found.
+            ArrayShapeError, MeshError: there are no UVs, or the mesh cannot be simplified to so few triangles.
             UnknownFormatError, MeshFileError: a file cannot be read or written.
         """
         from .apps.view import check_page, open_page, page_of, write_page
@@ -218,7 +221,7 @@ class Flattening:
         return page
 
     def _repr_html_(self) -> str:
-        """Return the page in a frame, which notebooks show."""
+        """Return the page as an HTML frame for notebooks."""
         from .apps.view import notebook_html
 
         return notebook_html(self)

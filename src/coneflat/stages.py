@@ -1,4 +1,4 @@
-"""What passes between the stages: a surface, its cones, a flat metric, a cut, a layout, and what is asked of each."""
+"""Data passed between the stages: surface, cones, flat metric, cut and layout, and the specification of each."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from .geometry.operators import area_distortion, vertex_areas
 from .geometry.straight import FlatTriangles
 from .mesh.connectivity import TriangleMesh
 
-# A mesh counts as stretched if its Delaunay triangulation takes more flips per edge: scans take less than 0.2, models
-# stretched thirty to one 1.0 to 1.5, noise alone up to 0.85. Flips are tried only where this share of edges is not
-# Delaunay.
+# A mesh counts as stretched if its Delaunay triangulation needs more than STRETCHED_FLIPS flips per edge: scans need
+# less than 0.2, models stretched thirty to one 1.0 to 1.5, noise alone up to 0.85. Flips are tried only if more than
+# MIN_SHARE_TO_FLIP of the edges are not Delaunay.
 STRETCHED_FLIPS, MIN_SHARE_TO_FLIP = 0.95, 0.15
 
 
 @dataclass(frozen=True, eq=False)
 class VertexCurvatures:
-    """Vertices that the user names, each with a curvature or without.
+    """Vertices chosen by the user, each with or without a prescribed curvature.
 
     Attributes:
         vertices: (k,).
-        curvatures: (k,) radians, NaN where it is to be computed.
+        curvatures: (k,) radians, NaN where the curvature must be computed.
     """
 
     vertices: IntArray
@@ -40,7 +40,7 @@ class VertexCurvatures:
         return len(self.vertices)
 
     def within(self, component: IntArray) -> VertexCurvatures:
-        """Return those of a component, numbered there; `component` are its vertices."""
+        """Return the vertices inside a component, in its numbering; `component` holds the component's vertices."""
         if not len(self):
             return self
         inside = np.isin(self.vertices, component)
@@ -51,26 +51,26 @@ class VertexCurvatures:
 
 @dataclass(frozen=True, eq=False)
 class ConeSpec:
-    """What is asked of the cones of a connected mesh with n vertices.
+    """Specification of the cones of a connected mesh with n vertices.
 
     Attributes:
         strategy: "auto", "sparse", "greedy", "none", or "given" for `given`.
-        needs_sparse_search: something is asked for that only the sparse search heeds.
+        needs_sparse_search: an option is set that only the sparse search supports.
         distortion: largest area distortion of the linear model.
         count: number of cones instead of a distortion, or None.
         max_count: largest number of cones, or None.
         min_angle, max_angle: bounds of cone angles, radians; None for no upper bound.
         positive_only: no cones of negative curvature.
         quantum: curvatures are multiples of it, radians; None for any.
-        given: cones that are given, each with its curvature or NaN.
-        required: vertices that are cones of any search.
-        is_allowed: (n,) where a search may put a cone.
+        given: cones given by the user, each with its curvature or NaN.
+        required: vertices that every search must use as cones.
+        is_allowed: (n,) vertices where a search may put a cone.
         weights: (n,) importance of each vertex, or None.
         absorbs_curvature: (n,) boundary vertices that take the curvature that the cones leave.
         prescribes_boundary: the boundary has a given shape.
         searches_corners: corners of a straight boundary are searched with the cones.
-        scale_at_cones: phi = 0 is prescribed at the cones, not their curvature.
-        names: (n,) the user's number of each vertex.
+        scale_at_cones: phi = 0 is prescribed at the cones instead of their curvature.
+        names: (n,) the index of each vertex in the user's input.
     """
 
     strategy: str
@@ -93,7 +93,7 @@ class ConeSpec:
     names: IntArray
 
     def without(self, vertices: IntArray) -> ConeSpec:
-        """Return the same, with no cones at some more vertices."""
+        """Return a specification that forbids cones at further vertices."""
         is_allowed = self.is_allowed.copy()
         is_allowed[vertices] = False
         return replace(self, is_allowed=is_allowed)
@@ -101,18 +101,18 @@ class ConeSpec:
 
 @dataclass(frozen=True, eq=False)
 class MetricSpec:
-    """What is asked of the metric of a connected mesh with n vertices.
+    """Specification of the metric of a connected mesh with n vertices.
 
     Attributes:
         method: "exact" or "linear".
         boundary: "free", "lengths", "disk", "straight" or "polygon".
         corners: corners of a polygon, each with its curvature or NaN.
-        keeps_length: (n,) boundary vertices between which lengths are kept.
+        keeps_length: (n,) boundary vertices between which edge lengths are preserved.
         keeps_area: the metric is scaled to the area of the input.
-        scale_at_cones: phi = 0 is prescribed at the cones, not their curvature.
-        quantum: rotations along handles and around holes are corrected to multiples of it, radians; None for not.
-        accepts_failure: return a metric that did not converge.
-        names: (n,) the user's number of each vertex.
+        scale_at_cones: phi = 0 is prescribed at the cones instead of their curvature.
+        quantum: holonomy along handles and around holes is corrected to multiples of it, radians; None: no correction.
+        accepts_failure: return a metric even if it did not converge.
+        names: (n,) the index of each vertex in the user's input.
     """
 
     method: str
@@ -126,20 +126,20 @@ class MetricSpec:
     accepts_failure: bool = False
 
     def plain(self) -> MetricSpec:
-        """Return the same without corrected rotations; what does not converge is accepted."""
+        """Return a specification without corrected holonomy that accepts metrics that did not converge."""
         return replace(self, quantum=None, accepts_failure=True)
 
 
 @dataclass(frozen=True, eq=False)
 class SeamSpec:
-    """What is asked of the seams of a connected mesh with n vertices and e edges.
+    """Specification of the seams of a connected mesh with n vertices and e edges.
 
     Attributes:
         follows_sharp: sharp edges are cheaper.
-        hiding: how much hidden places are cheaper, from 0.
-        visibility: (n,) share of directions from which each vertex is seen; None where it does not matter.
+        hiding: strength of the preference for hidden places, from 0.
+        visibility: (n,) fraction of directions from which each vertex is visible; None if `hiding` is 0.
         weights: (n,) factors of the cost, or None.
-        is_avoided: (e,) edges inside polygons of the input, cut only if nothing else serves.
+        is_avoided: (e,) edges inside polygons of the input, cut only if necessary.
         is_forbidden: (e,) edges that must not be cut.
     """
 
@@ -153,11 +153,12 @@ class SeamSpec:
 
 @dataclass(frozen=True)
 class RelaxSpec:
-    """What is asked of relaxing.
+    """Specification of relaxing.
 
     Attributes:
-        extent: "auto" for bent triangles, "whole" for all, "off" for none.
-        stretch: from angles, 0, to areas, 1; above 0 all triangles are relaxed.
+        extent: which triangles are relaxed: "auto" for the most distorted ones near cones, "whole" for all, "off" for
+            none.
+        stretch: from 0 (preserve angles) to 1 (preserve areas); above 0 all triangles are relaxed.
     """
 
     extent: str
@@ -170,7 +171,7 @@ class RelaxSpec:
 
     @property
     def is_off(self) -> bool:
-        """Whether none is."""
+        """Whether no triangle is relaxed."""
         return self.extent == "off" and not self.stretch
 
 
@@ -184,10 +185,10 @@ class Surface:
         laplacian: (n, n) cotangent Laplacian.
         curvature: (n,) angle defect, radians.
         areas: (n,) vertex areas.
-        widest: (n,) the widest corner at each vertex as a share of all there.
-        is_reused: other cones will be searched on it.
-        memo: what stages store to use again; only who stored a value reads it.
-        known_delaunay: the intrinsic Delaunay triangulation, once it is known.
+        widest: (n,) largest corner angle at each vertex, divided by the angle sum there.
+        is_reused: the surface is cached, and further searches for cones will follow.
+        memo: values cached by stages; a value is read only by the stage that stored it.
+        known_delaunay: the intrinsic Delaunay triangulation, or None before it is computed.
     """
 
     mesh: TriangleMesh
@@ -204,10 +205,13 @@ class Surface:
     def of(cls, mesh: TriangleMesh, lengths: FloatArray, flips: bool = True) -> Surface:
         """Return a mesh with the operators of its lengths.
 
-        On stretched meshes many cotangents are negative. Laplacian and areas are then those of the intrinsic Delaunay
-        triangulation, on which the exact metric is found.
+        On stretched meshes many cotangent weights are negative. Laplacian and areas are then those of the intrinsic
+        Delaunay triangulation, on which the exact metric is computed.
 
-        flips: the metric may flip edges; else Laplacian and areas are always the mesh's own.
+        Args:
+            mesh: a connected mesh with m faces.
+            lengths: (m, 3) side lengths, with which every triangle has area.
+            flips: the metric may flip edges; else Laplacian and areas are always those of the mesh itself.
         """
         n, cots = len(mesh.vertices), cotangents(lengths)
         faces, sides, delaunay = mesh.faces, lengths, None
@@ -235,20 +239,20 @@ class Surface:
         return self.known_delaunay
 
     def prepare(self, method: str) -> None:
-        """Find what a metric by a method will need, but on huge surfaces, where memory is what matters."""
+        """Compute in advance what a metric by the given method needs, except on surfaces where memory is scarce."""
         if method == "exact" and len(self.mesh.faces) <= MEMORY_BOUND_TRIANGLES:
             _ = self.delaunay
 
 
 @dataclass(frozen=True, eq=False)
 class LaplacianInverse:
-    """A factorized Laplacian, as a function of (n,) sources, up to a constant where nothing is held at zero.
+    """A factorized Laplacian; solutions are unique up to a constant if no vertex is fixed at zero.
 
     Attributes:
         solve: returns (n,) the solution for a source (n,).
         laplacian: (n, n), of all vertices.
-        is_zero: (n,) the vertices where its solutions are zero.
-        break_even: how many solutions take as long as another factorization.
+        is_zero: (n,) vertices where solutions are zero.
+        break_even: number of solves that take as long as another factorization.
     """
 
     solve: Callable[[FloatArray], FloatArray]
@@ -263,11 +267,12 @@ class ConeSolution:
 
     Attributes:
         cones: (s,) cone vertices, in the order in which they were chosen.
-        target: (n,) target curvature, radians: 0 but at cones and on the boundary.
-        log_scale: (n,) phi with L phi = target - curvature; constant on cones and boundary where their
-            curvature was not prescribed.
-        inverse: what solved for the log scale, if it is still there: zero on the boundary, mean-free without one.
-        is_searched: the sparse search chose them, so that others may be tried.
+        target: (n,) target curvature, radians: 0 except at cones and on the boundary.
+        log_scale: (n,) phi with L phi = target - curvature; constant on cones and boundary where their curvature was
+            not prescribed.
+        inverse: the factorized Laplacian that gave the log scale, if it still exists: solutions are zero on the
+            boundary, or have zero mean without one.
+        is_searched: the sparse search chose the cones, so that others can be tried.
         notes: unmet requests, one sentence each.
     """
 
@@ -289,8 +294,8 @@ class Cut:
     """A connected mesh cut open to a disk.
 
     Attributes:
-        mesh: the cut mesh; its faces are those of the mesh, in the same order.
-        seams: (k,) the edges that were cut.
+        mesh: the cut mesh; its faces are those of the original mesh, in the same order.
+        seams: (k,) the edges of the original mesh that were cut.
     """
 
     mesh: TriangleMesh
@@ -299,7 +304,7 @@ class Cut:
 
 @dataclass(frozen=True)
 class SolveStatistics:
-    """How a metric and its layout were found.
+    """Statistics of the solvers of a metric and its layout.
 
     Attributes:
         newton_steps: steps of Newton's method.
@@ -307,14 +312,14 @@ class SolveStatistics:
         ptolemy_flips: edges flipped during the solve.
         residual: largest curvature error of the metric where curvature was prescribed, radians.
         broken: triangles of the metric that break the triangle inequality.
-        untangled_triangles: triangles that were inverted on their straight sides, and were flipped.
+        untangled_triangles: flipped triangles that were untangled, i.e. became positively oriented.
         untangled_vertices: vertices that were moved for this.
-        untangled_move: how far one was moved at most, relative to the mean edge around them.
-        relaxed_vertices: vertices that were free to move so that triangles are less distorted.
-        qc_mean_unrelaxed, qc_max_unrelaxed: the mean and the largest quasi-conformal distortion before; NaN where
-            nothing was to be relaxed, and of polygons in a file, which programs split into triangles of their own.
-        area_distortion_linear: E of the linear model that the cones were chosen in: the standard deviation of
-            the log scale, by area (and importance, where weights were given).
+        untangled_move: largest displacement of a vertex, relative to the mean length of the edges around it.
+        relaxed_vertices: vertices that were free to move in relaxing.
+        qc_mean_unrelaxed, qc_max_unrelaxed: mean and largest quasi-conformal distortion before relaxing; NaN if nothing
+            was relaxed, and for files with polygons, which programs split into triangles differently.
+        area_distortion_linear: E of the linear model in which the cones were chosen: standard deviation of the log
+            scale, weighted by area (and by importance, if weights were given).
         area_distortion: E of the metric that was laid out.
     """
 
@@ -334,7 +339,7 @@ class SolveStatistics:
 
     @classmethod
     def of_all(cls, parts: Sequence[SolveStatistics], areas: Sequence[float]) -> SolveStatistics:
-        """Return the statistics of components together: counts add up, means and deviations combine by area."""
+        """Return the combined statistics of components: sums of counts, maxima, and means weighted by area."""
         values = {}
         for each in fields(cls):
             every = np.array([getattr(part, each.name) for part in parts])
@@ -351,11 +356,11 @@ class SolveStatistics:
 
 @dataclass(frozen=True, eq=False)
 class Embedding:
-    """A cut mesh in the plane, by a method that maps it without a metric.
+    """A cut mesh in the plane, from a method that computes no metric.
 
     Attributes:
-        points: (c, 2) of the vertices of the cut mesh, at any scale, positively oriented.
-        statistics: how it was found.
+        points: (c, 2) points of the vertices of the cut mesh, at any scale, positively oriented.
+        statistics: statistics of the solvers.
         notes: unmet requests, one sentence each.
     """
 
@@ -372,17 +377,17 @@ class FlatMetric:
         mesh: the mesh.
         lengths: (m, 3) its side lengths before scaling.
         cones: (s,) vertices.
-        target: (n,) curvature that was prescribed, or came out where the scale was.
+        target: (n,) prescribed curvature, or the resulting curvature where the scale was prescribed; radians.
         log_scale: (n,) phi; flat lengths are about l * exp(phi).
         is_open: (n,) vertices whose curvature is not prescribed.
-        is_held: (n,) boundary vertices that a layout must leave where the metric has them.
-        statistics: how it was found.
+        is_held: (n,) boundary vertices that a layout must not move from where the metric puts them.
+        statistics: statistics of the solvers.
         notes: unmet requests, one sentence each.
         scale: factor of the triangles' size, contained in phi.
-        triangles: straight triangles that fit each other, which are unfolded; or None.
-        flat_lengths: (m, 3) lengths that fit nearly, for a least squares layout; or None.
-        embed: maps the cut mesh itself; or None.
-        holds_cones: the cones have the target; if not, the sides of seams are a free boundary.
+        triangles: flat triangles with matching edge lengths, to be unfolded; or None.
+        flat_lengths: (m, 3) lengths that are nearly flat, for a least squares layout; or None.
+        embed: maps the cut mesh to the plane; or None.
+        holds_cones: the cones have their target curvature; if not, the sides of seams are a free boundary.
     """
 
     mesh: TriangleMesh
@@ -401,7 +406,7 @@ class FlatMetric:
     holds_cones: bool = True
 
     def scaled(self, factor: float) -> FlatMetric:
-        """Return the metric at another size."""
+        """Return the metric with all lengths multiplied by a factor."""
         return replace(self, scale=factor * self.scale, log_scale=self.log_scale + np.log(factor))
 
 
@@ -414,16 +419,16 @@ class Layout:
         lengths: (m, 3) its side lengths before scaling.
         points: (c, 2) points of the plane, model units.
         corners: (m, 3) index into `points` of every triangle corner.
-        chart: (m,) the chart of each triangle, from 0; charts have no points in common and may lie over each other.
+        chart: (m,) the chart of each triangle, from 0; charts share no points, but may overlap.
         cones: (s,) vertices.
         seams: (k, 2) vertex pairs.
         log_scale: (n,) phi; flat lengths are about l * exp(phi).
-        target, curvature: (n,) curvature wanted and reached, radians.
+        target, curvature: (n,) target curvature and curvature of the metric, radians.
         is_open: (n,) vertices whose curvature is not prescribed.
-        is_held: (n,) boundary vertices that must stay.
-        statistics: how it was found.
+        is_held: (n,) boundary vertices that must not move.
+        statistics: statistics of the solvers.
         notes: unmet requests, one sentence each.
-        disk: the mesh cut open, whose faces are the corners, with a vertex for each point; None if there is none.
+        disk: the mesh cut to a disk, with one vertex per point and `corners` as faces; or None.
     """
 
     mesh: TriangleMesh
@@ -449,11 +454,11 @@ class Layout:
 
     @property
     def prescribed(self) -> FloatArray:
-        """(n,) the curvature that vertices are to have in the plane, radians; NaN where none is prescribed."""
+        """(n,) the prescribed curvature in the plane, radians; NaN where none is prescribed."""
         return np.where(self.is_open, np.nan, self.target)
 
     def with_notes(self, *notes: str) -> Layout:
-        """Return the same layout with more notes."""
+        """Return the same layout with further notes."""
         return replace(self, notes=(*self.notes, *notes))
 
     def with_area_distortion(self, linear: FloatArray, areas: FloatArray) -> Layout:

@@ -210,7 +210,7 @@ class TestFormats:
         [
             (SQUARE + "f 1 2 3\n", "has no UV coordinates"),
             (SQUARE + "f 1/1 2/2 3/3\n", "numbers UV coordinates, but does not hold them"),
-            (SQUARE + "vt nan 1\nf 1/1 2/1 3/1\n", "none of 1 triangle has UVs that are finite"),
+            (SQUARE + "vt nan 1\nf 1/1 2/1 3/1\n", "none of 1 triangle has finite UVs"),
         ],
     )
     def test_nothing_to_measure(self, tmp_path, text, message):

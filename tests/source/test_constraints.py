@@ -104,9 +104,9 @@ def test_cones_that_triangles_cannot_hold_are_avoided():
 @pytest.mark.parametrize(
     ("options", "kind", "message"),
     [
-        ({"weights": "quality"}, errors.OptionError, "no property 'quality'"),
+        ({"weights": "quality"}, errors.OptionError, "no vertex property 'quality'"),
         ({"weights": np.ones(5)}, errors.OptionError, "162 numbers"),
-        ({"weights": -np.ones(162)}, errors.OptionError, "0 and up"),
+        ({"weights": -np.ones(162)}, errors.OptionError, "must be nonnegative"),
         ({"weights": ["a"] * 162}, errors.OptionError, "must be numbers"),
         ({"required_cones": [3], "forbidden_cones": [3]}, errors.OptionError, "both"),
         ({"required_cones": [999]}, errors.OptionError, "0 to 161"),

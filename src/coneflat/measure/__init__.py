@@ -1,6 +1,6 @@
-"""Measures of a parameterization, and of how it was found.
+"""Measures of a parameterization, reports and guarantees.
 
-What needs NumPy is imported on first use: the commands name the measures in their help.
+Modules that need NumPy are imported on first use, because the commands list the measures in their help texts.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from ..geometry.straight import place_triangles
 from ..mesh.charts import both_sides, joined_edges, label_charts
 from ..mesh.connectivity import TriangleMesh
 
-ZERO_AREA = 1e-12  # twice the area over the longest side squared: no digit of the shape is left below
+ZERO_AREA = 1e-12  # twice the area over the longest side squared; smaller ones are rounding errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,26 +29,26 @@ class Distortion:
     conformal (Kharevych et al. 2006); means and quantiles are weighted by the area on the model.
 
     Attributes:
-        qc: (m,) per triangle; NaN where the triangle is degenerate on the model or in the plane.
-        log_area_scale: (m,) log of sqrt(UV area / area on the model); NaN likewise.
+        qc: (m,) QC of each triangle; NaN where the triangle is degenerate on the model or in the plane.
+        log_area_scale: (m,) log of sqrt(UV area / area on the model); NaN for the same triangles.
         qc_mean, qc_p95, qc_max: of `qc`.
         area_std: standard deviation of `log_area_scale`.
-        flipped: triangles that run against the orientation of their chart.
-        degenerate: triangles without area in the plane that have some on the model.
-        degenerate_input: triangles without area on the model.
-        charts: pieces of the layout.
-        mirrored_charts: charts whose orientation is reversed.
-        seam_length: length on the model of all seams, each once, over the square root of the area.
-        seam_mismatch: relative difference of a seam edge's two UV lengths: mean, weighted by length.
-        seam_mismatch_max: the same, the largest.
-        seam_motion_mismatch: how far the two sides of a seam are from one rigid motion of each other: the largest
-            change of the rotation between them from one seam edge to the next, radians; where seams branch
-            or end, and at cones, there is none to compare.
-        density_spread: of texels per length on the model, the quantile at 95% over that at 5%.
-        overlap: part of the area that the layout covers that it covers more than once.
-        overlapping_pairs: pairs of triangles with inner points in common, without rounding.
-        angle_sum_error: largest difference, radians, between the sum of the angles around a vertex in the plane and
-            what it is to be: 2 pi (pi on the boundary) less the curvature prescribed; NaN if none is known.
+        flipped: number of triangles whose orientation is opposite to that of their chart.
+        degenerate: number of triangles without area in the plane that have area on the model.
+        degenerate_input: number of triangles without area on the model.
+        charts: number of charts of the layout.
+        mirrored_charts: number of charts whose orientation is reversed.
+        seam_length: length on the model of all seams, each counted once, divided by the square root of the area.
+        seam_mismatch: relative difference of the two UV lengths of a seam edge: mean, weighted by length.
+        seam_mismatch_max: the largest such difference.
+        seam_motion_mismatch: deviation of the two sides of a seam from being related by one rigid motion: largest
+            change of the rotation between them from one seam edge to the next, radians. Vertices where seams branch or
+            end, and cones, are not compared.
+        density_spread: 95% quantile of the texel density (texels per length on the model) divided by its 5% quantile.
+        overlap: fraction of the covered area that is covered more than once.
+        overlapping_pairs: number of pairs of triangles with common interior points, computed exactly.
+        angle_sum_error: largest difference, radians, between the angle sum at a vertex in the plane and its target,
+            2 pi (pi on the boundary) minus the prescribed curvature; NaN if unknown.
         curvature_error: ||target - K||_2 / n of the metric, in units of pi (Table 1 of the paper).
         curvature_error_max: largest |target - K|, in units of pi.
 
@@ -85,7 +85,7 @@ class Distortion:
     curvature_error_max: float = float("nan")
 
     def rescaled(self, log_factor: float) -> Distortion:
-        """Return the measures of the same layout at another scale, given by the log of that over the one measured."""
+        """Return the measures of the layout scaled by exp(log_factor)."""
         return replace(self, log_area_scale=self.log_area_scale + log_factor)
 
 
@@ -109,21 +109,24 @@ def measure(
     overlaps: Overlaps | None = None,
     lengths: ArrayLike | None = None,
 ) -> Distortion:
-    """Measure a UV map.
+    """Return the measures of a UV map.
 
     Args:
         mesh: the mesh.
         corner_uv: (m, 3, 2) the UV point of every triangle corner.
+        curvature_error: the values of `curvature_errors` for the metric.
         cones: (s,) vertices at which the rotation between the sides of a seam changes.
-        curvature_error: what `curvature_errors` returns for the metric.
-        prescribed: (n,) curvature that vertices are to have in the plane, radians; NaN where it is free.
-        overlaps: what `find_overlaps` returns, if that is known.
-        lengths: (m, 3) side lengths of the metric that is mapped, column i opposite corner i; None for those between
-            the positions of the vertices.
+        prescribed: (n,) prescribed curvature in the plane, radians; NaN where it is free.
+        overlaps: the result of `find_overlaps`; None to compute it.
+        lengths: (m, 3) side lengths of the metric that is mapped, column i opposite corner i; None for the distances
+            between the vertices.
+
+    Returns:
+        The measures.
 
     Raises:
         ArrayShapeError, NonFiniteError: the arrays do not fit the mesh, or UVs are not finite.
-        FaceIndexError: faces have indices of no vertex.
+        FaceIndexError: a face has the index of a vertex that does not exist.
         OptionError: cones are not vertices.
         LengthError: the lengths are not a metric.
 
@@ -148,10 +151,10 @@ def measure(
 def _check_arrays(
     mesh: TriangleMesh, corner_uv: FloatArray, cones: IntArray | None, prescribed: FloatArray | None
 ) -> None:
-    """Refuse what is not a mesh with UVs; compiled loops would read beyond the ends of arrays."""
+    """Raise an error for invalid arrays, with which compiled loops would read out of bounds."""
     if not isinstance(mesh, TriangleMesh):
         raise ArrayShapeError(
-            f"mesh must be a TriangleMesh, check_mesh(vertices, faces).mesh say, not {shown(mesh)}"
+            f"mesh must be a TriangleMesh, for example check_mesh(vertices, faces).mesh, not {shown(mesh)}"
         )
     as_faces(mesh.faces, len(mesh.vertices))
     if not np.isfinite(as_floats("corner_uv", corner_uv)).all():
@@ -168,18 +171,21 @@ def _check_arrays(
         ),
     ):
         if found != wanted:
-            raise ArrayShapeError(f"{name} must have the shape {wanted}, as the mesh has it, not {found}")
+            raise ArrayShapeError(f"{name} must have the shape {wanted}, to match the mesh, not {found}")
 
 
 def angle_sum_errors(
     mesh: TriangleMesh, corner_uv: FloatArray, prescribed: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return (n,) by what the angles around each vertex sum to too much, radians; and what a rounded point makes of it.
+    """Return (n,) the angle sum at each vertex minus its target, radians, and (n,) its sensitivity to rounding.
 
     Args:
         mesh: the mesh.
         corner_uv: (m, 3, 2) the UV point of every triangle corner.
-        prescribed: (n,) curvature of vertices in the plane, NaN where it is free; so is the error then.
+        prescribed: (n,) prescribed curvature in the plane, radians; where it is NaN, so is the error.
+
+    Returns:
+        (n,) errors in radians, and (n,) their change per displacement of points, as `sum_angles` returns it.
     """
     uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
     sums, change = sum_angles(mesh.faces, uv, len(mesh.vertices))
@@ -194,12 +200,12 @@ def measure_map(
     cones: IntArray | None = None,
     lengths: FloatArray | None = None,
 ) -> Distortion:
-    """Return all measures but those of overlaps; arguments are those of `measure`."""
+    """Return all measures except those of overlaps; arguments are those of `measure`."""
     corner_uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
-    shapes = (mesh.vertices, mesh.faces) if lengths is None else _drawn(lengths)
+    shapes = (mesh.vertices, mesh.faces) if lengths is None else _place_separately(lengths)
     area, has_area, uv_area, has_uv_area, qc = measure_triangles(*shapes, corner_uv, ZERO_AREA)
     valid = has_area & has_uv_area
-    # Of most meshes all are: no copies then.
+    # In most meshes all triangles are valid; a slice then avoids copies.
     chosen = slice(None) if valid.all() else valid
     weights = area[chosen]
     scales = np.log(np.abs(uv_area[chosen]) / weights) / 2
@@ -248,7 +254,7 @@ def _side_lengths(ends: FloatArray) -> FloatArray:
 def _seam_mismatch(
     mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the length on the model of each seam edge, and the relative difference of its UV lengths."""
+    """Return (k,) the length on the model of each seam edge, and (k,) the relative difference of its UV lengths."""
     here, there = (_side_lengths(ends) for ends in both_sides(mesh, seams, corner_uv))
     ends = mesh.vertices[mesh.edges[seams]]
     return _side_lengths(ends), np.abs(here - there) / np.maximum((here + there) / 2, np.finfo(float).tiny)
@@ -257,12 +263,12 @@ def _seam_mismatch(
 def _seam_motion_mismatch(
     mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray, cones: IntArray | None
 ) -> float:
-    """Return the largest change, radians, of the rotation between a seam's sides along it."""
+    """Return the largest change of the rotation between the two sides of a seam along the seam, radians."""
     here, there = both_sides(mesh, seams, corner_uv)
     one = (here[:, 1] - here[:, 0]) @ np.array([1, 1j])
     two = (there[:, 1] - there[:, 0]) @ np.array([1, 1j])
-    # `here` is the side of the first half-edge, which may be either side of the seam: each edge tells the
-    # rotation as seen by a walker along it, from the left side to the right.
+    # `here` is the side of the first half-edge, which may be either side of the seam. The rotation of each edge is
+    # from its left side to its right side, in the direction of its first half-edge.
     rotation = one * np.conj(two)
     rotation = rotation / np.maximum(np.abs(rotation), np.finfo(float).tiny)
     starts, ends = mesh.ends_of(mesh.edge_halfedges[seams, 0])
@@ -270,7 +276,7 @@ def _seam_motion_mismatch(
     passed = (degree == 2) & ~mesh.is_boundary_vertex
     if cones is not None:
         passed[cones] = False
-    # The two seam edges at each vertex that a seam passes, and whether each of them leaves it.
+    # The two seam edges at each vertex that a seam passes, and whether each of them starts there.
     at = np.concatenate([starts, ends])
     leaves = np.repeat([True, False], len(seams))
     edge = np.tile(np.arange(len(seams)), 2)
@@ -279,7 +285,7 @@ def _seam_motion_mismatch(
     if not len(order):
         return 0.0
     first, second = rotation[edge[order[:, 0]]], rotation[edge[order[:, 1]]]
-    # Edges that both leave, or both arrive, are walked in opposite directions, with left and right exchanged.
+    # Two edges that both start or both end at the vertex have opposite directions; their left and right are exchanged.
     opposed = leaves[order[:, 0]] == leaves[order[:, 1]]
     change = np.where(opposed, first * second, first * np.conj(second))
     return float(np.abs(np.angle(change)).max())
@@ -296,12 +302,12 @@ def _spread(log_scale: FloatArray, weights: FloatArray) -> float:
 
 
 def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
-    """Return the value below which lies a fraction of the weight; NaN of nothing."""
+    """Return the weighted quantile of values for a fraction from 0 to 1; NaN for empty arrays."""
     return quantiles(values, weights, fraction)[0]
 
 
 def quantiles(values: FloatArray, weights: FloatArray, *fractions: float) -> list[float]:
-    """Return the values below which lie fractions of the weight; NaN of nothing."""
+    """Return the weighted quantiles of values for fractions from 0 to 1; NaN for empty arrays."""
     if not len(values):
         return [float("nan")] * len(fractions)
     order = np.argsort(values)
@@ -309,8 +315,8 @@ def quantiles(values: FloatArray, weights: FloatArray, *fractions: float) -> lis
     return [float(values[order[np.searchsorted(cumulated, part * cumulated[-1])]]) for part in fractions]
 
 
-def _drawn(lengths: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return triangles with given side lengths, each drawn by itself: positions (3m, 3), and (m, 3) indices of them."""
+def _place_separately(lengths: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return separate triangles with the given side lengths: positions (3m, 3), and (m, 3) indices of them."""
     sides = np.empty(lengths.size, dtype=np.complex128)
     place_triangles(lengths.ravel(), sides)
     along = sides.reshape(-1, 3)
@@ -323,17 +329,17 @@ def _drawn(lengths: FloatArray) -> tuple[FloatArray, IntArray]:
 def measure_triangles(
     vertices: FloatArray, faces: IntArray, corner_uv: FloatArray, zero: float
 ) -> tuple[FloatArray, BoolArray, FloatArray, BoolArray, FloatArray]:
-    """Return twice the area of triangles and whether they have any, the same in the plane, and their QC distortion.
+    """Return the areas of triangles on the model and in the plane, and their QC distortion.
 
     Args:
         vertices: (n, 3) positions.
         faces: (m, 3).
         corner_uv: (m, 3, 2).
-        zero: twice the area over the square of the longest side up to which there is none.
+        zero: bound of twice the area over the square of the longest side, up to which a triangle is degenerate.
 
     Returns:
-        (m,) each. Areas in the plane have a sign. QC is the ratio of the singular values of the map, NaN where one of
-        the areas is none.
+        Five arrays (m,): twice the area on the model, whether it is nonzero, twice the signed area in the plane,
+        whether it is nonzero, and QC, the ratio of the singular values of the map, NaN where one of the areas is zero.
     """
     count = len(faces)
     area, uv_area, ratio = np.empty(count), np.empty(count), np.empty(count)
@@ -362,13 +368,13 @@ def measure_triangles(
         has_uv_area[f] = abs(uv_area[f]) > zero * longest
         ratio[f] = np.nan
         if has_area[f] and has_uv_area[f]:
-            # The images of two orthonormal vectors, the first along the first side.
+            # (x1, y1) and (x2, y2) are the images of two orthonormal vectors, the first along the first side.
             base = math.sqrt(along)
             height = area[f] / base
             x1, y1 = u1 / base, v1 / base
             x2, y2 = (u2 - x1 * inner / base) / height, (v2 - y1 * inner / base) / height
             larger = (math.hypot(x1 + y2, y1 - x2) + math.hypot(x1 - y2, y1 + x2)) / 2
-            # The smaller one from the determinant: their difference would cancel.
+            # The smaller singular value follows from the determinant; a difference would suffer from cancellation.
             smaller = abs(uv_area[f]) / area[f] / larger
             ratio[f] = max(larger / smaller, 1.0)
     return area, has_area, uv_area, has_uv_area, ratio
@@ -376,14 +382,13 @@ def measure_triangles(
 
 @compiled
 def sum_angles(faces: IntArray, corner_uv: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """Return (n,) the sum of the angles in the plane around each vertex, and by what a rounded point changes it.
+    """Return (n,) the sum of the angles around each vertex in the plane, and (n,) its sensitivity to rounding.
 
-    Angles are those of the triangles' shapes, whichever way these are turned, so a vertex that its triangles go
-    around twice has 4 pi. Where a side has no length there is no angle. The change is in radians per unit that points
-    are off by, infinite beside such a side.
+    Angles are unsigned, so a vertex around which the triangles wind twice has 4 pi. Corners at a side of zero length
+    have no angle. The sensitivity is in radians per unit of displacement of the points, infinite at such corners.
 
     Args:
-        faces: (m, 3) the vertices, or whatever else angles are to be summed up at.
+        faces: (m, 3) indices of the vertices, or of other items for which angles are summed.
         corner_uv: (m, 3, 2).
         count: n.
     """
@@ -395,7 +400,7 @@ def sum_angles(faces: IntArray, corner_uv: FloatArray, count: int) -> tuple[Floa
             v[i] = corner_uv[f, (i + 1) % 3, 1] - corner_uv[f, i, 1]
             length[i] = math.hypot(u[i], v[i])
             if length[i] > 0.0:
-                # Of length one, lest products of tiny or huge ones are not numbers.
+                # Unit vectors avoid underflow and overflow in the products.
                 u[i], v[i] = u[i] / length[i], v[i] / length[i]
         for i in range(3):
             before = (i + 2) % 3

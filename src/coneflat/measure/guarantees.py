@@ -1,4 +1,4 @@
-"""What a flattening promises, held against what it is: a note on everything that is not kept."""
+"""Checks of the guarantees of a flattening; a note reports each one that is not met."""
 
 from __future__ import annotations
 
@@ -19,39 +19,39 @@ from .seam_data import Rotations, seam_rotations
 if TYPE_CHECKING:
     from ..result import Flattening
 
-# Of a double, and of the 32-bit numbers of GLB files, relative to 1.
+# Relative rounding of a double, and of the 32-bit numbers of GLB files.
 DOUBLE, SINGLE = 2.0**-53, 2.0**-24
-# Points are off by so many roundings: of the coordinates, and of what turned, moved and scaled them.
+# Largest error of points, in roundings: of the coordinates, and of the operations that rotate, move and scale them.
 MAX_ROUNDINGS = 8
-# Radians, or parts of a length, that a layout may be off by beside rounding. Metrics are solved to about 1e-11.
+# Tolerance of a layout in addition to rounding: radians, or relative to a length. Metrics are solved to about 1e-11.
 EXACT_TOLERANCE = 1e-6
-# Radians for methods that have no exact angles: a vertex that triangles go around twice is off by 2 pi.
+# Radians, for methods without exact angles: a vertex around which triangles wind twice has an error of 2 pi.
 WINDING_TOLERANCE = 1.0
-# Mean of QC, and what a twentieth of the area is above, from which on a layout is unfit for most uses, though every
-# triangle is positively oriented. Single triangles are worse on many models.
+# Mean QC, and QC exceeded on 5% of the area, above which a layout is unsuitable for most uses even though all triangles
+# are positively oriented. Single triangles are worse on many models.
 EXTREME_QC, EXTREME_TAIL = 1.25, 2.0
-# How far the turn of a round boundary at a vertex may be off a circle's: radians, as it is found iteratively to a
-# thousandth, plus a share of the circle's turn, which no eye sees.
+# Tolerance of the turning angle of a round boundary at a vertex: radians, as it is solved iteratively to a thousandth,
+# plus a fraction of the turning angle of a circle, which is not visible.
 NOT_ROUND, NOT_ROUND_SHARE = 1e-3, 0.02
-# Relative difference of the sides of marked seams that methods without a flat metric are let go.
+# Tolerated relative difference of the sides of marked seams for methods without a flat metric.
 ROUGH_TOLERANCE = 0.01
 
 
 def broken_promises(result: Flattening, unit: float = DOUBLE) -> tuple[str, ...]:
-    """Return what a result does not keep of what its options promise, one sentence each.
+    """Return a note, one sentence, for each guarantee of the options that a result does not meet.
 
     Args:
-        result: with its measures.
-        unit: rounding of the coordinates, relative to 1.
+        result: the result with its measures.
+        unit: relative rounding of the coordinates.
     """
     return (
         *_orientation(result),
-        *_apart(result),
+        *_overlaps(result),
         *_angle_sums(result, unit),
         *_equal_sides(result, unit),
         *_boundary_lengths(result, unit),
         *_round_boundary(result, unit),
-        *_whole_turns(result, unit),
+        *_seam_rotations(result, unit),
         *_distortion(result),
     )
 
@@ -63,18 +63,18 @@ def remeasured(
     notes: tuple[str, ...] = (),
     overlaps: Overlaps | None = None,
 ) -> Flattening:
-    """Return a changed result, measured anew, with the notes that it then has.
+    """Return a changed result, measured again, with updated notes.
 
     Args:
-        result: before the change.
-        changed: with the measures and notes of that.
-        unit: rounding of its coordinates.
-        notes: more of them.
-        overlaps: of its triangles, if they are known.
+        result: the result before the change.
+        changed: the changed result, with the measures and notes of the original.
+        unit: relative rounding of its coordinates.
+        notes: further notes to add.
+        overlaps: the overlaps of its triangles; None to compute them.
     """
-    told = broken_promises(result)
+    old_notes = broken_promises(result)
     old = result.distortion
-    # By a power of two, lest squares of tiny or huge lengths are not numbers.
+    # Scaling by a power of two avoids underflow and overflow of squared lengths.
     exponent = -unit_exponent(changed.vertices[changed.faces])
     distortion = measure(
         TriangleMesh(np.ldexp(changed.vertices, exponent), changed.faces),
@@ -86,12 +86,12 @@ def remeasured(
         None if changed.lengths is None else np.ldexp(changed.lengths, exponent),
     ).rescaled(exponent * float(np.log(2)))
     changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
-    kept = tuple(note for note in result.notes if note not in told)
+    kept = tuple(note for note in result.notes if note not in old_notes)
     return replace(changed, notes=(*kept, *broken_promises(changed, unit), *notes))
 
 
 def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
-    """Return the rotations of seams after points were moved a little: the worst of them is measured anew."""
+    """Return the rotations of seams after small changes of the points, with the worst deviation measured again."""
     before = result.rotations
     if before is None:
         return None
@@ -99,14 +99,14 @@ def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
     off, after = (
         seam_rotations(mesh, each.corner_uv, before.quantum) for mesh, each in ((old, result), (new, changed))
     )
-    # Polygons may have other diagonals: edges are told by their ends.
+    # Polygons may have other diagonals, so edges are identified by their ends.
     known, names = (mesh.edges[~mesh.is_boundary_edge] @ [len(result.vertices), 1] for mesh in (old, new))
     bound = ~np.isin(names, known[~before.binds(off)])
     return replace(before, worst=float(after[bound].max(initial=0.0)))
 
 
 def _is_exact(result: Flattening) -> bool:
-    """Whether angles and seams are those of a flat metric, for which no least squares stand in."""
+    """Return whether the layout has the angles and seams of an exact flat metric, not a least squares fit."""
     return result.settings.get("method") == "exact"
 
 
@@ -115,18 +115,18 @@ def _orientation(result: Flattening) -> Iterator[str]:
     kinds = ((measures.flipped, "flipped triangle"), (measures.degenerate, "degenerate triangle"))
     parts = [plural(count, what) for count, what in kinds if count]
     if parts:
-        advice = "refine the mesh there" if _is_exact(result) else "method exact has fewest"
+        advice = "refine the mesh there" if _is_exact(result) else "method exact gives the fewest"
         verb, broken = "is" if parts[0].startswith("1 ") else "are", result.solve.broken
         why = f" ({plural(broken, 'triangle')} broke the triangle inequality in the metric)" if broken else ""
         yield f"There {verb} {' and '.join(parts)} in the plane{why}: {advice}."
 
 
-def _apart(result: Flattening) -> Iterator[str]:
+def _overlaps(result: Flattening) -> Iterator[str]:
     measures = result.distortion
     if result.settings.get("charts") == "atlas" and measures.overlapping_pairs:
         pairs = plural(measures.overlapping_pairs, "pair")
         verb = "overlaps" if measures.overlapping_pairs == 1 else "overlap"
-        yield f"{pairs} of triangles {verb} in the atlas, {measures.overlap:.2g} of the area that it covers."
+        yield f"{pairs} of triangles {verb} in the atlas, on {measures.overlap:.2g} of the covered area."
 
 
 def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
@@ -141,8 +141,8 @@ def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
     if len(off):
         worst = off[np.argmax(np.abs(errors[off]))]
         yield (
-            f"Around {plural(len(off), 'vertex', 'vertices')} the angles do not sum to what they are to be: vertex "
-            f"{worst} is the worst, {errors[worst]:+.3g} rad off."
+            f"Around {plural(len(off), 'vertex', 'vertices')} the angle sum differs from its target: most at vertex "
+            f"{worst}, by {errors[worst]:+.3g} rad."
         )
 
 
@@ -158,7 +158,7 @@ def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
     beyond = off > most * mean + MAX_ROUNDINGS * unit
     if beyond.any():
         worst = (off[beyond] / mean[beyond]).max()
-        yield f"The two sides of seams differ in length, by up to {worst:.2g} of it."
+        yield f"The two sides of seams differ in length: relative difference up to {worst:.2g}."
 
 
 def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
@@ -166,7 +166,7 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
     sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
-    # By a power of two, lest squares underflow.
+    # Scaling by a power of two avoids underflow of squares.
     exponent = unit_exponent(mesh.vertices)
     sides_in_space = np.ldexp(mesh.vertices[mesh.heads[sides]] - mesh.vertices[mesh.tails[sides]], -exponent)
     lengths = np.linalg.norm(sides_in_space, axis=1) * np.ldexp(result.uv_scale, exponent)
@@ -176,11 +176,11 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
     beyond = off > EXACT_TOLERANCE * lengths + MAX_ROUNDINGS * unit
     if beyond.any():
         worst = (off[beyond] / np.maximum(lengths[beyond], np.finfo(float).tiny)).max()
-        yield f"Lengths along the boundary are not kept: they differ by up to {worst:.2g} of them."
+        yield f"Lengths along the boundary are not preserved: relative difference up to {worst:.2g}."
 
 
 def _round_boundary(result: Flattening, unit: float) -> Iterator[str]:
-    """Tell where a loop that is to be round turns otherwise than evenly along its length in the plane."""
+    """Yield a note if the turning angle of a round boundary is not uniform along its length in the plane."""
     boundary = result.settings.get("boundary", "free")
     if boundary != "disk" and isinstance(boundary, str):
         return
@@ -209,11 +209,11 @@ def _round_boundary(result: Flattening, unit: float) -> Iterator[str]:
     if off[worst] > NOT_ROUND:
         yield (
             f"The boundary is not quite round: at vertex {on_round[worst]} it turns by "
-            f"{-missing[on_round[worst]]:.3g} rad, a circle by {even[worst]:.3g}."
+            f"{-missing[on_round[worst]]:.3g} rad instead of {even[worst]:.3g} rad."
         )
 
 
-def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:
+def _seam_rotations(result: Flattening, unit: float) -> Iterator[str]:
     rotations = result.rotations
     if rotations is None or not rotations.worst > EXACT_TOLERANCE:
         return
@@ -227,8 +227,8 @@ def _whole_turns(result: Flattening, unit: float) -> Iterator[str]:
     off = np.where(rotations.binds(off), off, 0.0)
     if (off * shorter > EXACT_TOLERANCE * shorter + MAX_ROUNDINGS * unit).any():
         along = np.abs(rotations.handles).max(initial=0.0) > EXACT_TOLERANCE
-        advice = ", as loops along handles do: correct them (correct_handles=True)" if along else ""
-        yield f"Seams turn by up to {rotations.worst:.2g} rad beside multiples of {rotations.quantum:.4g} rad{advice}."
+        advice = ", also along handles: use correct_handles=True" if along else ""
+        yield f"Seam rotations are {rotations.worst:.2g} rad off multiples of {rotations.quantum:.4g} rad{advice}."
 
 
 def _distortion(result: Flattening) -> Iterator[str]:
@@ -238,6 +238,6 @@ def _distortion(result: Flattening) -> Iterator[str]:
         if result.settings.get("boundary", "free") != "free":
             cure.insert(0, "a free boundary")
         yield (
-            f"Angles are far from kept: the mean QC distortion is {measures.qc_mean:.3g}, a twentieth of the area is "
-            f"above {measures.qc_p95:.3g}; {', '.join(cure[:-1])} or {cure[-1]} would lower it."
+            f"Angle distortion is high: the mean QC distortion is {measures.qc_mean:.3g}, and above "
+            f"{measures.qc_p95:.3g} on 5% of the area; {', '.join(cure[:-1])} or {cure[-1]} would lower it."
         )

@@ -1,4 +1,4 @@
-"""The numbers of a flattening, for people and for programs."""
+"""Reports of the measures of a flattening: as plain values for programs, and as table rows for people."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..result import Flattening
     from .distortion import Distortion
 
-#: A measure, its value, and what it means.
+#: The name of a measure, its value, and its meaning.
 Row: TypeAlias = tuple[str, str, str]
 
 #: Measures of any map of a mesh to the plane.
@@ -38,12 +38,12 @@ MAP_MEASURES = (
     "overlap",
     "overlapping_pairs",
 )
-#: Those of a flattening.
+#: Measures of a flattening.
 MEASURES = ("curvature_error", "curvature_error_max", "angle_sum_error", *MAP_MEASURES)
 
 
 def as_dict(result: Flattening) -> dict[str, Any]:
-    """Return every measure as plain values; what is not finite becomes None, so that it is valid JSON."""
+    """Return all measures as plain Python values; numbers that are not finite become None, for valid JSON."""
     report: dict[str, Any] = {
         "input": path_text(result.source.path) if result.source else None,
         "vertices": len(result.vertices),
@@ -75,17 +75,17 @@ def _plain(value: Any) -> Any:
 
 
 def path_text(path: Path) -> str:
-    """Return a path as text that is valid in any encoding, whatever bytes its name has."""
+    """Return a path as valid Unicode text; invalid bytes in its name are replaced."""
     return os.fsencode(path).decode("utf-8", "replace")
 
 
-def _allowed(result: Flattening) -> str:
-    """Return what the search for cones was to reach."""
+def _target_text(result: Flattening) -> str:
+    """Return a phrase on the area distortion that the search for cones had to reach."""
     settings = result.settings
     if settings.get("cones") not in ("auto", "sparse"):
-        return "no search for it"
+        return "not searched"
     if settings.get("cone_count") is not None:
-        return "the least for so many cones"
+        return "the least for this number of cones"
     return f"{settings['distortion']:g} allowed"
 
 
@@ -103,12 +103,12 @@ def _rotation_rows(result: Flattening) -> list[Row]:
 
 
 def number_text(value: float, form: str) -> str:
-    """Return a number as text; a word where there is none, as for the distortion of what has no area."""
+    """Return a number as text; "unknown" if it is not finite, such as the distortion of a triangle without area."""
     return f"{value:{form}}" if math.isfinite(value) else "unknown"
 
 
 def as_rows(result: Flattening) -> list[Row]:
-    """Return (measure, value, meaning) rows of the table that the commands print."""
+    """Return rows (measure, value, meaning) of the table that the commands print."""
     d = result.distortion
     curvatures = result.curvatures / np.pi
     solve = result.solve
@@ -125,7 +125,7 @@ def as_rows(result: Flattening) -> list[Row]:
     of_map = map_rows(d)
     if solve.relaxed_vertices:
         moved = f"{plural(solve.relaxed_vertices, 'vertex', 'vertices')} moved"
-        relaxed = f"; {moved} to lessen it"
+        relaxed = f"; {moved} to reduce it"
         if np.isfinite(solve.qc_mean_unrelaxed):
             before = number_text(solve.qc_mean_unrelaxed, ".4f"), number_text(solve.qc_max_unrelaxed, ".4g")
             relaxed = f"; before {moved} {before[0]}, worst {before[1]}"
@@ -135,7 +135,7 @@ def as_rows(result: Flattening) -> list[Row]:
         of_map["flipped"] = (*of_map["flipped"][:2], untangled)
     return [
         ("triangles", f"{len(result.faces):,}", f"{_used(result):,} vertices"),
-        ("cones", cones, "singular vertices, and their curvatures"),
+        ("cones", cones, "singular vertices and their curvatures"),
         (
             "curvature error",
             f"{number_text(d.curvature_error, '.2e')} pi",
@@ -146,8 +146,8 @@ def as_rows(result: Flattening) -> list[Row]:
         (
             "of the metric",
             number_text(solve.area_distortion, ".4f"),
-            f"the same of the metric; {number_text(solve.area_distortion_linear, '.4f')} in the linear model, of "
-            f"{_allowed(result)}",
+            f"area distortion of the metric; {number_text(solve.area_distortion_linear, '.4f')} in the linear model: "
+            f"{_target_text(result)}",
         ),
         *(of_map[name] for name in ("flipped", "degenerate", "overlap", "charts")),
         packing_row(result.packing_efficiency),
@@ -157,14 +157,14 @@ def as_rows(result: Flattening) -> list[Row]:
 
 
 def _used(result: Flattening) -> int:
-    """Return how many vertices have triangles."""
+    """Return the number of vertices that have triangles."""
     is_used = np.zeros(len(result.vertices), dtype=bool)
     is_used[result.faces] = True
     return int(np.count_nonzero(is_used))
 
 
 def map_rows(d: Distortion) -> dict[str, Row]:
-    """Return the rows of the measures of a map alone, by their names."""
+    """Return the rows of the measures of a map, by name."""
     rows = (
         (
             "QC distortion",
@@ -174,9 +174,9 @@ def map_rows(d: Distortion) -> dict[str, Row]:
         (
             "area distortion",
             number_text(d.area_std, ".4f"),
-            "standard deviation of the log of the scale, by area",
+            "standard deviation of the log scale, weighted by area",
         ),
-        ("flipped", f"{d.flipped:,}", "triangles against the orientation of their chart"),
+        ("flipped", f"{d.flipped:,}", "triangles with orientation opposite to their chart"),
         (
             "degenerate",
             f"{d.degenerate:,}",
@@ -185,24 +185,24 @@ def map_rows(d: Distortion) -> dict[str, Row]:
         (
             "overlap",
             f"{number_text(100 * d.overlap, '.3g')} %" if d.overlapping_pairs else "none",
-            f"of the area covered, covered twice; {plural(d.overlapping_pairs, 'pair')} of triangles",
+            f"of the covered area is covered twice; {plural(d.overlapping_pairs, 'pair')} of triangles",
         ),
         ("charts", f"{d.charts:,}", f"pieces of the layout; {d.mirrored_charts:,} mirrored"),
         (
             "texel density",
             number_text(d.density_spread, ".3f"),
-            "its spread: the quantile at 95% over that at 5%",
+            "spread: 95% quantile over 5% quantile",
         ),
-        ("seam length", number_text(d.seam_length, ".3f"), "over the square root of the area"),
+        ("seam length", number_text(d.seam_length, ".3f"), "divided by the square root of the area"),
         (
             "seam mismatch",
             number_text(d.seam_mismatch, ".1e"),
-            f"of the two sides' lengths; worst {number_text(d.seam_mismatch_max, '.1e')}",
+            f"relative, of the lengths of both sides; worst {number_text(d.seam_mismatch_max, '.1e')}",
         ),
     )
     return {row[0]: row for row in rows}
 
 
 def packing_row(efficiency: float, tiles: str = "") -> Row:
-    """Return the row that says how much of the texture is covered; of which tiles, if there are several."""
+    """Return the row on the covered fraction of the texture; `tiles` names the tiles if there are several."""
     return "packing", number_text(efficiency, ".1%"), f"of the texture is covered{tiles}"

@@ -1,4 +1,4 @@
-"""What a user requires of the measures: `flipped=0,overlap=0,qc_mean<=1.05`."""
+"""Requirements on measures, such as `flipped=0,overlap=0,qc_mean<=1.05`."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ class Requirement:
     """A bound on a measure.
 
     Attributes:
-        name: of the measure, as in the report.
+        name: the measure, as in the report.
         relation: "=", "<=", ">=", "<" or ">".
-        bound: what stands to its right.
+        bound: the number to the right of it.
     """
 
     name: str
@@ -52,28 +52,28 @@ class Requirement:
         return f"{self.name}{self.relation}{self.bound:g}"
 
     def breach(self, measures: Mapping[str, object]) -> str | None:
-        """Return what is wrong with measures of a report, or None if nothing is; what is not known never suffices."""
+        """Return a message if a report violates the requirement, else None; unknown values violate it."""
         value = measures.get(self.name)
         if not isinstance(value, (int, float)) or not math.isfinite(value):
-            return f"{self.name} is not known, and {self} is required"
+            return f"{self.name} is unknown, but {self} is required"
         pairs = measures.get("overlapping_pairs")
         if self.name == "overlap" and value == 0 and isinstance(pairs, int) and pairs > 0:
-            # Overlaps so small that their share is rounded to nothing are overlaps.
+            # Overlaps also count if their fraction of the area is rounded to zero.
             value = math.ulp(0.0)
         if _RELATIONS[self.relation](value, self.bound):
             return None
-        return f"{self.name} is {value:.6g}, and {self} is required"
+        return f"{self.name} is {value:.6g}, but {self} is required"
 
 
 def parse_requirements(texts: Iterable[str], known: Iterable[str]) -> tuple[Requirement, ...]:
     """Return requirements from texts such as "flipped=0,qc_mean<=1.05".
 
     Args:
-        texts: each with one or more, between commas.
+        texts: each with one or more requirements, separated by commas.
         known: names of measures.
 
     Raises:
-        OptionError: a text is none, or names no measure.
+        OptionError: a text is not a requirement, or its measure is unknown.
     """
     known = tuple(known)
     found = []
@@ -83,7 +83,7 @@ def parse_requirements(texts: Iterable[str], known: Iterable[str]) -> tuple[Requ
             raise OptionError(f"{part.strip()!r} is not a requirement; write flipped=0 or qc_mean<=1.05")
         name, relation = match["name"], "=" if match["relation"] == "==" else match["relation"]
         if name not in known:
-            raise OptionError(f"there is no measure {name!r}: choose from {', '.join(sorted(known))}")
+            raise OptionError(f"unknown measure {name!r}: choose from {', '.join(sorted(known))}")
         try:
             bound = float(match["bound"])
         except ValueError:
@@ -95,6 +95,6 @@ def parse_requirements(texts: Iterable[str], known: Iterable[str]) -> tuple[Requ
 
 
 def breaches(requirements: Iterable[Requirement], measures: Mapping[str, object]) -> tuple[str, ...]:
-    """Return what measures of a report do not meet, a line for each requirement."""
+    """Return a message for each requirement that the measures of a report violate."""
     lines = (requirement.breach(measures) for requirement in requirements)
     return tuple(line for line in lines if line is not None)

@@ -1,4 +1,4 @@
-"""The cut as data: what lies on either side of every seam edge, and the motion that takes one side to the other."""
+"""The cut as arrays: both sides of every seam edge, and the motion that maps one side to the other."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from ..geometry.planar import sides_between
 class SeamData:
     """The cut of a flattening: k seam edges, s cones, n vertices, m triangles, u points in the plane.
 
-    Seams are the inner edges that were cut, between two charts or within one; the borders of the model are none. Side 0
-    of a seam edge is on the left of the way from its first vertex to its second, seen from outside, and side 1 on the
-    right. A similarity takes side 0 to side 1: with a point of the plane as a complex number z = u + iv,
+    Seams are the inner edges that were cut, between two charts or within one, without boundary edges of the model. Side
+    0 of a seam edge is on the left of the direction from its first vertex to its second, seen from outside, and side 1
+    on the right. A similarity maps side 0 to side 1: with a point of the plane as a complex number z = u + iv,
 
         z_1 = seam_scale * exp(i seam_rotation) * z_0 + seam_translation.
 
-    The exact metric makes it a rigid motion: `seam_scale` is 1 to rounding. All is measured on the UVs, and in their
-    units; translations over `uv_scale` are in model units. A side that is missing, which no flattening has but a file
-    may, has indices -1; a motion is NaN there, and where a side has no length.
+    With the exact metric it is a rigid motion: `seam_scale` is 1 up to rounding. All values are measured on the UVs, in
+    their units; translations divided by `uv_scale` are in model units. A side can be missing in files, but not in
+    flattenings; it has indices -1. The motion is NaN if a side is missing or has no length.
 
     Names, types and shapes are the same in a result written as .npz. All indices are int64, all numbers float64.
 
@@ -46,18 +46,19 @@ class SeamData:
         seam_corners: (k, 2) the corner of that triangle opposite the edge: 0, 1 or 2.
         seam_points: (k, 2, 2) index into `uv` on each side of each end, the ends in the order of `seams`.
         seam_charts: (k, 2) the chart on each side.
-        seam_rotation: (k,) radians, above -pi and up to pi. Of the seams crossed on a way around an inner vertex
-            counterclockwise they sum to its curvature in the plane, that of a cone, say, up to full turns; crossed from
-            side 1 to side 0, a rotation counts as negative.
+        seam_rotation: (k,) radians, above -pi and up to pi. On a counterclockwise loop around an inner vertex, the
+            rotations of the crossed seams sum to its curvature in the plane, e.g. that of a cone, up to full turns; a
+            rotation crossed from side 1 to side 0 counts as negative.
         seam_translation: (k, 2) UV units.
-        seam_scale: (k,) length of side 1 over that of side 0.
-        face_chart: (m,) the chart of each triangle, from 0, in the order of their first triangles: what hangs together
-            across sides with the same points.
+        seam_scale: (k,) length of side 1 divided by that of side 0.
+        face_chart: (m,) the chart of each triangle, from 0, in the order of their first triangles. Triangles are in the
+            same chart if they are connected across edges with the same points on both sides.
         cones: (s,) cone vertices.
-        cone_angles: (s,) sum of the angles around each in the plane, radians; 2 pi less its curvature.
+        cone_angles: (s,) angle sum at each cone in the plane, radians; 2 pi minus its curvature.
         vertex_log_scale: (n,) log of the length scale from the model to the plane, UV units per model unit: half the
-            log of the area of the triangles around in the plane over that on the model. NaN where none has area.
-        log_area_scale: (m,) the same of each triangle; that of `Distortion`.
+            log of the ratio of the areas of the triangles around the vertex, in the plane over the model. NaN where
+            none has area.
+        log_area_scale: (m,) the same for each triangle, as in `Distortion`.
 
     Examples:
         >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
@@ -84,24 +85,24 @@ class SeamData:
     log_area_scale: FloatArray
 
     def as_arrays(self) -> dict[str, FloatArray | IntArray]:
-        """Return the arrays by their names."""
+        """Return the arrays by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
 def seam_data(result: Flattening) -> SeamData:
-    """Return the cut of a result, measured on its points."""
+    """Return the cut of a result as arrays, measured on its UVs."""
     mesh = TriangleMesh(result.vertices, result.faces)
     seams = np.asarray(result.seams, dtype=np.int64).reshape(-1, 2)
     halfedges = _sides(mesh, seams)
-    is_there = halfedges >= 0
+    exists = halfedges >= 0
     start, end = end_corners(halfedges)
-    # The ends as seams name them: along the half-edge on side 0, against it on side 1.
+    # The ends in the order of `seams`: in the direction of the half-edge on side 0, against it on side 1.
     ends = np.stack([np.stack([start[:, 0], end[:, 0]], 1), np.stack([end[:, 1], start[:, 1]], 1)], axis=1)
-    points = np.where(is_there[:, :, None], result.uv_faces.ravel()[ends], -1)
+    points = np.where(exists[:, :, None], result.uv_faces.ravel()[ends], -1)
     joined = ~mesh.is_boundary_edge
     joined[point_seams(mesh, result.uv_faces)] = False
     chart = label_charts(mesh, joined)[1]
-    faces = np.where(is_there, halfedges // 3, -1)
+    faces = np.where(exists, halfedges // 3, -1)
     ratio = _ratios(mesh, result.corner_uv, halfedges)
     middles = result.uv[points].mean(axis=2) @ np.array([1, 1j])
     shift = middles[:, 1] - ratio * middles[:, 0]
@@ -110,9 +111,9 @@ def seam_data(result: Flattening) -> SeamData:
     return SeamData(
         seams=seams,
         seam_faces=faces,
-        seam_corners=np.where(is_there, halfedges % 3, -1),
+        seam_corners=np.where(exists, halfedges % 3, -1),
         seam_points=points,
-        seam_charts=np.where(is_there, chart[faces], -1),
+        seam_charts=np.where(exists, chart[faces], -1),
         seam_rotation=np.angle(ratio),
         seam_translation=np.stack([shift.real, shift.imag], axis=1),
         seam_scale=np.abs(ratio),
@@ -125,7 +126,7 @@ def seam_data(result: Flattening) -> SeamData:
 
 
 def _sides(mesh: TriangleMesh, seams: IntArray) -> IntArray:
-    """Return (k, 2) the half-edges on the left and right of pairs of vertices; -1 where there is none."""
+    """Return (k, 2) the half-edges on the left and right of seams (k, 2); -1 where a side is missing."""
     count = len(mesh.vertices)
     # Edges are sorted by their ends.
     keys, wanted = mesh.edges @ [count, 1], np.sort(seams, axis=1) @ [count, 1]
@@ -137,7 +138,7 @@ def _sides(mesh: TriangleMesh, seams: IntArray) -> IntArray:
 
 
 def _ratios(mesh: TriangleMesh, corner_uv: FloatArray, halfedges: IntArray) -> ComplexArray:
-    """Return (k,) side 1 over side 0 as complex numbers; NaN where one of them is missing or has no length."""
+    """Return (k,) the ratio of side 1 to side 0 as complex numbers; NaN where one is missing or has no length."""
     ratios = np.full(len(mesh.edges), np.nan, dtype=np.complex128)
     ratios[~mesh.is_boundary_edge] = ratios_across(mesh, corner_uv)
     edge = mesh.halfedge_edges[halfedges.max(axis=1)]
@@ -149,8 +150,8 @@ def _ratios(mesh: TriangleMesh, corner_uv: FloatArray, halfedges: IntArray) -> C
 
 
 def _vertex_scales(mesh: TriangleMesh, log_area_scale: FloatArray, lengths: FloatArray | None) -> FloatArray:
-    """Return (n,) half the log of the area around each vertex in the plane over that on the model."""
-    # At a size of one, as squares of extreme positions are none; factors cancel.
+    """Return (n,) half the log of the ratio of the areas around each vertex, in the plane over the model."""
+    # Scaling to unit size avoids underflow and overflow of squares; the factors cancel.
     if lengths is None:
         lengths = edge_lengths(np.ldexp(mesh.vertices, -unit_exponent(mesh.vertices[mesh.faces])), mesh.faces)
     else:
@@ -167,12 +168,12 @@ def _vertex_scales(mesh: TriangleMesh, log_area_scale: FloatArray, lengths: Floa
 
 @dataclass(frozen=True)
 class Rotations:
-    """How far rotations are from multiples of a quantum, radians.
+    """Deviation of rotations from multiples of a quantum, radians.
 
     Attributes:
         quantum: the angle.
-        worst: the largest deviation of a seam edge's rotation.
-        handles: the deviation of the rotation along each generator of the handles, two for each.
+        worst: largest deviation of the rotation across a seam edge.
+        handles: deviation of the holonomy along each generator of the handles, two per handle.
     """
 
     quantum: float
@@ -181,7 +182,7 @@ class Rotations:
 
     @classmethod
     def of_all(cls, parts: Iterable[Rotations | None]) -> Rotations | None:
-        """Return those of components together; None if there are none."""
+        """Return the combined deviations of components; None if there are none."""
         known = [part for part in parts if part is not None]
         if not known:
             return None
@@ -189,14 +190,20 @@ class Rotations:
         return cls(known[0].quantum, max(part.worst for part in known), handles)
 
     def binds(self, off: FloatArray) -> BoolArray:
-        """Return which edges with these deviations are held; seams that were marked, or join components, are not."""
+        """Return which edges with the given deviations are constrained; marked seams and joined components are not."""
         return np.asarray(off <= self.worst * (1 + 1e-6) + 1e-12)
 
 
 def measure_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> Rotations:
-    """Return the rotations of a layout of a connected mesh; `corner_uv` is (m, 3, 2)."""
+    """Return the deviations of seams and handles in a layout of a connected mesh.
+
+    Args:
+        mesh: the connected mesh.
+        corner_uv: (m, 3, 2) points of the triangle corners.
+        quantum: radians.
+    """
     pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
-    turns = _turns(mesh, corner_uv)
+    turns = _rotations(mesh, corner_uv)
     across = np.zeros(mesh.faces.size)
     across[pairs[:, 0]], across[pairs[:, 1]] = turns, -turns
     off = np.abs(off_multiple(turns, quantum))
@@ -205,14 +212,14 @@ def measure_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float)
 
 
 def seam_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> FloatArray:
-    """Return (k,) by how much the rotation across each inner edge misses a multiple of a quantum, radians."""
-    return np.abs(off_multiple(_turns(mesh, corner_uv), quantum))
+    """Return (k,) the deviation of the rotation across each inner edge from a multiple of a quantum, radians."""
+    return np.abs(off_multiple(_rotations(mesh, corner_uv), quantum))
 
 
 def ratios_across(mesh: TriangleMesh, corner_uv: FloatArray) -> ComplexArray:
-    """Return (k,) the second side of each inner edge over the first, as complex numbers: how it is turned and scaled.
+    """Return (k,) the ratio of the second to the first side of each inner edge, as complex numbers.
 
-    Not finite where the first has no length.
+    The ratio combines rotation and scale. It is not finite where the first side has no length.
     """
     sides = sides_between(corner_uv).ravel()
     pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
@@ -221,7 +228,7 @@ def ratios_across(mesh: TriangleMesh, corner_uv: FloatArray) -> ComplexArray:
     return ratios
 
 
-def _turns(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
-    """Return the rotation between the two sides of each inner edge, radians; 0 where a side has no length."""
+def _rotations(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
+    """Return (k,) the rotation between the two sides of each inner edge, radians; 0 where a side has no length."""
     turns: FloatArray = np.angle(ratios_across(mesh, corner_uv))
     return np.where(np.isfinite(turns), turns, 0.0)

@@ -1,4 +1,4 @@
-"""Options: declared once, parsed at the door."""
+"""Declaration, parsing and validation of all options."""
 
 from .combined import Options
 from .declared import (

@@ -1,4 +1,4 @@
-"""All options of a flattening together: which go together, and what follows from them."""
+"""All options of a flattening: checks of their combinations, and values derived from them."""
 
 from __future__ import annotations
 
@@ -11,35 +11,35 @@ from ..base.defaults import LEAST_QUANTUM, TYPED_TOLERANCE
 from ..errors import OptionError
 from .declared import WIDEST_CONE, AtlasOptions, ConeOptions, MetricOptions, RunOptions, SeamOptions
 
-# What asks for the sparse search for cones, and it alone.
+# Options that only the sparse search for cones supports.
 SEARCH_OPTIONS = ("cone_count", "positive_only", "weights", "required_cones", "forbidden_cones", "quantise")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions):
-    """Options of `coneflat.flatten`; `read_options` makes them from what a user gives, so that they are parsed.
+    """Parsed options of `coneflat.flatten`, as `read_options` returns them.
 
     Raises:
-        OptionError: options do not go together.
+        OptionError: options contradict each other.
     """
 
     def __post_init__(self) -> None:
-        for message in (*self._off_in_metric(), *self._off_in_cones(), *self._off_elsewhere()):
+        for message in (*self._metric_errors(), *self._cone_errors(), *self._other_errors()):
             raise OptionError(message)
 
-    def _off_in_metric(self) -> Iterator[str]:
-        """Yield what is wrong with the options of the metric."""
+    def _metric_errors(self) -> Iterator[str]:
+        """Yield an error message for each conflict of the metric options."""
         moves_all = self.stretch or self.relax == "whole"
         if self.method != "exact":
             if moves_all:
-                yield f"method {self.method!r} gives layouts as published, unrelaxed: use method 'exact'"
+                yield f"method {self.method!r} does not relax layouts: use method 'exact'"
             if self.boundary_kind != "free":
                 yield f"method {self.method!r} has a free boundary: use method 'exact'"
             if self.correct_handles:
-                yield "rotations along handles are corrected by method 'exact' only"
+                yield "correct_handles needs method 'exact'"
 
-    def _off_in_cones(self) -> Iterator[str]:
-        """Yield what is wrong with the options of cones."""
+    def _cone_errors(self) -> Iterator[str]:
+        """Yield an error message for each conflict of the cone options."""
         least, widest, quantum = self.min_cone_angle, self.max_cone_angle, self.quantise
         if not 0 < least <= WIDEST_CONE:
             most = f"{WIDEST_CONE / math.pi:g} pi"
@@ -47,23 +47,23 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
         if widest is not None and not widest > least:
             yield f"the largest cone angle ({widest:g} radians) must exceed the smallest ({least:g})"
         if not self.searches_cones:
-            # Cones without curvatures have the least area distortion by weight.
+            # The curvatures of given cones without one minimize the weighted area distortion.
             is_fitted = any(k is None for k in self.named_cones.values())
             for name in SEARCH_OPTIONS:
                 if self._is_set(name) and not (name == "weights" and is_fitted):
                     yield f"{name} is an option of cones 'sparse', not of cones {self.cone_choice!r}"
             if self.boundary_kind == "straight":
-                yield "a straight boundary gets its corners from the search: use cones 'sparse'"
+                yield "boundary 'straight' needs the cone search, which finds its corners: use cones 'sparse'"
         if quantum is None and self.correct_handles:
-            yield "rotations along handles are made whole for quantised cones only: give quantise, pi/2 say"
+            yield "correct_handles needs quantised cones: set quantise, for example to pi/2"
         if quantum is not None and not LEAST_QUANTUM <= quantum <= 2 * math.pi * (1 + TYPED_TOLERANCE):
             yield (
-                f"quantise must be from {LEAST_QUANTUM:g} radians, below which it restricts nothing, to 2 pi, not "
+                f"quantise must be from {LEAST_QUANTUM:g} radians (a smaller quantum has no effect) to 2 pi, not "
                 f"{quantum:g}"
             )
 
-    def _off_elsewhere(self) -> Iterator[str]:
-        """Yield what is wrong with the options of seams, atlas and input."""
+    def _other_errors(self) -> Iterator[str]:
+        """Yield an error message for each conflict of the options of seams and atlas."""
         if not 0 <= self.padding < self.resolution / 4:
             most = f"a quarter of the resolution of {self.resolution:,}"
             yield f"padding must be from 0 to {most}, not {self.padding:g}"
@@ -76,12 +76,12 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
 
     @cached_property
     def asks_for_search(self) -> bool:
-        """Whether something is said that only the sparse search heeds."""
+        """Whether an option is set that only the sparse search supports."""
         return any(self._is_set(name) for name in SEARCH_OPTIONS)
 
     @property
     def cone_choice(self) -> str:
-        """The way cones are found: "auto", "sparse", "greedy", "none" or "given"."""
+        """How cones are found: "auto", "sparse", "greedy", "none" or "given"."""
         return self.cones if isinstance(self.cones, str) else "given"
 
     @property
@@ -91,34 +91,34 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
 
     @property
     def named_cones(self) -> Mapping[int, float | None]:
-        """Cones that are given, with their curvatures or None."""
+        """Cones given by the user, with their curvatures or None."""
         return self.cones if isinstance(self.cones, Mapping) else {}
 
     @property
     def boundary_kind(self) -> str:
-        """What the boundary becomes: "free", "lengths", "disk", "straight" or "polygon"."""
+        """The kind of boundary: "free", "lengths", "disk", "straight" or "polygon"."""
         return self.boundary if isinstance(self.boundary, str) else "polygon"
 
     @property
     def corners(self) -> Mapping[int, float | None]:
-        """Corners of the boundary that are given, with their curvatures or None."""
+        """Corners of the boundary given by the user, with their curvatures or None."""
         return self.boundary if isinstance(self.boundary, Mapping) else {}
 
     @property
     def prescribes_boundary(self) -> bool:
-        """Whether vertices on the boundary have a curvature to keep."""
+        """Whether boundary vertices have a prescribed curvature."""
         return self.boundary_kind not in ("free", "lengths")
 
     @property
     def marks_seams(self) -> bool:
-        """Whether there may be edges that are cut in any case."""
+        """Whether edges may be marked as seams, by `seams` or by `sharp_angle`."""
         return self.seams is not None or self.sharp_angle is not None
 
     @property
     def scale_at_cones(self) -> bool:
-        """Whether phi = 0 is prescribed at cones, not curvature.
+        """Whether phi = 0 is prescribed at cones instead of their curvature.
 
-        It is where they have no curvatures that must hold: the search keeps cone angles within bounds, which those
-        that come out need not respect.
+        This is the case if cones have no prescribed curvatures. Searched cones keep their curvatures, because the
+        resulting cone angles might violate the bounds that the search respects.
         """
         return not (self.searches_cones or self.named_cones or self.prescribes_boundary)

@@ -1,8 +1,8 @@
-"""The options of a flattening: each is declared here, and here alone.
+"""Declarations of all options of a flattening.
 
-A field of a group below is an option: its name, type, default, kind with bounds, and what it means. The keywords of
-`coneflat.flatten`, `find_cones` and `cone_curve`, the flags of the commands, what `coneflat batch` writes down, the
-settings in the report and the tables in the documentation are made from it.
+A field of a group below is an option: its name, type, default, kind with bounds, and help text. The keywords of
+`coneflat.flatten`, `find_cones` and `cone_curve`, the flags of the commands, the records of `coneflat batch`, the
+settings in the report and the tables in the documentation are generated from it.
 """
 
 from __future__ import annotations
@@ -49,15 +49,15 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 CONES = ("auto", "sparse", "greedy", "none")
-#: From cones to a layout: this package's own, and the paper's.
+#: How a layout is computed from cones: by the method of this package, or that of the paper.
 METHODS = ("exact", "linear")
 #: Which triangles of a flat metric are relaxed.
 RELAXED = ("auto", "off", "whole")
 CHARTS = ("atlas", "one")
 BOUNDARIES = ("free", "lengths", "disk", "straight")
-NO_CORNERS = "boundary names no corners; for a round boundary, say 'disk'"
+NO_CORNERS = "boundary must have at least one corner; for a round boundary use 'disk'"
 
-# Radians: no triangulation has room for wider cones than this.
+# Radians. A larger bound has no effect on any triangulation.
 WIDEST_CONE = 1000 * math.pi
 
 Cones = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
@@ -71,28 +71,27 @@ PAPER: Mapping[str, Any] = {
 }
 
 
-#: Formats that flattened meshes are written in: the endings of their files.
+#: Formats in which flattened meshes are written: file extensions.
 FORMATS = ("obj", "ply", "glb", "npz")
-#: Triangles up to which the page draws a mesh as it is; larger ones, which the browser would turn haltingly, are
-#: thinned to so many.
+#: Largest number of triangles that the page draws. Larger meshes, which a browser rotates slowly, are simplified.
 MOST_TRIANGLES = 500_000
-#: What the viewer's page can show first.
+#: What the page of the viewer can show first.
 SHOWS = ("checker", "picture", "charts", "qc", "area", "curvature", "flat", "plain")
 
 
 @dataclass(frozen=True)
 class Declaration:
-    """What is declared of an option.
+    """The declaration of an option.
 
     Attributes:
-        kind: what values it takes.
-        only: what alone has this choice: "sparse" for cones, "exact" for the method; or "".
-        one_mesh: it names vertices of one mesh, so it fits no others.
-        flag: the commands have it.
-        command_default: what they take by default if it is not what Python takes; the reason stands beside it.
-        name, type, default: of the field.
-        group: what it is an option of, the first word of the docstring of its group.
-        doc: what it means, for people at the command line and in Python alike: as in the docstring of its group.
+        kind: the values it takes.
+        only: the method that alone supports it: "sparse" for cones, "exact" for the metric; or "".
+        one_mesh: it contains vertex indices, so its value fits one mesh only.
+        flag: the commands have a flag for it.
+        command_default: the default of the commands if it differs from that in Python; a comment gives the reason.
+        name, type, default: those of the field.
+        group: the group of the option: the first word of the docstring of its class.
+        doc: help text for the command line and for Python, from the docstring of its class.
     """
 
     kind: Kind
@@ -108,13 +107,13 @@ class Declaration:
 
 
 def option(default: Any, kind: Kind, **more: Any) -> Any:
-    """Return a field of a group, with its declaration."""
+    """Return a dataclass field with the declaration of an option."""
     return field(default=default, metadata={"declared": Declaration(kind, **more)})
 
 
 @cache
 def declarations(group: Any) -> dict[str, Declaration]:
-    """Return the options of a group by name, its own before those of the groups that it is made of, in their order."""
+    """Return the options of a group by name: its own fields, then those of its base classes, in their order."""
     known = {each.name: each for each in fields(group)}
     found: dict[str, Declaration] = {}
     for base in group.__mro__:
@@ -125,25 +124,25 @@ def declarations(group: Any) -> dict[str, Declaration]:
             if name in known and name not in found:
                 of = known[name]
                 doc = " ".join(docs.get(name, "").split())
-                told = {"name": name, "group": title, "doc": doc, "type": of.type, "default": of.default}
-                found[name] = replace(of.metadata["declared"], **told)
+                data = {"name": name, "group": title, "doc": doc, "type": of.type, "default": of.default}
+                found[name] = replace(of.metadata["declared"], **data)
     return found
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConeBounds:
-    """Cones: of which angles, and where.
+    """Cones: bounds of their angles and positions.
 
     Attributes:
-        required_cones: Vertices that are cones in any case.
-        forbidden_cones: Vertices that may not be cones.
-        weights: Importance of each vertex, from which distortion keeps off: numbers, or a map of vertices to theirs,
-            where others are 1; the name of a property in the file; or color, where grey vertices are 1, those of a pure
-            colour 100.
-        min_cone_angle: The sharpest cone: its angle, 2 pi less its curvature. Needles distort what is around them.
-        max_cone_angle: The widest saddle: its angle, above 2 pi; none or inf for any. Wider ones have no room in
-            triangles.
-        positive_only: No cones of negative curvature, which are saddles.
+        required_cones: Vertices that must be cones.
+        forbidden_cones: Vertices that must not be cones.
+        weights: Importance of each vertex; important regions get less area distortion. An array with one number per
+            vertex; a map from vertex to number, 1 for the others; the name of a vertex property in the file; or color,
+            which gives 1 to grey vertices and 100 to vertices of a pure colour.
+        min_cone_angle: Smallest cone angle (2 pi minus the curvature). Sharper cones distort the triangles around them.
+        max_cone_angle: Largest cone angle, above 2 pi; none or inf for no bound. The triangles around a wider cone
+            cannot hold its angle.
+        positive_only: No cones of negative curvature (saddles).
     """
 
     required_cones: Iterable[int] = option((), Vertices(), only="sparse", one_mesh=True)
@@ -156,12 +155,12 @@ class ConeBounds:
 
 @dataclass(frozen=True, kw_only=True)
 class ConeNumber:
-    """Cones: how many.
+    """Cones: their number.
 
     Attributes:
-        distortion: The area distortion allowed, the standard deviation of the log of the scale by area; less needs more
-            cones.
-        cone_count: So many cones per component, placed for the least area distortion, instead.
+        distortion: Largest area distortion allowed: the standard deviation of the log scale, weighted by area. A
+            smaller value needs more cones.
+        cone_count: Number of cones per component, placed for the least area distortion; replaces distortion.
     """
 
     distortion: float = option(DISTORTION, POSITIVE, only="sparse")
@@ -170,12 +169,13 @@ class ConeNumber:
 
 @dataclass(frozen=True, kw_only=True)
 class ConeQuanta:
-    """Cones: of whole multiples.
+    """Cones: quantised curvatures.
 
     Attributes:
-        quantise: Cones have curvatures that are multiples of this, pi/2 say, so that seams turn by such multiples.
-        correct_handles: With quantised cones and the exact metric: make rotations along handles, and around holes where
-            the boundary is free, multiples, too, by a map that is as little off conformal as can be.
+        quantise: Cone curvatures are multiples of this angle, for example pi/2. Rotations across seams are then
+            multiples of it, too.
+        correct_handles: With quantised cones and the exact metric: make the holonomy along handles, and around holes
+            where the boundary is free, a multiple, too. The map is then not conformal, but as close to it as possible.
     """
 
     quantise: float | None = option(None, ANGLE_OR_NONE, only="sparse")
@@ -187,12 +187,12 @@ class ConeOptions(ConeNumber, ConeBounds, ConeQuanta):
     """Cones.
 
     Attributes:
-        cones: How cones are found. sparse: the fewest for the distortion allowed. greedy: the paper's search, which
-            takes three to six times as many. none: none, for bounded meshes and tori. Or vertices, each with its
-            curvature or without: those without have the curvatures of the least area distortion. auto:
-            sparse, but none where the boundary is prescribed, the corners of a polyhedron that has few, and greedy
-            on closed surfaces with over 51 handles.
-        max_cones: Searches stop at so many cones per component.
+        cones: How cones are found. sparse: search for the fewest cones with the allowed distortion. greedy: the search
+            of the paper, which needs three to six times as many cones. none: no cones, for meshes with boundary and
+            tori. Or a list of vertices, each with or without a curvature; missing curvatures are chosen for the least
+            area distortion. auto: sparse, except that a prescribed boundary gets no cones, a polyhedron with few
+            corners gets its corners, and closed surfaces with over 51 handles use greedy.
+        max_cones: Largest number of cones per component, at which searches stop.
     """
 
     cones: Cones = option("auto", WordOrVertices(CONES, "cone", may_differ=True))
@@ -204,16 +204,17 @@ class MetricOptions:
     """Metric.
 
     Attributes:
-        method: exact: no curvature error, and no flipped triangle. linear: the paper's linear system and least squares.
-        boundary: Exact metric: free has the least area distortion. lengths is the same at the model's own scale, so
-            that lengths on the boundary are kept. disk is round. straight has straight sides between corners that the
-            search finds like cones. Or the corners of a polygon, vertices with curvatures, or all without for equal
-            angles; components without one are free.
-        relax: Exact metric: less distortion of triangles, with the same cones, curvatures and seams. auto: those that
-            cones bend most, and three rings around them. whole: all. off: none, so that the map is discretely conformal
-            everywhere.
-        stretch: Exact metric: from angles, 0, to areas, 1, which is as near to isometric as the cones allow. More than
-            0 moves all vertices, except on a boundary that is prescribed.
+        method: exact: no curvature error and no flipped triangles. linear: the linear system and least squares layout
+            of the paper.
+        boundary: Shape of the boundary, with the exact metric. free: the least area distortion. lengths: preserve the
+            edge lengths of the boundary. disk: a circle. straight: straight sides between corners that the search
+            finds together with the cones. Or the corners of a polygon: vertices with curvatures, or all without for
+            equal angles; components without a corner have a free boundary.
+        relax: Reduce the distortion of triangles and preserve cones, curvatures and seams, with the exact metric.
+            auto: relax the triangles that cones distort most, and three rings around them. whole: all triangles. off:
+            none, so that the map is discretely conformal everywhere.
+        stretch: Trade-off between angles (0) and areas (1), with the exact metric. At 1 the map is as close to
+            isometric as the cones allow. Above 0 all vertices move, except on a prescribed boundary.
     """
 
     method: str = option("exact", Choice(METHODS))
@@ -227,17 +228,17 @@ class SeamOptions:
     """Seams.
 
     Attributes:
-        seams: Edges that are cut in any case, pairs of vertices, or input: the seams of the file's own UVs, or both, as
-            ("input", pairs). They act like a boundary. An edge that no other meets is not a cut.
-        no_seams: Edges, pairs of vertices, that the first cut must not use, not for sharp edges or seams of the file
-            either; or vertices: then the edges between two of them. No search puts a cone where no seam could reach.
-            What is cut later so that nothing overlaps avoids these edges where it can.
-        sharp_angle: Cut edges at which the surface bends by more, 40deg say: CAD parts open there. Other seams prefer
-            sharp edges: the cost of an edge falls from its length where the surface bends by 20 degrees to a tenth at
-            60.
-        hide_seams: How much seams prefer what can hardly be seen, in deep folds and, with a direction up, below: at 1,
-            it costs a tenth of its length.
-        seam_weights: By how much seams are costlier at each vertex: numbers, or the name of a property in the file.
+        seams: Edges that must be cut, as pairs of vertices; or input, for the seams of the UVs in the file; or both, as
+            ("input", pairs). They act like a boundary. A single edge without a neighbouring seam is not cut.
+        no_seams: Edges that must not be cut, as pairs of vertices; or vertices, for all edges between two of them.
+            This also excludes sharp edges and seams of the file. No search puts a cone where no seam can reach it.
+            Cuts that are added later to remove overlaps avoid these edges if possible.
+        sharp_angle: Cut all edges with a larger dihedral angle, for example 40deg for CAD parts. Other seams prefer
+            sharp edges: the cost of an edge is its length up to 20 degrees, and falls to a tenth of it at 60 degrees.
+        hide_seams: Strength of the preference for seams in places that are hard to see, in deep folds and, if up is
+            given, on the underside. At 1, hidden edges cost a tenth of their length.
+        seam_weights: Factor of the cost of seams at each vertex: one number per vertex, or the name of a vertex
+            property in the file.
     """
 
     seams: ArrayLike | str | tuple[str, ArrayLike] | None = option(None, Edges(("input",)), one_mesh=True)
@@ -252,12 +253,14 @@ class AtlasOptions:
     """Atlas.
 
     Attributes:
-        charts: atlas: seams are moved, and cuts made where they must be, so that nothing overlaps. one: a single chart
-            per component, as in the paper, which may overlap itself; PAPER and --paper take it.
-        resolution: Texels along a side of the texture, by which padding counts.
-        padding: Texels between charts, and between them and the border, at least; to a quarter of a side.
-        tiles: Textures (UDIM tiles) to distribute charts over, all at one scale.
-        up: What is up in the model is to be up in the texture; without, charts lie as they fill it best.
+        charts: atlas: move seams and add cuts until no triangles overlap. one: a single chart per component, as in the
+            paper, which may overlap itself; PAPER and --paper use it.
+        resolution: Texels along a side of the texture; padding is measured in these.
+        padding: Least distance between charts, and between charts and the border, in texels; at most a quarter of a
+            side.
+        tiles: Number of textures (UDIM tiles) over which charts are distributed, all at one scale.
+        up: Upward direction of the model; charts are rotated so that it points up in the texture. Without it, charts
+            are rotated to fill the texture best.
     """
 
     charts: str = option("atlas", Choice(CHARTS))
@@ -272,17 +275,17 @@ class InputOptions:
     """Input.
 
     Attributes:
-        lengths: A metric of one's own instead of the distances between vertices: (m, 3) side lengths of the triangles
-            given, column i opposite corner i. For meshes given as arrays.
-        repair: Drop, split and cut what makes the input no manifold, with a note, instead of refusing it. Commands do
-            so unless told otherwise.
-        strict: Refuse triangles without area, which otherwise are opened by a tiny change of lengths; for commands,
-            what is not manifold, too.
-        progress: Called with what is being done and the fraction of the whole that is done.
+        lengths: Metric to use instead of the distances between vertices: (m, 3) side lengths of the triangles, column
+            i opposite corner i. For meshes given as arrays only.
+        repair: Remove, split or cut what makes the input not a manifold, and add a note, instead of raising an error.
+            This is the default of the commands.
+        strict: Raise an error for triangles without area, which are otherwise opened by a tiny change of lengths; in
+            commands, also for meshes that are not manifold.
+        progress: Function that is called with the name of the current stage and the completed fraction of all work.
     """
 
     lengths: ArrayLike | None = option(None, Kind(), flag=False, one_mesh=True)
-    # A file's user can seldom mend it; whoever has arrays wants to know that they are not a mesh.
+    # The user of a file can rarely repair it; a user of arrays should be notified that they are not a mesh.
     repair: bool = option(False, Flag(), command_default=True)
     strict: bool = option(False, Flag())
     progress: Progress | None = option(None, Kind(), flag=False)
@@ -290,11 +293,12 @@ class InputOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class RunOptions(InputOptions):
-    """Input, and how it is worked on.
+    """Input and computation.
 
     Attributes:
-        threads: Threads of PARDISO, which solves large systems; two stages at once at most are done by more than one.
-            The last digits depend on it, so that it is the same on every machine unless told otherwise.
+        threads: Number of threads of PARDISO, which solves large linear systems. With more than one, two stages may
+            also run at the same time. The last digits of results depend on it, so the default is the same on every
+            machine.
     """
 
     threads: int = option(THREADS, whole(256))
@@ -302,15 +306,15 @@ class RunOptions(InputOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class FindOptions(ConeNumber, ConeBounds, InputOptions):
-    """What `coneflat.find_cones` takes."""
+    """Options of `coneflat.find_cones`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CurveOptions(ConeBounds, InputOptions):
-    """What `coneflat.cone_curve` takes.
+    """Options of `coneflat.cone_curve`.
 
     Attributes:
-        most: The largest number of cones.
+        most: Largest number of cones.
     """
 
     most: int = option(MOST_CONES, whole())

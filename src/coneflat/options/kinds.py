@@ -1,4 +1,4 @@
-"""Kinds of options: what values they take, and what is said of others."""
+"""Kinds of options: how values are parsed, and the errors for invalid ones."""
 
 from __future__ import annotations
 
@@ -16,25 +16,29 @@ if TYPE_CHECKING:
 
     from ..base.arrays import IntArray
 
-# NumPy is imported late: commands that only print their help need none.
+# NumPy is imported late, because commands that only print their help do not need it.
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What values an option takes: this one takes anything."""
+    """The values that an option takes; the base class takes any value."""
 
     def parse(self, name: str, value: Any) -> Any:
-        """Return a value in the one form that the rest of the package knows.
+        """Return a value in the form that the rest of the package uses.
+
+        Args:
+            name: of the option, for messages.
+            value: as the user gave it.
 
         Raises:
-            OptionError: it makes no sense.
+            OptionError: the value is invalid.
         """
         return value
 
 
 @dataclass(frozen=True)
 class Choice(Kind):
-    """One of a few words."""
+    """One of several words."""
 
     words: tuple[str, ...]
 
@@ -46,26 +50,26 @@ class Choice(Kind):
 
 @dataclass(frozen=True)
 class Flag(Kind):
-    """Yes or no."""
+    """True or False."""
 
     def parse(self, name: str, value: Any) -> bool:
         import numpy as np
 
         if not isinstance(value, (bool, np.bool_)):
-            raise OptionError(f"{name} is True or False, not {shown(value)}")
+            raise OptionError(f"{name} must be True or False, not {shown(value)}")
         return bool(value)
 
 
 @dataclass(frozen=True)
 class Number(Kind):
-    """A number; an angle is one in radians, a strength one from 0, where True and False are 1 and 0.
+    """A number; an angle is in radians, a strength is from 0 and also accepts True (1) and False (0).
 
     Attributes:
-        least, most: bounds that it may reach.
-        is_whole: it is an integer.
-        is_positive: it is finite and above 0.
-        is_angle, is_strength: it is one.
-        optional: None stands for no number.
+        least, most: inclusive bounds.
+        is_whole: the number must be an integer.
+        is_positive: the number must be finite and above 0.
+        is_angle, is_strength: the number is an angle, or a strength.
+        optional: None is allowed.
     """
 
     least: float = -math.inf
@@ -88,7 +92,7 @@ class Number(Kind):
 
     @property
     def text(self) -> str:
-        """What numbers there are."""
+        """A description of the valid numbers, for messages."""
         noun = "an integer" if self.is_whole else "a number"
         if self.is_positive:
             return f"{noun} above 0"
@@ -103,56 +107,56 @@ COUNT = Number(0, is_whole=True, optional=True)
 
 
 def strength(most: float) -> Number:
-    """Return a strength up to a largest one."""
+    """Return the kind of a strength from 0 to `most`."""
     return Number(0, most, is_strength=True)
 
 
 def whole(most: float = math.inf) -> Number:
-    """Return an integer from 1 to a largest one."""
+    """Return the kind of an integer from 1 to `most`."""
     return Number(1, most, is_whole=True)
 
 
 @dataclass(frozen=True)
 class Vertices(Kind):
-    """Vertices, from 0, as a tuple; None stands for none."""
+    """Vertex indices from 0, parsed to a tuple; None for no vertices."""
 
     def parse(self, name: str, value: Any) -> tuple[int, ...]:
         if value is None:
             return ()
         noun = name.replace("_", " ").removesuffix("s")
         if isinstance(value, Mapping):
-            raise OptionError(f"{noun}s are vertices alone, without curvatures: give a list of them")
+            raise OptionError(f"{noun}s must be a list of vertices without curvatures, not a map")
         return tuple(given_vertices(noun, value))
 
 
 @dataclass(frozen=True)
 class WordOrVertices(Kind):
-    """A word, or vertices, with curvatures (radians) or without: a map to curvature or None.
+    """A word, or vertices with or without curvatures (radians), parsed to a map from vertex to curvature or None.
 
     Attributes:
         words: the words.
-        noun: what a vertex becomes.
-        lacking: what is said of no vertices; "" if they may be none.
-        may_differ: some may have a curvature and others none; else all or none have.
+        noun: the noun for such a vertex in messages.
+        empty_error: error message for an empty list; "" if it is allowed.
+        may_differ: some vertices may have a curvature and others not; else all or none must have one.
     """
 
     words: tuple[str, ...]
     noun: str
-    lacking: str = ""
+    empty_error: str = ""
     may_differ: bool = False
 
     def parse(self, name: str, value: Any) -> str | dict[int, float | None]:
         if isinstance(value, str):
             return Choice(self.words).parse(name, value)
         given = given_vertices(self.noun, value, self.may_differ)
-        if self.lacking and not given:
-            raise OptionError(self.lacking)
+        if self.empty_error and not given:
+            raise OptionError(self.empty_error)
         return given
 
 
 @dataclass(frozen=True)
 class Edges(Kind):
-    """Edges as (k, 2) pairs of vertices, a word, or a word and such pairs; None for none."""
+    """Edges as (k, 2) pairs of vertices, a word, or a word with such pairs; None for no edges."""
 
     words: tuple[str, ...]
 
@@ -166,7 +170,7 @@ class Edges(Kind):
 
 @dataclass(frozen=True)
 class VerticesOrEdges(Kind):
-    """Vertices (k,), from 0, or edges as pairs of vertices (k, 2); None for none."""
+    """Vertices (k,), from 0, or edges as pairs of vertices (k, 2); None for no edges."""
 
     def parse(self, name: str, value: Any) -> IntArray | None:
         import numpy as np
@@ -184,12 +188,12 @@ class VerticesOrEdges(Kind):
 
 @dataclass(frozen=True)
 class Weights(Kind):
-    """A number for each vertex, or for some; or the name of a property in the file; checked with the mesh."""
+    """A number for each vertex, or for some; or the name of a vertex property in the file; checked with the mesh."""
 
 
 @dataclass(frozen=True)
 class Direction(Kind):
-    """A direction in space, not 0, as three numbers; None for none."""
+    """A direction in space as three numbers, not all 0; None for no direction."""
 
     def parse(self, name: str, value: Any) -> tuple[float, float, float] | None:
         import numpy as np
@@ -204,13 +208,13 @@ class Direction(Kind):
             )
         direction = direction.astype(np.float64)
         largest = np.abs(direction).max()
-        # The squared length of what is used must be neither 0 nor infinite in double precision.
+        # The squared length must be neither 0 nor infinite in double precision.
         x, y, z = (direction if abs(np.frexp(largest)[1]) < 300 else direction / largest).tolist()
         return x, y, z
 
 
 def as_number(name: str, value: object) -> float:
-    """Return a number, or raise OptionError."""
+    """Return a value as a float, or raise OptionError."""
     import numpy as np
 
     is_scalar = np.ndim(value) == 0 if isinstance(value, np.ndarray) else not isinstance(value, (str, bytes))
@@ -223,7 +227,7 @@ def as_number(name: str, value: object) -> float:
 
 
 def as_whole(name: str, value: object) -> int:
-    """Return an integer, or raise OptionError."""
+    """Return a value as an integer, or raise OptionError."""
     import numpy as np
 
     number = math.nan if isinstance(value, (bool, np.bool_)) else as_number(name, value)
@@ -242,7 +246,7 @@ def _array(name: str, value: object) -> NDArray[Any]:
 
 
 def _indices(name: str, given: object) -> NDArray[Any]:
-    """Return an array, of integers if it is empty."""
+    """Return a value as an array, of integers if it is empty."""
     values = _array(name, list(given) if isinstance(given, (set, frozenset)) else given)
     return values if values.size else values.astype("i8")
 
@@ -262,7 +266,16 @@ def _pairs(noun: str, given: object) -> IntArray:
 
 
 def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dict[int, float | None]:
-    """Return vertex -> curvature, None where it is to be computed: for all or for none, unless they may differ."""
+    """Return a map from vertex to curvature, None where it must be computed.
+
+    Args:
+        noun: the noun for such a vertex in messages.
+        vertices: vertices, or a map from vertex to curvature.
+        may_differ: some vertices may have a curvature and others not; else all or none must have one.
+
+    Raises:
+        OptionError: the value is invalid.
+    """
     import numpy as np
 
     if isinstance(vertices, Mapping):
@@ -280,7 +293,7 @@ def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dic
             raise OptionError(f"vertex {twice} is given as a {noun} twice")
     else:
         is_count = noun == "cone" and isinstance(vertices, Integral) and int(vertices) > 0
-        advice = f": for so many cones give cone_count={shown(vertices)}" if is_count else ""
+        advice = f": for a number of cones use cone_count={shown(vertices)}" if is_count else ""
         raise OptionError(
             f"{noun}s must be vertices, or a map from vertex to curvature, not {type(vertices).__name__}{advice}"
         )
@@ -288,9 +301,9 @@ def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dic
     if unknown and len(unknown) < len(given) and not may_differ:
         raise OptionError(
             f"{len(given) - len(unknown)} of {len(given)} {noun}s have a curvature and vertex {unknown[0]} has "
-            "none: give curvatures to all, or to none"
+            "none: give curvatures for all, or for none"
         )
     for v, k in given.items():
         if k is not None and not math.isfinite(k):
-            raise OptionError(f"the curvature of {noun} {v} is {k}")
+            raise OptionError(f"the curvature of {noun} {v} must be finite, not {k}")
     return given

@@ -1,4 +1,4 @@
-"""Options from what a user gives, and functions that take them."""
+"""Parsing of options from keywords, and a decorator for functions with options."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ R = TypeVar("R")
 G = TypeVar("G")
 R_co = TypeVar("R_co", covariant=True)
 
-#: Other spellings.
+#: Alternative spellings of option names.
 SPELLINGS = {"quantize": "quantise"}
 
 
 def read_options(given: Mapping[str, Any], group: type[G] = Options) -> G:  # type: ignore[assignment]
-    """Return options from keywords, each parsed.
+    """Return parsed options from keywords.
 
     Args:
-        given: name -> value.
-        group: those that may be given.
+        given: map from name to value.
+        group: the class with the allowed options.
 
     Raises:
-        OptionError: there is no such option, a value makes no sense, or options do not go together.
+        OptionError: an option is unknown, a value is invalid, or options contradict each other.
     """
     known = declarations(cast(type, group))
     parsed: dict[str, Any] = {}
@@ -44,7 +44,7 @@ def read_options(given: Mapping[str, Any], group: type[G] = Options) -> G:  # ty
             near = difflib.get_close_matches(name, list(known), 1)
             raise OptionError(f"unknown option {name}" + (f"; did you mean {near[0]}?" if near else ""))
         if name in parsed:
-            raise OptionError(f"{name} is given twice, in two spellings")
+            raise OptionError(f"{name} is given twice, in different spellings")
         parsed[name] = known[name].kind.parse(name, value)
     widest = parsed.get("max_cone_angle")
     if widest is not None and WIDEST_CONE < widest <= math.inf:
@@ -53,7 +53,7 @@ def read_options(given: Mapping[str, Any], group: type[G] = Options) -> G:  # ty
 
 
 def settings(options: Options) -> dict[str, Any]:
-    """Return options as plain values, for a report."""
+    """Return options as plain Python values, for a report."""
     values: dict[str, Any] = {}
     for name, each in declarations(cast(type, type(options))).items():
         value = getattr(options, name)
@@ -71,14 +71,15 @@ class OfMesh(Protocol[P, R_co]):
     """A function of a mesh with options."""
 
     def __call__(self, mesh: Any, faces: ArrayLike | None = None, *args: P.args, **options: P.kwargs) -> R_co:
-        """Call it."""
+        """Call the function with a mesh and options."""
         ...
 
 
 def takes(declared: Callable[P, Any]) -> Callable[[Callable[..., R]], OfMesh[P, R]]:
-    """Return a decorator that gives a function of a mesh, with `**options`, the keywords of a group of options.
+    """Return a decorator that adds the keywords of a group of options to a function of a mesh with `**options`.
 
-    Type checkers and editors know the keywords from the group; its signature and docstring tell them when it runs.
+    Type checkers and editors see the keywords of the group. At run time they are in the function's signature and
+    docstring.
     """
 
     def decorate(function: Callable[..., R]) -> OfMesh[P, R]:

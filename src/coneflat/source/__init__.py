@@ -1,4 +1,4 @@
-"""From the input to connected parts, each with what is asked of it."""
+"""Preparation of the input: connected parts, each with the specification of its cones, metric and seams."""
 
 from .parts import Part, Source
 

@@ -1,4 +1,4 @@
-"""What the user says about vertices of his mesh, in the numbering of the checked mesh and of its components."""
+"""The user's constraints on vertices, in the numbering of the checked mesh and of its components."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from ..options.kinds import as_number, as_whole
 from ..stages import VertexCurvatures
 from .input_mesh import InputMesh
 
-# How much more a vertex of a pure colour weighs than a grey one.
+# Weight of a vertex of a pure colour minus that of a grey one.
 PAINTED = 99.0
 
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """What the user says about the vertices of a mesh.
+    """The user's constraints on the vertices of a mesh.
 
     Attributes:
-        names: (n,) what he calls each vertex.
-        cones: cones that he gives.
-        corners: corners of the boundary.
-        required: vertices that are cones in any case of a search; their curvatures are NaN.
-        is_allowed: (n,) whether a search may put a cone there.
+        names: (n,) the index of each vertex in the user's input.
+        cones: given cones.
+        corners: given corners of the boundary.
+        required: vertices that every search must use as cones; their curvatures are NaN.
+        is_allowed: (n,) vertices where a search may put a cone.
         weights: (n,) importance of each vertex, or None.
-        seam_weights: (n,) by which seams are costlier, or None.
-        on_marks: (n,) vertices on seams that are marked, or None.
+        seam_weights: (n,) factors of the cost of seams, or None.
+        on_marks: (n,) vertices on marked seams, or None.
     """
 
     names: IntArray
@@ -47,27 +47,27 @@ class Constraints:
     on_marks: BoolArray | None = None
 
     def without(self, vertices: IntArray) -> Constraints:
-        """Return constraints that forbid cones at some vertices, too."""
+        """Return constraints that forbid cones at further vertices."""
         is_allowed = self.is_allowed.copy()
         is_allowed[vertices] = False
         return replace(self, is_allowed=is_allowed)
 
-    def keep_off(self, seams: IntArray) -> None:
-        """Raise OptionError if a cone is wished for on seams, given by vertices, that are cut in any case."""
+    def check_off_seams(self, seams: IntArray) -> None:
+        """Raise OptionError if a given or required cone is among the vertices of marked seams."""
         for place in (self.cones, self.required):
             for vertex in place.vertices[np.isin(place.vertices, seams)]:
                 raise OptionError(
-                    f"cone {self.names[vertex]} lies on a seam that is marked, which takes what curvature it needs"
+                    f"cone {self.names[vertex]} lies on a seam that is marked, where the curvature is free"
                 )
 
     def with_marks(self, seams: IntArray) -> Constraints:
-        """Return constraints that know the marked seams, given by vertices."""
+        """Return constraints with the marked seams, given by their vertices."""
         on_marks = np.zeros(len(self.names), dtype=bool)
         on_marks[seams] = True
         return replace(self, on_marks=on_marks)
 
     def within(self, component: IntArray) -> Constraints:
-        """Return what is said of a component, numbered there; `component` are its vertices."""
+        """Return the constraints of a component, in its numbering; `component` holds the component's vertices."""
         return Constraints(
             self.names[component],
             self.cones.within(component),
@@ -81,27 +81,27 @@ class Constraints:
 
 
 def _weights_within(weights: FloatArray | None, component: IntArray) -> FloatArray | None:
-    """Return the weights of a component; None where all are 0, which there says no more than that they are equal."""
+    """Return the weights of a component, scaled; None if all are 0, which is the same as equal weights."""
     return None if weights is None or not weights[component].any() else at_unit_scale(weights[component])
 
 
 def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh) -> Constraints:
-    """Return what the options say of the input's vertices for those of the checked mesh.
+    """Return the constraints of the options, in the numbering of the checked mesh.
 
     Args:
         checked: the mesh.
-        options: where the constraints stand.
+        options: the options with the constraints.
         given: the input.
 
     Raises:
-        OptionError: vertices that do not exist or cannot be what they are wanted for; weights that make no sense.
+        OptionError: a vertex does not exist or cannot be a cone or a corner; weights are invalid.
     """
     names, input_count = checked.vertex_origin, len(np.asarray(given.vertices))
     required = _locate(checked, "cone", dict.fromkeys(options.required_cones))
     for vertex in options.forbidden_cones:
         if not 0 <= vertex < input_count:
             raise OptionError(
-                f"a forbidden cone, {vertex}, is not a vertex: these are numbered from 0 to {input_count - 1}"
+                f"forbidden cone {vertex} is not a vertex: indices are from 0 to {input_count - 1}"
             )
     is_allowed = ~np.isin(names, list(options.forbidden_cones))
     for name in names[required.vertices[~is_allowed[required.vertices]]]:
@@ -120,11 +120,11 @@ def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh)
 
 
 def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) -> VertexCurvatures:
-    """Return given cones, which must be inside, or corners, which must be on the boundary."""
+    """Return given cones, which must be inner vertices, or given corners, which must be on the boundary."""
     names = np.array(list(given), dtype=np.int64)
     highest = int(checked.vertex_origin[-1])
     for name in names[(names < 0) | (names > highest)]:
-        raise OptionError(f"{noun} {name} is not a vertex of a face: these are numbered from 0 to {highest}")
+        raise OptionError(f"{noun} {name} is not a vertex of a face: indices are from 0 to {highest}")
     found = np.searchsorted(checked.vertex_origin, names)
     for name in names[checked.vertex_origin[found] != names]:
         raise OptionError(f"{noun} {name} cannot be used: no face uses this vertex")
@@ -132,7 +132,7 @@ def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) 
     if noun == "cone":
         for name in names[on_boundary]:
             raise OptionError(
-                f"cone {name} lies on the boundary, which takes what curvature it needs: choose inner vertices, "
+                f"cone {name} lies on the boundary, where the curvature is free: choose inner vertices, "
                 "or prescribe the boundary's curvature (boundary)"
             )
     else:
@@ -143,12 +143,12 @@ def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) 
 
 
 def _weights_of_some(noun: str, weights: Mapping[Any, Any], count: int) -> FloatArray:
-    """Return (n,) the weights of the vertices that a map has, and 1 of the others."""
+    """Return (n,) the weights of the vertices in a map, and 1 for the others."""
     values = np.ones(count)
     for vertex, weight in weights.items():
         at = as_whole(f"a vertex of {noun}", vertex)
         if not 0 <= at < count:
-            raise OptionError(f"{noun}: {at} is not a vertex: these are numbered from 0 to {count - 1}")
+            raise OptionError(f"{noun}: {at} is not a vertex: indices are from 0 to {count - 1}")
         values[at] = as_number(f"{noun}: that of vertex {at}", weight)
     return values
 
@@ -176,18 +176,18 @@ def _weights(noun: str, weights: object, given: InputMesh) -> FloatArray:
         raise OptionError(f"{noun} must be finite; that of vertex {at} is {values[at]:g}")
     if not (values.min() >= 0 and values.max() > 0):
         raise OptionError(
-            f"{noun} must be 0 and up, not all 0; they are {values.min():g} to {values.max():g}"
+            f"{noun} must be nonnegative and not all 0; they are {values.min():g} to {values.max():g}"
         )
     return values
 
 
 def _property(name: str, given: InputMesh) -> FloatArray:
-    """Return what the input's file says of each vertex; "color" is how strongly it is painted."""
+    """Return (n,) a vertex property of the input's file; "color" stands for the saturation of the vertex colour."""
     known = {} if given.source is None else given.source.properties
     if name == "color" and all(colour in known for colour in COLOURS):
         painted = np.ptp(np.stack([known[colour] for colour in COLOURS]), axis=0)
         return 1.0 + PAINTED * painted
     if name not in known:
         has = "it has " + ", ".join(known) if known else "it has none"
-        raise OptionError(f"the mesh has no property {name!r} at its vertices to take weights from; {has}")
+        raise OptionError(f"the mesh has no vertex property {name!r} for weights; {has}")
     return known[name]

@@ -1,6 +1,6 @@
-"""Components that are copies of others, as bolts, bricks and leaves are: their layout is found once.
+"""Detection of components that are copies of each other, such as bolts or leaves; their layout is computed once.
 
-60 copies of a sphere of 320 triangles take 44% of the time that they take without.
+For 60 copies of a sphere of 320 triangles this reduces the time to 44%.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from ..base.arrays import FloatArray
 from ..stages import Layout
 from . import Part
 
-# How far the vertices of a copy, moved, turned and scaled, may be from those of the first, as a share of the largest
-# coordinates: what rounding makes of these. And by what share sides may differ: a tenth of what metrics are good to.
+# Largest distance of the vertices of a copy from the transformed vertices of the first, relative to the largest
+# coordinates: rounding errors. And largest relative difference of side lengths: a tenth of the accuracy of metrics.
 COPY_ROUNDING, SIDE_TOLERANCE = 2.0**-48, 1e-10
-# Digits of what copies are looked for by, before they are compared.
+# Digits of the values by which possible copies are grouped before they are compared.
 MATCHED_DIGITS = 6
 
 
 @dataclass(frozen=True)
 class Copy:
-    """What a component is a copy of.
+    """A reference to the component of which another is a copy.
 
     Attributes:
-        first: the number of the first of its kind.
-        scale: how much larger it is.
+        first: index of the first component of its kind.
+        scale: size of the copy divided by the size of the first.
     """
 
     first: int
@@ -35,19 +35,19 @@ class Copy:
 
 
 def find_copies(parts: Sequence[Part]) -> list[Copy | None]:
-    """Return for each part what it is a copy of, None for the first of a kind.
+    """Return for each part the part of which it is a copy, None for the first of a kind.
 
-    Copies have triangles of the same numbering, which a rigid motion and a scale take onto each other, and the same is
-    asked of their vertices and edges.
+    Copies have the same connectivity with the same numbering and the same options for vertices and edges; a rotation, a
+    translation and a uniform scaling map one to the other.
     """
     found: list[Copy | None] = [None] * len(parts)
     if len(parts) == 1:
         return found
     kinds: dict[tuple[object, ...], list[int]] = {}
     for i, part in enumerate(parts):
-        if _names_vertices(part):
+        if _has_vertex_options(part):
             continue
-        alike = kinds.setdefault(_kind(part), [])
+        alike = kinds.setdefault(_copy_key(part), [])
         for first in alike:
             scale = _scale_of_copy(parts[first], part)
             if scale is not None:
@@ -59,12 +59,12 @@ def find_copies(parts: Sequence[Part]) -> list[Copy | None]:
 
 
 def copied(first: Layout, part: Part, scale: float) -> Layout:
-    """Return the layout of a copy by that of the first of its kind."""
+    """Return the layout of a copy from the layout of the first component of its kind."""
     return replace(first, mesh=part.mesh, lengths=part.lengths, points=scale * first.points)
 
 
-def _names_vertices(part: Part) -> bool:
-    """Whether something is asked of single vertices."""
+def _has_vertex_options(part: Part) -> bool:
+    """Return whether options name single vertices of a part."""
     cones = part.cones
     weights = cones.weights, part.seams.weights, part.seams.visibility
     return bool(
@@ -75,8 +75,8 @@ def _names_vertices(part: Part) -> bool:
     )
 
 
-def _kind(part: Part) -> tuple[object, ...]:
-    """Return what is equal for copies, and for few others."""
+def _copy_key(part: Part) -> tuple[object, ...]:
+    """Return a hash key that is equal for copies, and differs for most other parts."""
     lengths = part.lengths
     size = np.sqrt((lengths * lengths).sum())
     shape = [
@@ -87,9 +87,10 @@ def _kind(part: Part) -> tuple[object, ...]:
 
 
 def _scale_of_copy(first: Part, part: Part) -> float | None:
-    """Return how much larger a component is than one that it is a copy of; None if it is not a copy.
+    """Return the size of a component relative to the component of which it is a copy; None if it is not a copy.
 
-    W. Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
+    References:
+        W. Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
     """
     one, two = (p.mesh.vertices - p.mesh.vertices.mean(axis=0) for p in (first, part))
     sizes = np.sqrt((one * one).sum()), np.sqrt((two * two).sum())

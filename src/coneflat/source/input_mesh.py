@@ -1,4 +1,4 @@
-"""The triangles that a user gives, and the polygons that they are parts of."""
+"""The input triangles, and the polygons that contain them."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from ..errors import NonFiniteError
 from ..geometry.intrinsic import as_lengths, check_lengths
 from ..mesh.check import CheckedMesh
 
-# Size of a mesh of which texels per unit of length, and their like, are numbers.
+# Smallest size of a mesh for which texels per unit of length, and similar ratios, are finite.
 SMALLEST = 1e-300
 Values = TypeVar("Values", IntArray, BoolArray, FloatArray)
 
 
 @dataclass(frozen=True, eq=False)
 class InputMesh:
-    """Triangles to flatten, and the polygons they are parts of.
+    """Triangles to flatten, and the polygons that contain them.
 
     Attributes:
-        vertices, faces: as given; not checked.
-        source: the file they came from, if any.
+        vertices, faces: as given, unchecked.
+        source: the file that they were read from, if any.
         face_corners: (m, 3) polygon corner of `source` at each triangle corner, if there is a source.
     """
 
@@ -44,30 +44,30 @@ class InputMesh:
     face_corners: IntArray | None = None
 
     def is_side(self) -> BoolArray:
-        """Return (m, 3) True where the side opposite a corner is a side of the input's polygon, too."""
+        """Return (m, 3) whether the side opposite each corner is also a side of the input's polygon."""
         if self.source is None or self.face_corners is None:
             return np.ones(np.shape(self.faces), dtype=bool)
-        # is_polygon_side speaks of the side from corner k to k + 1, which is opposite corner k + 2.
+        # Column k of is_polygon_side is the side from corner k to k + 1, which is opposite corner k + 2.
         sides: BoolArray = is_polygon_side(self.face_corners, self.source.offsets)[:, [1, 2, 0]]
         return sides
 
     def corner_texture(self) -> IntArray | None:
-        """Return (m, 3) what tells apart the UVs that a triangle's corners have in the input; None without UVs."""
+        """Return (m, 3) indices that are equal where triangle corners have the same input UV; None without UVs."""
         if self.source is None or self.source.texture is None or self.face_corners is None:
             return None
         texture, uv = self.source.texture, self.source.uv
         if uv is not None:
-            # Points at the same place are one, though many programs write one for every corner.
+            # Points with equal coordinates count as one, because many programs write one point per corner.
             different = np.unique(uv + 0.0, axis=0, return_inverse=True)[1].reshape(-1)
             texture = np.where(texture < 0, texture, different[texture])
         return texture[self.face_corners]
 
 
 def result_numbering(checked: CheckedMesh, input_count: int) -> tuple[IntArray, IntArray]:
-    """Number the checked mesh's vertices as the input does; those that a repair added come after them.
+    """Return the numbering of the result's vertices: those of the input, then those that a repair added.
 
     Returns:
-        (n,) the number of each vertex of the checked mesh, and (r,) the input vertex of each number.
+        (n,) the index in the result of each vertex of the checked mesh, and (r,) the input vertex of each index.
     """
     origin = checked.vertex_origin
     is_added = np.zeros(len(origin), dtype=bool)
@@ -78,30 +78,32 @@ def result_numbering(checked: CheckedMesh, input_count: int) -> tuple[IntArray, 
 
 
 def at_unit_size(checked: CheckedMesh) -> CheckedMesh:
-    """Return the mesh scaled by a power of two, which rounds nothing, so that squares of lengths are not extremes.
+    """Return the mesh scaled to about unit size by a power of two.
+
+    This is exact, and avoids underflow and overflow of squared lengths.
 
     Raises:
-        NonFiniteError: it is so small that UV units per unit of length are beyond numbers.
+        NonFiniteError: the mesh is so small that UV units per unit of length are not finite.
     """
     size = float(np.abs(checked.mesh.vertices).max())
     if size < SMALLEST:
-        raise NonFiniteError(f"positions of at most {size:.3g} are below double precision: scale the mesh")
+        raise NonFiniteError(f"coordinates of at most {size:.3g} are too small: scale the mesh")
     exponent = -unit_exponent(checked.mesh.vertices)
     mesh = checked.mesh.moved_to(np.ldexp(checked.mesh.vertices, exponent))
     return replace(checked, mesh=mesh, exponent=exponent)
 
 
-def turn_corners(checked: CheckedMesh, per_corner: Values) -> Values:
-    """Bring values at the input's triangle corners (m, 3) to the faces of the checked mesh."""
+def reorder_corners(checked: CheckedMesh, per_corner: Values) -> Values:
+    """Return values (m, 3) at triangle corners of the input, rearranged for the faces of the checked mesh."""
     values = per_corner[checked.face_origin]
     return np.where(checked.is_turned[:, None], values[:, [0, 2, 1]], values)
 
 
 def lengths_of_input(checked: CheckedMesh, lengths: ArrayLike, face_count: int) -> FloatArray:
-    """Bring a metric that the user gives to the checked mesh: (m, 3) side lengths there, at its size.
+    """Return (m, 3) the side lengths given by the user, for the checked mesh and at its size.
 
-    Faces that a repair dropped do not matter, nor that both sides agree where it separated them. Triangles may be flat,
-    as `mollify` is to open them.
+    Faces that a repair removed are ignored, and the two sides of an edge that it separated may differ. Triangles may be
+    degenerate, because `mollify` opens them later.
 
     Args:
         checked: the mesh.
@@ -109,8 +111,8 @@ def lengths_of_input(checked: CheckedMesh, lengths: ArrayLike, face_count: int) 
         face_count: f.
 
     Raises:
-        ArrayShapeError, NonFiniteError, LengthError: they are not a metric; by the input's numbers.
+        ArrayShapeError, NonFiniteError, LengthError: the lengths are not a metric; messages use the input's indices.
     """
-    values = turn_corners(checked, as_lengths(lengths, face_count))
+    values = reorder_corners(checked, as_lengths(lengths, face_count))
     names = {"face_names": checked.face_origin, "vertex_names": checked.vertex_origin}
     return np.ldexp(check_lengths(checked.mesh, values, flat=True, **names), checked.exponent)

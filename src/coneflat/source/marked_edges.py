@@ -1,4 +1,4 @@
-"""Edges that the user wants cut in any case."""
+"""Edges that the user marks as seams, and edges that must not be cut."""
 
 from __future__ import annotations
 
@@ -15,20 +15,24 @@ from ..mesh.check import CheckedMesh
 from ..mesh.connectivity import TriangleMesh, label_components
 from ..mesh.ties import tie_key
 from ..options import Options
-from .input_mesh import InputMesh, turn_corners
+from .input_mesh import InputMesh, reorder_corners
 
-# Of a vertex: what its key adds to the size of a place.
+# Contribution of a vertex's tie-breaking key to the size of a region.
 TIE_BREAK = 1e-6
 
 
 def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh, forbidden: BoolArray) -> BoolArray:
-    """Return (e,) True for inner edges that are to be seams: named, sharp, or seams of the input's own UVs.
+    """Return (e,) whether each edge is an inner edge marked as a seam: named, sharp, or a seam of the input's UVs.
 
-    forbidden: (e,) edges that are not to be cut, sharp or not.
+    Args:
+        checked: the mesh with e edges.
+        options: the options.
+        given: the input.
+        forbidden: (e,) edges that must not be cut, even if they are sharp.
 
     Raises:
         OptionError: a pair of vertices is not an edge; the input has no UVs.
-        SeamError: a pair of vertices is forbidden.
+        SeamError: a named edge is forbidden.
     """
     mesh = checked.mesh
     marked = np.zeros(len(mesh.edges), dtype=bool)
@@ -51,25 +55,27 @@ def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh, forbi
 
 
 def _word_and_pairs(seams: Any) -> tuple[str | None, IntArray | None]:
-    """Return the word and the pairs of vertices that the option `seams` consists of."""
+    """Return the word and the pairs of vertices in the option `seams`, each None if missing."""
     if isinstance(seams, tuple):
         return seams
     return (seams, None) if isinstance(seams, str) else (None, seams)
 
 
 def effective_marks(mesh: TriangleMesh, marked: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return the marked edges that cut something, and those that do not: alone, their ends are the same on both sides.
+    """Return the marked edges that cut the mesh, and the isolated ones, which do not.
+
+    Cutting a single edge splits neither of its ends, unless one is on the boundary or on another marked edge.
 
     marked: (e,) inner edges.
     """
     at = np.bincount(mesh.edges[marked].ravel(), minlength=len(mesh.vertices))
-    falls_apart = (at > 1) | mesh.is_boundary_vertex
-    cuts = falls_apart[mesh.edges].any(axis=1)
+    is_split = (at > 1) | mesh.is_boundary_vertex
+    cuts = is_split[mesh.edges].any(axis=1)
     return np.flatnonzero(marked & cuts), np.flatnonzero(marked & ~cuts)
 
 
 def named_edges(checked: CheckedMesh, pairs: IntArray) -> IntArray:
-    """Return the edges between pairs (k, 2) of the input's vertices.
+    """Return the indices of the edges between pairs (k, 2) of the input's vertices.
 
     Raises:
         OptionError: a pair of vertices is not an edge.
@@ -91,9 +97,12 @@ def named_edges(checked: CheckedMesh, pairs: IntArray) -> IntArray:
 
 
 def forbidden_edges(checked: CheckedMesh, options: Options, count: int) -> BoolArray:
-    """Return (e,) True for the edges of the option `no_seams`; those between its vertices if it names vertices.
+    """Return (e,) whether each edge is forbidden by `no_seams`; if this has vertices, edges between two of them are.
 
-    count: of the input's vertices.
+    Args:
+        checked: the mesh with e edges.
+        options: the options.
+        count: number of the input's vertices.
 
     Raises:
         OptionError: a vertex or an edge does not exist.
@@ -103,28 +112,29 @@ def forbidden_edges(checked: CheckedMesh, options: Options, count: int) -> BoolA
         forbidden = np.zeros(len(checked.mesh.edges), dtype=bool)
         forbidden[named_edges(checked, given)] = True
         return forbidden
-    strange = given[(given < 0) | (given >= count)]
-    if len(strange):
-        raise OptionError(f"no_seams: {strange[0]} is not a vertex: these are numbered from 0 to {count - 1}")
+    invalid = given[(given < 0) | (given >= count)]
+    if len(invalid):
+        raise OptionError(f"no_seams: {invalid[0]} is not a vertex: indices are from 0 to {count - 1}")
     inside = np.zeros(count, dtype=bool)
     inside[given] = True
     ends: BoolArray = inside[checked.vertex_origin][checked.mesh.edges]
     return ends[:, 0] & ends[:, 1]
 
 
-def out_of_reach(mesh: TriangleMesh, is_forbidden: BoolArray) -> IntArray:
-    """Return the vertices of a connected mesh to which no seam gets from most of the others, or from the boundary.
+def unreachable(mesh: TriangleMesh, is_forbidden: BoolArray) -> IntArray:
+    """Return the vertices of a connected mesh that no seam can reach from its largest region of allowed edges.
 
-    None where nothing may be cut at all: it is the seams, then, that cannot be had, and not the cones.
+    With a boundary, that region must touch it. If all edges are forbidden, the result is empty, because then the error
+    is about the seams and not about the cones.
 
-    is_forbidden: (m, 3) sides that are not cut.
+    is_forbidden: (m, 3) sides that must not be cut.
     """
-    barred = is_forbidden.ravel()[mesh.edge_halfedges[:, 0]] & ~mesh.is_boundary_edge
-    ways = mesh.edges[~barred]
-    if not len(ways):
+    is_blocked = is_forbidden.ravel()[mesh.edge_halfedges[:, 0]] & ~mesh.is_boundary_edge
+    allowed = mesh.edges[~is_blocked]
+    if not len(allowed):
         return np.empty(0, dtype=np.int64)
-    number, label = label_components(len(mesh.vertices), ways[:, 0], ways[:, 1])
-    # Of places that are equally large, one that does not depend on numbers.
+    number, label = label_components(len(mesh.vertices), allowed[:, 0], allowed[:, 1])
+    # Among regions of equal size, the choice must not depend on the numbering.
     sizes = np.bincount(label, weights=1 + TIE_BREAK * tie_key(mesh.vertices), minlength=number)
     if mesh.is_boundary_vertex.any():
         sizes[np.bincount(label[mesh.is_boundary_vertex], minlength=number) == 0] = 0
@@ -132,11 +142,11 @@ def out_of_reach(mesh: TriangleMesh, is_forbidden: BoolArray) -> IntArray:
 
 
 def _seams_of_input(checked: CheckedMesh, given: InputMesh) -> BoolArray:
-    """Return (e,) True where the sides of an edge have different UVs in the input's file."""
+    """Return (e,) whether the two sides of each edge have different UVs in the input's file."""
     texture = given.corner_texture()
     if texture is None:
-        raise OptionError("the input has no UV coordinates whose seams could be kept")
+        raise OptionError("the input has no UV coordinates, so it has no seams to use")
     mesh = checked.mesh
     marked = np.zeros(len(mesh.edges), dtype=bool)
-    marked[point_seams(mesh, turn_corners(checked, texture))] = True
+    marked[point_seams(mesh, reorder_corners(checked, texture))] = True
     return marked

@@ -46,7 +46,7 @@ class TestForm:
             ("=3", "'=3' is not a requirement"),
             ("flipped=none", "'none' is not a number"),
             ("flipped=nan", "'nan' is not a number"),
-            ("beauty=1", "no measure 'beauty': choose from .*area_std, .*flipped, .*overlap, "),
+            ("beauty=1", "unknown measure 'beauty': choose from .*area_std, .*flipped, .*overlap, "),
         ],
     )
     def test_what_is_none(self, text, message):

@@ -20,7 +20,7 @@ from coneflat.apps.peers.methods import PEERS as METHODS_OF_OTHERS
 from coneflat.apps.peers.packages import PEERS, installed_peers, with_uv
 from coneflat.apps.peers.paper import METHODS as PAPER_METHODS
 from coneflat.apps.peers.paper import MODELS, model_of
-from coneflat.apps.peers.pictures import Sight, draw_layouts, draw_qualities, turned_alike
+from coneflat.apps.peers.pictures import Sight, aligned_layouts, draw_layouts, draw_qualities
 from coneflat.apps.peers.run import COLUMNS, COMPARED, Comparison, Entry, comparison_csv, comparison_markdown
 
 
@@ -97,8 +97,8 @@ def test_models_are_known_by_their_names(tmp_path):
     assert model_of(tmp_path / "Rocker-Arm.OBJ") == "rockerarm"
     assert model_of(tmp_path / "isi_horse.ply") == "isi-horse"
     assert model_of(tmp_path / "cow.obj") is None
-    assert MODELS["fandisk"].has_as_many(12_946)
-    assert not MODELS["hand"].has_as_many(15_982)
+    assert MODELS["fandisk"].has_same_size(12_946)
+    assert not MODELS["hand"].has_same_size(15_982)
     assert MODELS["torso"].qc == {"linear-abf/free": 1.004, "linear": 1.005}
 
 
@@ -211,7 +211,7 @@ def rotated(result, angle, factor=1.0, shift=0.0):
 def test_layouts_are_turned_back_to_lie_as_the_first(hill, angle):
     others = [rotated(hill, angle), rotated(hill, angle, 0.4, 3.0)]
     entries = [Entry("a", hill, 1.0), *(Entry("b", each, 1.0) for each in others)]
-    first, second, third = turned_alike(entries)
+    first, second, third = aligned_layouts(entries)
     assert first is hill
     sides = [np.diff(each.uv[each.uv_faces], axis=1) for each in (first, second, third)]
     np.testing.assert_allclose(sides[1], sides[0], atol=1e-12)
@@ -220,7 +220,7 @@ def test_layouts_are_turned_back_to_lie_as_the_first(hill, angle):
 
 def test_layouts_of_other_charts_stay(hill):
     other = coneflat.flatten(*shapes.box(3), sharp_angle=1.0)
-    assert turned_alike([Entry("a", hill, 1.0), Entry("b", other, 1.0)])[1] is other
+    assert aligned_layouts([Entry("a", hill, 1.0), Entry("b", other, 1.0)])[1] is other
 
 
 @pytest.mark.parametrize("stretch", [1.0, 8.0])

@@ -100,7 +100,7 @@ class TestWhatIsNone:
         [
             ("turns", None, "holds no integer grid: 'turns' is missing"),
             ("turns", 7, "'turns' has indices beyond"),
-            ("shifts", 7, "its turns and shifts are not those of its corners"),
+            ("shifts", 7, "its turns and shifts do not match its corners"),
             ("faces", 10**6, "'faces' has indices beyond"),
             ("corner_grid", np.inf, "not finite"),
             ("cones", -1, "'cones' has indices beyond"),

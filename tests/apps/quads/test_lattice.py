@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from coneflat.apps.quads.lattice import Lattice, reduce_basis, whole_solutions
+from coneflat.apps.quads.lattice import Lattice, integer_solutions, reduce_basis
 
 
 def random_gram(rng, size):
@@ -27,7 +27,7 @@ def test_solutions_are_all_solutions(seed):
     rows = rng.integers(-2, 3, size=(3, 6))
     rows[2] = rows[0] + rows[1]  # one depends on the others
     known = rng.integers(-5, 6, size=6)
-    found = whole_solutions(rows, rows @ known)
+    found = integer_solutions(rows, rows @ known)
     assert found is not None
     assert (rows @ found.one == rows @ known).all()
     assert not (rows @ found.basis).any()
@@ -37,9 +37,9 @@ def test_solutions_are_all_solutions(seed):
 
 
 def test_what_has_no_whole_solution():
-    assert whole_solutions(np.array([[2, 4]]), np.array([3])) is None
-    assert whole_solutions(np.array([[1, 1], [2, 2]]), np.array([1, 3])) is None
-    assert whole_solutions(np.zeros((1, 2), dtype=int), np.array([1])) is None
+    assert integer_solutions(np.array([[2, 4]]), np.array([3])) is None
+    assert integer_solutions(np.array([[1, 1], [2, 2]]), np.array([1, 3])) is None
+    assert integer_solutions(np.zeros((1, 2), dtype=int), np.array([1])) is None
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -105,7 +105,7 @@ def test_what_is_no_grid_map_is_refused():
     with pytest.raises(GridError, match="grid units apart|flipped"):
         extract_quads(broken(grid, corner_grid=corners))
     with pytest.raises(
-        GridError, match=r"8 vertices with other angles than said: .* has 3 quarter turns, not 4"
+        GridError, match=r"8 vertices with unexpected angles: .* has 3 quarter turns, expected 4"
     ):
         extract_quads(broken(grid, cones=grid.cones[:0], quarters=grid.quarters[:0]))
     with pytest.raises(GridError, match="flipped"):

@@ -57,7 +57,7 @@ def test_a_grid_may_be_given():
     mesh = coneflat.quads(own, smooth=0)
     assert len(mesh.quads) == 32 * 16
     assert mesh.notes == ("As given.",)
-    with pytest.raises(OptionError, match="a grid has its"):
+    with pytest.raises(OptionError, match="a grid already has"):
         coneflat.quads(own, quads=100)
 
 

@@ -16,7 +16,7 @@ from coneflat.apps.quads.layout import aligned, split_edges
 from coneflat.apps.quads.nearest import Stars, slide_near
 from coneflat.apps.quads.quad_mesh import least_jacobians
 from coneflat.apps.quads.quality import measure_quads
-from coneflat.apps.quads.smooth import lift_worst, smooth_quads, untangled
+from coneflat.apps.quads.smooth import improve_worst, smooth_quads, untangled
 from coneflat.errors import OptionError
 from coneflat.geometry.planar import signed_double_areas
 from coneflat.geometry.triangles import double_areas, edge_lengths
@@ -58,11 +58,11 @@ def test_worst_quads_are_lifted():
     assert least_jacobians(places, mesh.quads).min() < 0
     others = np.arange(len(places)) != at
     before = places.copy()
-    lift_worst(places, mesh.quads, on, weights, ~others, surface)
+    improve_worst(places, mesh.quads, on, weights, ~others, surface)
     assert least_jacobians(places, mesh.quads).min() > 0.5
     np.testing.assert_array_equal(places[others], before[others])
     np.testing.assert_allclose(surface.at(on, weights), places, atol=1e-12)
-    lift_worst(before, mesh.quads, on, weights, np.zeros(len(places), dtype=bool), surface)
+    improve_worst(before, mesh.quads, on, weights, np.zeros(len(places), dtype=bool), surface)
     np.testing.assert_allclose(before[at], [4.6, 3.1, 0])
 
 

@@ -97,7 +97,7 @@ def test_the_page_of_quads():
     assert head["squares"] ** 2 == pytest.approx(len(mesh.quads))
     assert head["show"] == "charts"
     assert head["title"].startswith(f"{len(mesh.quads)} quads")
-    assert ["irregular", "12", "inner vertices of other valence than 4: 10 of 3, 2 of 5"] in head["rows"]
+    assert ["irregular", "12", "inner vertices with a valence other than 4: 10 of 3, 2 of 5"] in head["rows"]
     assert ["black dots", "2", "vertices with more than four quads"] in head["rows"]
 
 

@@ -1,4 +1,4 @@
-"""Other methods on the same cones and cut, methods side by side, and the paper's experiments.
+"""Other flattening methods with the same cones and cut, their comparison, and the paper's experiments.
 
 Examples:
     >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]

@@ -1,8 +1,8 @@
 """Angle based flattening with cones: ABF++, and its linear approximation.
 
 The conditions under which corner angles are those of a flat metric (A. Sheffer, E. de Sturler, "Parameterization of
-faceted surfaces for meshing using angle-based flattening", 2001) are stated for a disk there. They are local, so that
-cones and any topology fit in.
+faceted surfaces for meshing using angle-based flattening", 2001) are stated there for a disk. They are local, so they
+extend to cones and to any topology.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ from ...mesh import NEXT, PREVIOUS
 from ...stages import ConeSolution, Cut, Embedding, FlatMetric, SolveStatistics
 from .shared import embedding_metric, failure_notes
 
-# Smaller angles, radians, are rounded to 0 in needles; their logs and relative squares are to be finite.
+# Lower bound of angles, radians: those of needles can be rounded to 0, but their logs and relative squares must be
+# finite.
 LEAST_ANGLE = 1e-8
-# ABF++: steps at most; what conditions may be off by in the end, radians and logs; and the largest change of an angle
-# that another step would make: conditions are to hold exactly, while a minimum need not be found to the last digits.
+# ABF++: largest number of steps; tolerance of the conditions, radians and logs; and largest change of an angle by a
+# further step. Conditions must hold accurately, but the minimum need not be found to the last digits.
 STEPS, TOLERANCE, LAST_CHANGE = 100, 1e-9, 1e-6
 
 
-#: Returns (3m,) angles, Newton steps, and whether they converged, from conditions and wanted angles.
+#: Returns (3m,) angles, the number of Newton steps, and whether they converged, from conditions and target angles.
 Solve: TypeAlias = Callable[["AngleConditions", FloatArray], tuple[FloatArray, int, bool]]
 
 
@@ -46,19 +47,19 @@ def angle_based(
     """Return the angle based flattening of a mesh.
 
     Args:
-        mesh: connected.
+        mesh: a connected mesh.
         lengths: (m, 3) its side lengths.
         solution: cones and their curvatures.
-        solve: `linear_angles`, or `nearest_angles`.
-        best_effort: take angles that did not converge.
-        is_free: cut first and prescribe nothing at cones and seams, as in 2008; the seams are a free boundary then.
+        solve: `linear_angles` or `nearest_angles`.
+        best_effort: accept angles that did not converge.
+        is_free: cut first and prescribe nothing at cones and seams, as in 2008; seams are then a free boundary.
     """
 
     def embed(cut: Cut) -> Embedding:
-        """Return the least squares reconstruction, at the mesh's area.
+        """Return the least squares reconstruction from angles, with the area of the mesh.
 
         Raises:
-            ConvergenceError: the solve ends short of its tolerance, unless `best_effort`.
+            ConvergenceError: the solver did not reach its tolerance, unless `best_effort`.
             CurvatureError: a cone is too wide for its triangles.
         """
         notes: list[str] = []
@@ -78,7 +79,7 @@ def angle_based(
         shapes = shapes_of_angles(angles.reshape(-1, 3))
         broken = int(shapes.is_broken.sum())
         if broken:
-            notes.append(f"{plural(broken, 'triangle')} got an angle below 0: method 'abf++' allows none.")
+            notes.append(f"{plural(broken, 'triangle')} with an angle below 0: method 'abf++' avoids this.")
         statistics = SolveStatistics(newton_steps=steps, residual=residual, broken=broken)
         return Embedding(fit_shapes(cut.mesh, shapes, lengths), statistics, tuple(notes))
 
@@ -86,29 +87,31 @@ def angle_based(
 
 
 def nearest_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[FloatArray, int, bool]:
-    """Return the angles of a flat metric whose differences from those wanted have the least sum of relative squares.
+    """Return the angles of a flat metric with the least sum of squared relative differences from target angles (ABF++).
 
-    ABF++ (A. Sheffer, B. Levy, M. Mogilnitsky, A. Bogomyakov, "ABF++: fast and robust angle based flattening", 2005):
-    Newton's method for sum w (x - wanted)^2 / 2, w = 1 / wanted^2, with Lagrange multipliers, each system reduced to
-    the multipliers of vertices. Products of sines are taken by their logs here: that makes the second derivative of
-    the Lagrangian diagonal with nothing neglected, and convergence quadratic where it stays positive.
+    Newton's method for sum w (x - wanted)^2 / 2, w = 1 / wanted^2, with Lagrange multipliers, where each system is
+    reduced to the multipliers of vertices. Logs replace products of sines: this makes the second derivative of the
+    Lagrangian diagonal without approximation, and convergence quadratic where it stays positive.
 
-    A step that would take angles more than half way to 0 or pi is shortened to that, and their weights grow. The
-    Lagrangian has a saddle point and no minimum, so that a line search as in `linalg.newton` would have no measure.
+    A step that would move angles more than half way to 0 or pi is shortened, and their weights are increased. The
+    Lagrangian has a saddle point and no minimum, so a line search as in `linalg.newton` has no merit function.
 
     Args:
-        conditions: to be fulfilled.
-        wanted: (3m,) radians, positive and less than pi.
+        conditions: the conditions on angles.
+        wanted: (3m,) target angles, radians, positive and less than pi.
 
     Returns:
-        (3m,) radians; Newton steps; and whether the angles are what was sought.
+        (3m,) radians; the number of Newton steps; and whether the angles converged.
+
+    References:
+        A. Sheffer, B. Levy, M. Mogilnitsky, A. Bogomyakov, "ABF++: fast and robust angle based flattening", 2005.
     """
     angles, weights = wanted.copy(), wanted**-2
     sums = len(conditions.totals)
     forces = np.zeros(sums + conditions.ratios.shape[0])
     residual = conditions.residual(angles)
     for count in range(STEPS + 1):
-        # A part of the objective's own second derivative is kept at least, so that each step has a minimum.
+        # At least a tenth of the objective's second derivative remains, so that each step has a minimum.
         bend = -(conditions.ratios.T @ forces[sums:]) / np.sin(angles) ** 2
         step, pushed = least_change(
             conditions.slopes(angles),
@@ -121,31 +124,33 @@ def nearest_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[Flo
         converged = residual <= TOLERANCE and change <= LAST_CHANGE
         if converged or count == STEPS or not np.isfinite(change):
             break
-        room = 0.5 * np.where(step < 0, angles, np.pi - angles)
-        goes_far = np.abs(step) > room
-        part = float((room[goes_far] / np.abs(step[goes_far])).min(initial=1.0))
-        weights[goes_far] *= 2.0
-        angles += part * step
-        forces += part * (pushed - forces)
+        bound = 0.5 * np.where(step < 0, angles, np.pi - angles)
+        is_long = np.abs(step) > bound
+        fraction = float((bound[is_long] / np.abs(step[is_long])).min(initial=1.0))
+        weights[is_long] *= 2.0
+        angles += fraction * step
+        forces += fraction * (pushed - forces)
         residual = conditions.residual(angles)
     return angles, count, converged
 
 
 def linear_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[FloatArray, int, bool]:
-    """Return the angles that fulfil the conditions to first order with the least relative change.
+    """Return the angles that satisfy the conditions to first order with the least relative change.
 
-    R. Zayer, B. Levy, H.-P. Seidel, "Linear angle based parameterization", 2007: the logarithm of the wheel condition
-    is expanded about the wanted angles. With the sums around vertices and in triangles, which are linear, it makes a
-    system A x = b in the errors x of these angles; with D, diagonal, of the angles themselves, the D^-1 x of least
-    norm is D A^T (A D^2 A^T)^-1 b: one solve. The angles are not bound to be positive, and fulfil wheel
-    conditions up to the square of the errors.
+    The logarithm of the wheel condition is linearised at the target angles. With the linear conditions on sums around
+    vertices and in triangles, this is a system A x = b for the changes x of the angles. With the diagonal matrix D of
+    the target angles, the D^-1 x of least norm is D A^T (A D^2 A^T)^-1 b, which needs one solve. The angles can be
+    negative, and satisfy the wheel conditions up to the square of the changes.
 
     Args:
-        conditions: to be fulfilled.
-        wanted: (3m,) radians, positive and less than pi.
+        conditions: the conditions on angles.
+        wanted: (3m,) target angles, radians, positive and less than pi.
 
     Returns:
-        As `nearest_angles`.
+        The same as `nearest_angles`.
+
+    References:
+        R. Zayer, B. Levy, H.-P. Seidel, "Linear angle based parameterization", 2007.
     """
     off, slopes = conditions.off(wanted), conditions.slopes(wanted)
     change, _ = least_change(slopes, off, excess_of(wanted), wanted**-2, np.zeros_like(wanted))
@@ -154,18 +159,18 @@ def linear_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[Floa
 
 @dataclass(frozen=True, eq=False)
 class AngleConditions:
-    """What the (3m,) corner angles of a mesh have to fulfil, apart from summing to pi in triangles.
+    """The conditions on the (3m,) corner angles of a mesh, in addition to sums of pi in triangles.
 
-    A sine is the length of the side opposite, over the diameter of the triangle's circumcircle. So along a strip of
-    triangles, log sines before and behind each edge that is crossed add up to what the size changes by; it must not
-    change around a vertex (the wheel condition), a handle, or a hole. A cone makes no difference to that. Those around
-    inner vertices, handles and all holes but one are independent and imply the others; without a boundary, one
-    vertex follows from the rest, for angle sums (Gauss-Bonnet) and wheels alike.
+    The sine of an angle is the length of the opposite side over the diameter of the circumcircle. So along a strip of
+    triangles, the differences of log sines at the crossed edges add up to the change of size. This must be zero around
+    a vertex (the wheel condition), along a handle and around a hole, also at cones. The conditions of inner vertices,
+    handles and all holes but one are independent and imply the others. Without a boundary, the conditions of one vertex
+    follow from the rest, both the angle sum (Gauss-Bonnet) and the wheel condition.
 
     Attributes:
-        sums: (k, 3m) the angles around each inner vertex, with 1.
-        totals: (k,) what they sum to: 2 pi, or the angle of the cone.
-        ratios: (l, 3m) of +1 and -1, of log sines that sum to zero.
+        sums: (k, 3m) matrix with 1 for the angles around each inner vertex.
+        totals: (k,) their sums: 2 pi, or the cone angle.
+        ratios: (l, 3m) matrix of +1 and -1 for log sines that sum to zero.
     """
 
     sums: csr_matrix
@@ -173,11 +178,11 @@ class AngleConditions:
     ratios: csr_matrix
 
     def off(self, angles: FloatArray) -> FloatArray:
-        """Return (k + l,) by how much angles fail: radians, and logs of ratios of lengths."""
+        """Return (k + l,) the errors of the conditions: radians, and logs of ratios of lengths."""
         return np.concatenate([self.sums @ angles - self.totals, self.ratios @ np.log(np.sin(angles))])
 
     def residual(self, angles: FloatArray) -> float:
-        """Return the largest of what the conditions, those on triangles among them, are off by."""
+        """Return the largest error of the conditions, including the angle sums of triangles."""
         return float(np.abs(self.off(angles)).max(initial=np.abs(excess_of(angles)).max()))
 
     def slopes(self, angles: FloatArray) -> csr_matrix:
@@ -186,16 +191,16 @@ class AngleConditions:
 
 
 def excess_of(angles: FloatArray) -> FloatArray:
-    """Return (m,) what triangles with (3m,) corner angles have in excess of half a turn."""
+    """Return (m,) the angle sum of each triangle minus pi, for corner angles (3m,)."""
     return angles.reshape(-1, 3).sum(axis=1) - np.pi
 
 
 def angle_conditions(mesh: TriangleMesh, curvature: FloatArray) -> AngleConditions:
-    """Return the conditions for a flat metric with the given (n,) curvature inside; the boundary is free.
+    """Return the conditions for a flat metric with given curvatures at inner vertices; the boundary is free.
 
     Args:
-        mesh: connected.
-        curvature: radians; what it is on the boundary does not matter.
+        mesh: a connected mesh.
+        curvature: (n,) radians; ignored on the boundary.
     """
     inside = np.flatnonzero(~mesh.is_boundary_vertex)
     if len(inside) == len(mesh.vertices):
@@ -219,7 +224,7 @@ def angle_conditions(mesh: TriangleMesh, curvature: FloatArray) -> AngleConditio
 
 
 def _strip_ratios(mesh: TriangleMesh, strips: list[IntArray]) -> csr_matrix:
-    """Return (k, 3m) +1 at the corner opposite each half-edge that a strip crosses, -1 at that opposite its twin."""
+    """Return (k, 3m) with +1 at the corner opposite each half-edge that a strip crosses, -1 opposite its twin."""
     crossed = np.concatenate([*strips, np.empty(0, dtype=np.int64)])
     rows = np.repeat(np.arange(len(strips)), [len(strip) for strip in strips])
     columns = np.concatenate([crossed, halfedge_twins(mesh)[crossed]])
@@ -228,35 +233,35 @@ def _strip_ratios(mesh: TriangleMesh, strips: list[IntArray]) -> csr_matrix:
 
 
 def wanted_angles(mesh: TriangleMesh, angles: FloatArray, curvature: FloatArray) -> FloatArray:
-    """Return (3m,) the mesh's angles, scaled at each inner vertex so that they sum to what is wanted there.
+    """Return (3m,) the target angles: those of the mesh, scaled at each inner vertex to the prescribed sum.
 
-    These are the optimal angles of angle based flattening (as in ABF++, Sheffer et al. 2005), with the angle of the
-    cone for a full turn. Where one would get to half a turn, all around the vertex are made equal instead.
+    These are the optimal angles of angle based flattening (as in ABF++, Sheffer et al. 2005), with the cone angle
+    instead of 2 pi at cones. If a scaled angle is pi or more, all angles at the vertex are equal instead.
 
     Args:
         mesh: the mesh.
-        angles: (m, 3) of its triangles, radians.
-        curvature: (n,) wanted, radians.
+        angles: (m, 3) angles of its triangles, radians.
+        curvature: (n,) target curvature, radians.
 
     Raises:
-        CurvatureError: a cone has an angle of half a turn and more for each of its triangles, or none.
+        CurvatureError: a cone angle is 0, or at least pi times the number of its triangles.
     """
     at = mesh.faces.ravel()
     angles = np.maximum(angles, LEAST_ANGLE)
     count = np.bincount(at, minlength=len(mesh.vertices))
     total = np.bincount(at, angles.ravel(), len(mesh.vertices))
     wanted = np.where(mesh.is_boundary_vertex, total, 2 * np.pi - curvature)
-    closed = np.flatnonzero(wanted <= LEAST_ANGLE)
-    if len(closed):
+    low = np.flatnonzero(wanted <= LEAST_ANGLE)
+    if len(low):
         raise CurvatureError(
-            f"{plural(len(closed), 'cone')} without an angle: no triangles make one of "
-            f"{wanted[closed[0]] / np.pi:.4g} pi; ask for curvatures below 2 pi"
+            f"{plural(len(low), 'cone')} whose angle is not positive: {wanted[low[0]] / np.pi:.4g} pi; "
+            "curvatures must be below 2 pi"
         )
-    crowded = np.flatnonzero(wanted >= np.pi * count)
-    if len(crowded):
-        worst = crowded[0]
+    wide = np.flatnonzero(wanted >= np.pi * count)
+    if len(wide):
+        worst = wide[0]
         raise CurvatureError(
-            f"{plural(len(crowded), 'cone')} too wide for the triangles around: {count[worst]} of them cannot make an "
+            f"{plural(len(wide), 'cone')} too wide for the triangles around: {count[worst]} of them cannot hold an "
             f"angle of {wanted[worst] / np.pi:.4g} pi; choose others, or remesh"
         )
     scaled: FloatArray = angles.ravel() * (wanted / total)[at]
@@ -268,17 +273,17 @@ def wanted_angles(mesh: TriangleMesh, angles: FloatArray, curvature: FloatArray)
 def least_change(
     slopes: csr_matrix, off: FloatArray, excess: FloatArray, stiffness: FloatArray, pull: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the x that minimises x.(stiffness x) / 2 + pull.x with slopes x = -off, and triangles rid of their excess.
+    """Return the x that minimises x.(stiffness x) / 2 + pull.x with slopes x = -off and triangle sums of pi.
 
-    The conditions on triangles involve three angles each, so they are eliminated with these: what is left is one
-    system in the multipliers of vertices, two for each inner one (the reduction of ABF++, Sheffer et al. 2005).
-    Its matrix is made as a sum of squares, two of them for the two directions in which a triangle's angles can change.
+    The condition of each triangle involves its three angles only, so it is eliminated with these. The remaining system
+    is in the multipliers of vertices, two for each inner one (the reduction of ABF++, Sheffer et al. 2005). Its matrix
+    is a sum of squares, two of them for the two directions in which the angles of a triangle can change.
 
     Args:
         slopes, off: (k, 3m) and (k,) the conditions.
-        excess: (m,) of the sums of triangles.
-        stiffness: (3m,) positive.
-        pull: (3m,).
+        excess: (m,) angle sums of triangles minus pi.
+        stiffness: (3m,) diagonal of the quadratic term, positive.
+        pull: (3m,) linear term.
 
     Returns:
         (3m,) the change, and (k,) the Lagrange multipliers of the conditions.
@@ -298,6 +303,6 @@ def least_change(
     pulled = directions.T @ pull
     right = off + slopes @ given - half @ pulled
     forces = factor.solve(right)
-    # Once more, for what rounding has left.
+    # One step of iterative refinement reduces rounding errors.
     forces += factor.solve(right - half @ (half.T @ forces))
     return given - directions @ (pulled + half.T @ forces), forces

@@ -13,8 +13,8 @@ from ...metric import linear_flat_metric
 from ...stages import ConeSolution, Cut, Embedding, FlatMetric
 from .shared import embedding_metric
 
-# Where sides of seams can close the curve together only by a change of this, root mean square and relative, each gets a
-# length of its own: together they can do little if they are hardly turned against each other.
+# Largest relative change of lengths, root mean square, for which both sides of a seam get equal lengths. Equal lengths
+# have little effect on the gap of the curve if the two sides are nearly parallel; they then get separate lengths.
 LARGEST_CHANGE = 0.1
 
 
@@ -22,24 +22,27 @@ def boundary_first(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSoluti
     """Return the boundary first flattening for given cones.
 
     Args:
-        mesh: connected.
+        mesh: a connected mesh.
         lengths: (m, 3) side lengths, model units.
         solution: cones and the linear log scale, which solves the discrete Cherrier problem of the paper: L u is target
-            less curvature inside, u = 0 on the boundary.
+            minus curvature at inner vertices, u = 0 on the boundary.
 
     Raises:
-        MetricError: scales are so far apart that lengths overflow.
+        MetricError: scales differ so much that lengths overflow.
+
+    References:
+        R. Sawhney, K. Crane, "Boundary first flattening", 2017.
     """
     scaled = linear_flat_metric(mesh, lengths, solution, "mean").flat_lengths
     assert scaled is not None
 
     def embed(cut: Cut) -> Embedding:
-        """Find the boundary curve and extend both coordinates harmonically, as the paper does where there are cones.
+        """Return the harmonic extension of the boundary curve in both coordinates, as in the paper for cones.
 
-        This keeps the curve, and with it both sides of seams equal, and pays in angles. The other extension, by a
-        conjugate harmonic function (the paper's for free boundaries), needs another factorization. Measured, mean QC
-        distortion and seam mismatch: fandisk 1.063, 0 and 1.034, 0.026; bunny 1.056, 0 and 1.029, 0.054. Without
-        seams both are alike: a face 1.02676 and 1.02675.
+        This preserves the curve, so that both sides of seams are equal, but increases angle distortion. The other
+        extension, by a conjugate harmonic function (used in the paper for free boundaries), needs another
+        factorization. Measured mean QC distortion and seam mismatch: fandisk 1.063, 0 and 1.034, 0.026; bunny 1.056, 0
+        and 1.029, 0.054. Without seams the results are similar: a face 1.02676 and 1.02675.
         """
         disk = cut.mesh
         border = disk.boundary_walk()
@@ -48,10 +51,10 @@ def boundary_first(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSoluti
         log_scale[disk.faces] = solution.log_scale[mesh.faces]
         tangents = np.exp(1j * np.cumsum(inside.boundary_curvature(log_scale)[disk.tails[border]]))
         wanted = scaled.ravel()[border]
-        # Half-edges keep their numbers in the cut: both sides of a seam are sides of one edge of the mesh.
+        # Half-edges have the same numbers in the cut mesh: both sides of a seam belong to one original edge.
         found = best_fit_lengths(wanted, lengths.ravel()[border], tangents, mesh.halfedge_edges[border])
         corners = closed_chain(found * tangents)
-        # Far too strong a change turns it inside out.
+        # A very large change of lengths can reverse the orientation of the curve.
         if (np.conj(corners) * np.roll(corners, -1)).sum().imag < 0:
             corners = np.conj(corners)
         curve = np.zeros((2, len(disk.vertices)))
@@ -61,8 +64,8 @@ def boundary_first(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSoluti
         change = float(np.abs(found / wanted - 1).max())
         if change > 0.01:
             notes = (
-                f"The boundary closes after its lengths were changed by up to {100 * change:,.1f} %: with those of the "
-                "linear scale factors it does not.",
+                f"Boundary lengths were changed by up to {100 * change:,.1f} %, because with those of the linear scale "
+                "factors the boundary does not close.",
             )
         return Embedding(points, notes=notes)
 
@@ -70,7 +73,7 @@ def boundary_first(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSoluti
 
 
 class HarmonicExtension:
-    """The Laplacian of a disk with its inner block factorized, which serves every step.
+    """The Laplacian of a disk with its inner block factorized.
 
     Args:
         disk: a topological disk.
@@ -84,15 +87,15 @@ class HarmonicExtension:
         self._inverse = GroundedLaplacian(self._laplacian, self._is_boundary)
 
     def extend(self, values: FloatArray, source: FloatArray | float = 0.0) -> FloatArray:
-        """Return (n,) x with given values on the boundary and L x = source inside."""
+        """Return (n,) the solution x with given values on the boundary and L x = source at inner vertices."""
         fixed = np.where(self._is_boundary, values, 0.0)
         return fixed + self._inverse.solve(source - self._laplacian @ fixed)
 
     def boundary_curvature(self, log_scale: FloatArray) -> FloatArray:
-        """Return (n,) the curvature that scale factors on the boundary lead to there, if there is to be none inside.
+        """Return (n,) the boundary curvature for given scale factors on the boundary and flat inner vertices.
 
-        k + L u, with L u = -K inside: the Dirichlet-to-Neumann map of the paper (Poincare-Steklov operator), for the
-        discrete Cherrier formula.
+        This is k + L u with L u = -K at inner vertices: the Dirichlet-to-Neumann map of the paper (Poincare-Steklov
+        operator), for the discrete Cherrier formula.
         """
         u = self.extend(log_scale, -self._curvature)
         return self._curvature + self._laplacian @ u
@@ -101,16 +104,17 @@ class HarmonicExtension:
 def best_fit_lengths(
     wanted: FloatArray, lengths: FloatArray, tangents: ComplexArray, edge: IntArray
 ) -> FloatArray:
-    """Return (b,) the lengths closest to those wanted with which a curve of given tangents closes.
+    """Return (b,) the lengths closest to target lengths for which a curve with given tangents closes.
 
-    They minimise the squared change over the length on the mesh, under sum of length times tangent = 0 (the best fit
-    curve of the paper, Section 4.3). Both sides of a seam get one length, if that is possible without much change.
+    They minimise the sum of the squared change divided by the length on the mesh, subject to sum of length times
+    tangent = 0 (the best fit curve of the paper, Section 4.3). Both sides of a seam get the same length if this is
+    possible without a large change.
 
     Args:
-        wanted: (b,) lengths.
-        lengths: (b,) those on the mesh.
-        tangents: (b,) unit numbers.
-        edge: (b,) the edge of the mesh that each is a side of.
+        wanted: (b,) target lengths.
+        lengths: (b,) lengths on the mesh.
+        tangents: (b,) complex numbers of absolute value 1.
+        edge: (b,) the edge of the mesh to which each side belongs.
     """
     _, joint = np.unique(edge, return_inverse=True)
     found = _closing_lengths(wanted, lengths, tangents, joint)
@@ -122,12 +126,12 @@ def best_fit_lengths(
 def _closing_lengths(
     wanted: FloatArray, lengths: FloatArray, tangents: ComplexArray, edge: IntArray
 ) -> FloatArray:
-    """Return those for edges numbered from 0; l - N^-1 T^t (T N^-1 T^t)^-1 T l with N = 1 / length, T the tangents."""
+    """Return (b,) the closing lengths l - N^-1 T^t (T N^-1 T^t)^-1 T l with N = 1 / length and T the tangents."""
     inverse_mass = 1 / np.bincount(edge, 1 / lengths)
     effect = np.stack([np.bincount(edge, tangents.real), np.bincount(edge, tangents.imag)])
     gap = np.array([(wanted * tangents.real).sum(), (wanted * tangents.imag).sum()])
-    # Sides that are only shifted against each other cannot open or close anything; where all are, nothing is open.
-    # Below 1e-10 of what lengths could do at most, they have no effect in a direction.
+    # Two sides of a seam that differ by a translation have no effect on the gap; if all do, there is no gap. Directions
+    # in which the effect is below 1e-10 of the largest possible one are ignored.
     system = (effect * inverse_mass) @ effect.T
     strength, axes = np.linalg.eigh(system)
     kept = strength > 1e-10 * inverse_mass.sum()

@@ -1,7 +1,7 @@
 """Circle patterns (Kharevych, Springborn, Schroeder 2006), with cones.
 
-First the nearest angles that a pattern can have, a quadratic program, after edge flips where there are none; then the
-radii of its circles.
+A quadratic program gives the nearest angles of a circle pattern, if necessary after edge flips. Then the radii of its
+circles are computed.
 """
 
 from __future__ import annotations
@@ -39,19 +39,23 @@ def circle_patterns(
     best_effort: bool = False,
     delaunay: bool = True,
 ) -> FlatMetric:
-    """Return the flat metric whose triangles' circumcircles meet at nearly the same angles as on the mesh.
+    """Return the flat metric whose circumcircles intersect at nearly the same angles as on the mesh.
 
     Args:
-        mesh: connected.
+        mesh: a connected mesh.
         lengths: (m, 3) side lengths, model units.
         solution: cones with their curvatures; the boundary is free.
-        best_effort: return a metric that did not converge.
-        delaunay: make the mesh intrinsic Delaunay first, as the paper does; without, angles opposite edges that are
-            not Delaunay are made smaller until these are.
+        best_effort: return a metric even if it did not converge.
+        delaunay: make the mesh intrinsic Delaunay first, as in the paper; otherwise angles opposite edges that are not
+            Delaunay are reduced until they are.
 
     Raises:
         ConvergenceError: there is no such pattern, or it was not found, unless `best_effort`.
         CurvatureError: no metric has the curvatures.
+
+    References:
+        L. Kharevych, B. Springborn, P. Schroeder, "Discrete conformal mappings via circle patterns", ACM Transactions
+        on Graphics 25(2), 2006.
     """
     border = mesh.is_boundary_vertex
     target, _ = checked_target(mesh, np.where(border, 0.0, solution.target), border)
@@ -79,14 +83,14 @@ def circle_patterns(
 def _find_angles(
     triangulation: IntrinsicTriangulation, target: FloatArray, border: BoolArray, delaunay: bool
 ) -> tuple[CoherentAngles, IntArray]:
-    """Return the angles of a pattern, and the half-edges flipped, in place, before there was one."""
+    """Return the angles of a pattern, and the half-edges that were flipped in place to make it feasible."""
     if not delaunay:
         return _nearest_angles(triangulation, target, border), np.empty(0, dtype=np.int64)
     flips = make_delaunay(triangulation)
     coherent = _nearest_angles(triangulation, target, border)
     if not coherent.converged:
-        # Two edges between the same vertices, flat all around, cannot both be straight; nor can there be a cone wider
-        # than the corners at it can be: their mean is to stay below 0.98 pi.
+        # In a flat region, two edges between the same vertices cannot both be straight. And a cone angle is bounded by
+        # the angles of its corners, whose mean must be below 0.98 pi.
         wanted = np.where(border, 0, np.floor((2 * np.pi - target) / (0.98 * np.pi)).astype(np.int64) + 1)
         flips = np.concatenate([flips, make_proper(triangulation, wanted)])
         coherent = _nearest_angles(triangulation, target, border)
@@ -101,24 +105,24 @@ def _nearest_angles(
 
 
 def make_proper(triangulation: IntrinsicTriangulation, wanted: IntArray) -> IntArray:
-    """Flip edges, in place, that have the same ends as others, or one end only, and towards vertices of small degree.
+    """Flip multiple edges and loops, and edges opposite vertices of small degree, in place.
 
-    Intrinsic Delaunay triangulations have some such edges near vertices of large curvature. Of those that
-    can be flipped the one with most room goes first; there are few, so each is looked for anew.
+    Intrinsic Delaunay triangulations have some such edges near vertices of large curvature. The edge with the largest
+    margin of convexity is flipped first; there are few, so the search is repeated after each flip.
 
     Args:
-        triangulation: changed in place, as far as quads are convex.
-        wanted: (n,) number of triangles at each vertex, at least.
+        triangulation: updated in place, where quads are convex.
+        wanted: (n,) least number of triangles at each vertex.
 
     Returns:
-        The half-edges flipped, in order.
+        The flipped half-edges, in order.
     """
     flipped: list[int] = []
     while True:
-        slots, room = _candidates(triangulation, wanted)
+        slots, margin = _candidates(triangulation, wanted)
         if not len(slots):
             return np.array(flipped, dtype=np.int64)
-        h = int(slots[np.argmax(room)])
+        h = int(slots[np.argmax(margin)])
         twin, tail, length = triangulation.twin, triangulation.tail, triangulation.length
         one, two = _around(h), _around(int(twin[h]))
         sides = (h, one[1], one[0], two[0], two[1])
@@ -128,13 +132,13 @@ def make_proper(triangulation: IntrinsicTriangulation, wanted: IntArray) -> IntA
 
 
 def _around(slots: int | IntArray) -> tuple[IntArray, IntArray]:
-    """Return the next and the previous half-edge in the triangle of each."""
+    """Return the next and the previous half-edge in the triangle of each half-edge."""
     base = slots - slots % 3
     return base + NEXT[slots % 3], base + PREVIOUS[slots % 3]
 
 
 def _candidates(triangulation: IntrinsicTriangulation, wanted: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return the half-edges that should be flipped, and can without harm, and their room."""
+    """Return the half-edges that should and can be flipped, and their margins of convexity, radians."""
     twin, tail, count = triangulation.twin, triangulation.tail, triangulation.vertex_count
     every = np.arange(len(twin))
     after, before = _around(every)
@@ -154,21 +158,21 @@ def _candidates(triangulation: IntrinsicTriangulation, wanted: IntArray) -> tupl
     fine = spare[tail[slots]] & spare[tail[other]] & (new[0] != new[1])
     fine &= ~np.isin(_pair(*new, count), known)
     slots = slots[fine]
-    room = _room(triangulation, slots)
-    wide = room > 1e-3  # radians that corners of the quad are short of straight
-    return slots[wide], room[wide]
+    margin = _margin(triangulation, slots)
+    wide = margin > 1e-3  # radians between the corners of the quad and a straight angle
+    return slots[wide], margin[wide]
 
 
 def _pair(one: IntArray, two: IntArray, count: int) -> IntArray:
     return np.minimum(one, two) * count + np.maximum(one, two)
 
 
-def _room(triangulation: IntrinsicTriangulation, slots: IntArray) -> FloatArray:
-    """Return by how much the wider corner at the ends of each edge is short of straight."""
+def _margin(triangulation: IntrinsicTriangulation, slots: IntArray) -> FloatArray:
+    """Return pi minus the larger angle of the quad at the two ends of each edge, radians."""
     lengths, other = triangulation.length.reshape(-1, 3), triangulation.twin[slots]
     one, two = corner_angles(lengths[slots // 3]), corner_angles(lengths[other // 3])
     rows = np.arange(len(slots))
-    # Of a half-edge in slot i, the corner at its tail is i + 1 and the one at its head i + 2.
+    # The half-edge in slot i has corner i + 1 at its tail and corner i + 2 at its head.
     at_tail = one[rows, NEXT[slots % 3]] + two[rows, PREVIOUS[other % 3]]
     at_head = one[rows, PREVIOUS[slots % 3]] + two[rows, NEXT[other % 3]]
     return np.pi - np.maximum(at_tail, at_head)

@@ -1,4 +1,4 @@
-"""Maps of a disk that prescribe no cones."""
+"""Maps of a disk that prescribe no cones: least squares and spectral conformal maps."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ Place: TypeAlias = Callable[[TriangleMesh, FloatArray], FloatArray]
 def map_cut_mesh(
     mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, name: str, place: Place
 ) -> FlatMetric:
-    """Return the map of a mesh, cut open through its cones, by a method that prescribes none.
+    """Return the map of a mesh, cut open through its cones, by a method that prescribes no cones.
 
     Args:
-        mesh: connected.
+        mesh: a connected mesh.
         lengths: (m, 3) side lengths, model units.
-        solution: the cones, which decide where the mesh is cut and no more.
-        name: the method's.
+        solution: the cones, which only determine the cut.
+        name: name of the method.
         place: returns (c, 2) points of a disk, at any scale, given its (m, 3) side lengths.
     """
 
     def embed(cut: Cut) -> Embedding:
         notes = (
             f"The mesh was cut open first, and {name} mapped the disk: it prescribes no cones, and the sides of seams "
-            "come out as they may.",
+            "do not match.",
         )
         return Embedding(place(cut.mesh, lengths), notes=notes if len(cut.seams) else ())
 
@@ -47,18 +47,18 @@ def map_cut_mesh(
 def least_squares_conformal(
     disk: TriangleMesh, lengths: FloatArray, pins: IntArray | None = None
 ) -> FloatArray:
-    """Return (n, 2) the map of a disk that keeps shapes best, in the least squares sense, with two vertices pinned.
+    """Return (n, 2) the least squares conformal map (LSCM) of a disk, with two vertices pinned.
 
-    It minimises the energy of Eq. 4 and 5 of the paper. Triangles may be flipped. The pins decide on
-    more than place and size: scale varies with them.
+    It minimises the energy of Eq. 4 and 5 of the paper (Levy et al. 2002). Triangles may be flipped. The pins affect
+    not only position and size, but also the variation of scale.
 
     Args:
         disk: a topological disk.
         lengths: (m, 3) side lengths; every triangle has area.
-        pins: (2,) the vertices that go to (0, 0) and (1, 0); by default two far apart.
+        pins: (2,) the vertices that are mapped to (0, 0) and (1, 0); by default two distant ones.
 
     Raises:
-        MetricError: there is no finite solution.
+        MetricError: the solution is not finite.
     """
     pins = far_pins(disk, lengths) if pins is None else pins
     z = pinned_least_squares(conformal_equations(disk, lengths), pins)
@@ -67,19 +67,19 @@ def least_squares_conformal(
     return np.stack([z.real, z.imag], axis=1)
 
 
-# What is added to the eigenvalues, times the number of vertices on the boundary, so that none is zero: well below that
-# of a map which keeps angles but for a thousandth, and enough that factorizations see it.
+# Shift of the eigenvalues, times the number of boundary vertices, so that none is zero: well below the eigenvalue of a
+# map with angle errors of a thousandth, and large enough for factorizations.
 SHIFT = 1e-7
-# Restarts of the Arnoldi iteration, which takes a few.
+# Largest number of restarts of the Arnoldi iteration, which normally needs a few.
 RESTARTS = 300
 
 
 def spectral_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
-    """Return (n, 2) the map of a disk with the least conformal energy for the spread of its boundary.
+    """Return (n, 2) the spectral conformal map of a disk: the least conformal energy for a boundary of unit variance.
 
-    This is the Fiedler vector of L_C u = lambda B u, where B is one at boundary vertices and zero inside (Section 3 of
-    the paper): the eigenvector of the smallest lambda among those whose boundary is centred, found, like there, as that
-    of the largest 1 / lambda. No vertex is pinned. Triangles may be flipped.
+    This is the Fiedler vector of L_C u = lambda B u, where B is one at boundary vertices and zero inside (Mullen et al.
+    2008, Section 3): the eigenvector of the smallest lambda among those with centred boundary, computed as that of the
+    largest 1 / lambda. No vertex is pinned. Triangles may be flipped.
 
     Args:
         disk: a topological disk.
@@ -87,7 +87,7 @@ def spectral_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
 
     Raises:
         ConvergenceError: the eigenvector was not found.
-        MetricError: it is not finite.
+        MetricError: the map is not finite.
     """
     walk = disk.boundary_walk()
     border, sides = disk.tails[walk], lengths.ravel()[walk]
@@ -96,17 +96,17 @@ def spectral_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
     equations = conformal_equations(disk, lengths)
     factor = HermitianFactor(csr_matrix(equations.conj().T @ equations + diags(shift)))
 
-    def spread(source: ComplexArray) -> ComplexArray:
-        """Return (n,) a source on the boundary, centred."""
+    def centred(source: ComplexArray) -> ComplexArray:
+        """Return (n,) a source on the boundary minus its mean, and zero inside."""
         right = np.zeros(len(shift), dtype=np.complex128)
         right[border] = source - source.mean()
         return right
 
     def apply(source: ComplexArray) -> ComplexArray:
-        z = factor.solve(spread(source))[border]
+        z = factor.solve(centred(source))[border]
         return z - z.mean()
 
-    # Maps that are turned are alike; which of them comes out, the start decides.
+    # Rotated maps have the same energy; the start vector determines which of them is found.
     start = np.exp(2j * np.pi * (np.cumsum(sides) - sides) / sides.sum())
     operator = LinearOperator((len(border),) * 2, matvec=apply, dtype=np.complex128)
     try:
@@ -116,7 +116,7 @@ def spectral_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
             f"the spectral map of {len(disk.faces):,} triangles was not found in {RESTARTS} restarts of the Arnoldi "
             "iteration: another cut or method 'lscm' may help"
         ) from error
-    right = spread(vectors[:, 0])
+    right = centred(vectors[:, 0])
     z = factor.solve(right)
     z += factor.solve(right - shift * z - equations.conj().T @ (equations @ z))
     if not np.isfinite(z).all():
@@ -125,18 +125,18 @@ def spectral_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
 
 
 def conformal_equations(mesh: TriangleMesh, lengths: FloatArray) -> csr_matrix:
-    """Return the complex (m, n) matrix C that vanishes on maps z to the plane that are similarities on triangles.
+    """Return the complex (m, n) matrix C with C z = 0 for maps z to the plane that are similarities on all triangles.
 
     |C z|^2 is the least squares energy of Levy et al. 2002 (Eq. 4): the rows are the sides opposite the corners, as
-    complex numbers in a frame of the triangle, over the root of its area. It is scaled so that it equals z^H L_C z,
-    twice the Dirichlet energy less the area (Mullen et al. 2008, Section 2.2).
+    complex numbers in a frame of the triangle, divided by the square root of its area. It is scaled to equal z^H L_C z,
+    twice the Dirichlet energy minus the area (Mullen et al. 2008, Section 2.2).
 
     Args:
         mesh: the mesh.
         lengths: (m, 3) side lengths; every triangle has area.
 
     Raises:
-        MetricError: one has none.
+        MetricError: a triangle has no area.
     """
     areas = double_areas(lengths)
     if not (areas > 0).all():
@@ -144,7 +144,7 @@ def conformal_equations(mesh: TriangleMesh, lengths: FloatArray) -> csr_matrix:
             f"{int((~(areas > 0)).sum())} of {plural(len(areas), 'triangle')} without area have no conformal energy"
         )
     angles = corner_angles(lengths)
-    # Walking around a triangle, one turns by the outer angles: side 0 runs ahead, from corner 1 to 2.
+    # The directions of sides differ by the exterior angles; side 0, from corner 1 to 2, has direction 0.
     directions = np.stack([np.zeros(len(angles)), np.pi - angles[:, 2], np.pi + angles[:, 1]], axis=1)
     sides = lengths * np.exp(1j * directions) / np.sqrt(2 * areas)[:, None]
     rows = np.repeat(np.arange(len(sides)), 3)

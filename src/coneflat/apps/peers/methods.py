@@ -1,4 +1,4 @@
-"""Flattening by the methods that the package is compared with, and by its own."""
+"""Flattening by the methods with which the package is compared, and by its own methods."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .circle_patterns import circle_patterns
 from .disk_maps import least_squares_conformal, map_cut_mesh, spectral_conformal
 from .ricci import ricci_flow
 
-#: The methods to compare with; each takes a connected mesh, its (m, 3) side lengths, and cones with their curvatures.
+#: The compared methods; each takes a connected mesh, its (m, 3) side lengths, and cones with their curvatures.
 PEERS: Mapping[str, Callable[..., FlatMetric]] = {
     "circle-patterns": circle_patterns,
     "circle-patterns/fixed": partial(circle_patterns, delaunay=False),
@@ -34,19 +34,19 @@ PEERS: Mapping[str, Callable[..., FlatMetric]] = {
     "spectral": partial(map_cut_mesh, name="the spectral method", place=spectral_conformal),
     "bff": boundary_first,
 }
-#: Those that need not converge, and take `best_effort`.
+#: Methods that may fail to converge, and accept `best_effort`.
 ITERATIVE = ("circle-patterns", "circle-patterns/fixed", "ricci", "abf++")
-#: All methods of `flatten_by`. Those with a / are as used in 2008: circle patterns without flips, and angles that
-#: prescribe nothing at cones.
+#: All methods of `flatten_by`. Those with a / are variants as used in 2008: circle patterns without flips, and angle
+#: based flattening that prescribes nothing at cones.
 METHODS = ("exact", "linear", *PEERS)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PeerOptions(Options):
-    """Options of `coneflat.flatten` with all methods.
+    """Options of `coneflat.flatten`, with all methods.
 
     Attributes:
-        method: The method.
+        method: Name of the method.
     """
 
     method: str = option("exact", Choice(METHODS))
@@ -55,19 +55,20 @@ class PeerOptions(Options):
 def flatten_by(
     name: str, mesh: Any, faces: ArrayLike | None = None, *, best_effort: bool = False, **options: Any
 ) -> Flattening:
-    """Flatten a triangle mesh by a method, in one chart per component by default, which all methods can make.
+    """Flatten a triangle mesh by a given method; the default is one chart per component, which all methods support.
 
     Args:
         name: one of `METHODS`.
         mesh, faces: as for `coneflat.flatten`.
-        best_effort: return a result, with a note, of a method to compare with that did not converge.
-        options: those of `coneflat.flatten`, but for the method. What only the exact method has is refused for others.
+        best_effort: return a result with a note if a compared method did not converge.
+        options: those of `coneflat.flatten`, except the method. Options of the exact method alone raise an error for
+            other methods.
 
     Returns:
-        What `coneflat.flatten` returns.
+        The result, as from `coneflat.flatten`.
 
     Raises:
-        OptionError: there is no such method, or an option makes no sense.
+        OptionError: the method is unknown, or an option is invalid.
         ConvergenceError: the method did not converge.
         ConeflatError: another of the errors of `coneflat.flatten`.
     """

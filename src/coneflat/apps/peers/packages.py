@@ -1,4 +1,4 @@
-"""Other packages that flatten meshes, where they are installed."""
+"""Methods of other packages that flatten meshes, if these are installed."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from ...mesh import uv_seams
 
 @dataclass(frozen=True)
 class Peer:
-    """Another package's method.
+    """A method of another package.
 
     Attributes:
-        module: what is imported.
-        run: takes one of our flattenings, of which it may use the cut, and returns (m, 3, 2) UVs.
-        note: what it does not do as we do.
+        module: the module to import.
+        run: returns (m, 3, 2) UVs for the mesh of a flattening, whose cut it may use.
+        note: how it differs from the methods of this package.
     """
 
     module: str
@@ -39,26 +39,26 @@ def installed_peers() -> tuple[str, ...]:
 
 
 def run_peer(name: str, base: Flattening) -> tuple[Flattening, float]:
-    """Return what a peer makes of the mesh of a flattening, and how many seconds it takes.
+    """Return the result of a peer for the mesh of a flattening, and its running time in seconds.
 
     Raises:
-        MetricError: it fails, or what it returns is not a map of the mesh.
+        MetricError: the peer fails, or its result is not a map of the mesh.
     """
     peer = PEERS[name]
     try:
         import_module(peer.module)
         start = time.perf_counter()
         corner_uv = peer.run(base)
-    except Exception as error:  # whatever others raise
+    except Exception as error:  # other packages may raise anything
         raise MetricError(f"{name} failed: {type(error).__name__}: {error}") from error
     seconds = time.perf_counter() - start
     if corner_uv.shape != (len(base.faces), 3, 2) or not np.isfinite(corner_uv).all():
-        raise MetricError(f"{name} returned no map of the mesh's {len(base.faces):,} triangles")
+        raise MetricError(f"{name} did not return a finite map of all {len(base.faces):,} triangles")
     return with_uv(base, corner_uv), seconds
 
 
 def with_uv(base: Flattening, corner_uv: FloatArray) -> Flattening:
-    """Return the same mesh with other UVs, which has no cones."""
+    """Return a flattening of the same mesh with other UVs and no cones."""
     low = corner_uv.min(axis=(0, 1))
     unit = (corner_uv - low) / max(float((corner_uv.max(axis=(0, 1)) - low).max()), np.finfo(np.float64).tiny)
     at_vertex = np.column_stack([base.faces.ravel(), unit.reshape(-1, 2)])
@@ -82,12 +82,12 @@ def with_uv(base: Flattening, corner_uv: FloatArray) -> Flattening:
 
 
 def _covered(corner_uv: FloatArray) -> float:
-    """Return the area of the triangles in the plane, overlaps counted as often as they are covered."""
+    """Return the sum of the areas of the triangles in the plane."""
     return float(np.abs(signed_double_areas(corner_uv)).sum() / 2)
 
 
 def libigl_lscm(base: Flattening) -> FloatArray:
-    """LSCM of each of our charts, two points far apart pinned; charts at their own areas, side by side."""
+    """Return the LSCM of each chart with two distant points pinned; charts keep their areas and are placed in a row."""
     import igl
 
     points = np.empty((len(base.uv), 3))
@@ -105,7 +105,7 @@ def libigl_lscm(base: Flattening) -> FloatArray:
 
 
 def xatlas_charts(base: Flattening) -> FloatArray:
-    """At a size at which its absolute tolerances do not matter: an area of 10,000."""
+    """Return the UVs of xatlas, run at an area of 10,000 so that its absolute tolerances do not matter."""
     import xatlas
 
     sides = base.vertices[base.faces[:, 1:]] - base.vertices[base.faces[:, :1]]
@@ -115,7 +115,7 @@ def xatlas_charts(base: Flattening) -> FloatArray:
 
 
 def uvunwrap_charts(base: Flattening) -> FloatArray:
-    """With its defaults."""
+    """Return the UVs of uvunwrap with its default options."""
     import uvunwrap
 
     mesh = uvunwrap.Mesh(base.vertices.ravel().tolist(), base.faces.ravel().tolist())
@@ -123,7 +123,7 @@ def uvunwrap_charts(base: Flattening) -> FloatArray:
     return np.array(found.corner_uvs, dtype=np.float64).reshape(-1, 3, 2)
 
 
-#: By name.
+#: Peers by name.
 PEERS = {
     "libigl LSCM": Peer("igl", libigl_lscm, "our cut; prescribes no cones"),
     "xatlas": Peer("xatlas", xatlas_charts, "charts of its own"),

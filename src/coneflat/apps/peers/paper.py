@@ -1,4 +1,4 @@
-"""Section 5 of the paper, on given meshes: its tables and figures, with the paper's numbers beside."""
+"""Section 5 of the paper on given meshes: its tables and figures, with the paper's numbers for comparison."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ... import PAPER, ConeflatError, read_mesh
 from ...base import Progress, plural
 from ...errors import MeshError
 from ...io import find_meshes
-from .run import Comparison, as_csv, compare_methods, known_methods, markdown, notes, written
+from .run import Comparison, as_cell, as_csv, compare_methods, known_methods, markdown, notes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,10 +28,10 @@ class Published:
     """A model's row in the paper's tables.
 
     Attributes:
-        thousands: of triangles.
-        curvature_error: ||K_target - K|| / n over pi, of the paper's method.
-        qc: mean QC distortion, by method, where it is given.
-        seconds: running time, by method, likewise.
+        thousands: number of triangles in thousands.
+        curvature_error: ||K_target - K|| / n divided by pi, for the paper's method.
+        qc: mean QC distortion by method, where it is given.
+        seconds: running time by method, where it is given.
     """
 
     thousands: float
@@ -39,58 +39,58 @@ class Published:
     qc: Mapping[str, float]
     seconds: Mapping[str, float]
 
-    def has_as_many(self, triangles: int) -> bool:
-        """Whether a mesh has the resolution of the paper's: as many triangles, to the thousand, or within 3 %."""
+    def has_same_size(self, triangles: int) -> bool:
+        """Return whether a number of triangles is that of the paper's mesh, rounded to thousands or within 3 %."""
         return abs(triangles / 1000 - self.thousands) <= max(0.03 * self.thousands, 0.5)
 
 
-#: The paper's names of the methods, by ours. Its circle patterns ran on the triangles as they are, and its
-#: linear ABF left cones free.
+#: Names of the methods in the paper, by their names here. In the paper, circle patterns used the given triangles
+#: without flips, and linear ABF left cones free.
 NAMES = {"circle-patterns/fixed": "CP", "linear-abf/free": "LABF", "linear": "CF"}
 
 
-def _last(*numbers: float) -> dict[str, float]:
-    """Return the numbers of CP, LABF and CF, or of the last so many of them, by method."""
+def _by_method(*numbers: float) -> dict[str, float]:
+    """Return the numbers of CP, LABF and CF by method; with fewer numbers, those of the last ones."""
     return dict(zip(list(NAMES)[-len(numbers) :], numbers, strict=True))
 
 
-#: By model, in the paper's order.
+#: Published numbers by model, in the paper's order.
 MODELS = {
-    "fandisk": Published(13, 4.6e-6, _last(1.013, 1.007, 1.012), _last(20, 0.9, 0.5)),
-    "rockerarm": Published(20, 1.4e-5, _last(1.045, 1.027, 1.028), _last(21, 1.5, 0.4)),
-    "foot": Published(20, 2.7e-5, _last(1.029, 1.016, 1.020), _last(29, 1.4, 0.6)),
-    "gargoyle": Published(20, 2.9e-5, _last(1.213, 1.032, 1.037), _last(29, 1.6, 0.7)),
-    "elephant": Published(40, 1.6e-5, _last(1.028, 1.022, 1.027), _last(44, 4.8, 1.1)),
-    "horse": Published(40, 1.8e-5, _last(1.035, 1.017, 1.077), _last(62, 4.1, 1.3)),
-    "hand": Published(106, 3.2e-6, _last(1.009, 1.008, 1.009), _last(903, 26, 3.8)),
-    "torso": Published(284, 1.4e-6, _last(1.004, 1.005), _last(86, 24)),
-    "isi-horse": Published(358, 8.4e-7, _last(1.009), _last(32)),
+    "fandisk": Published(13, 4.6e-6, _by_method(1.013, 1.007, 1.012), _by_method(20, 0.9, 0.5)),
+    "rockerarm": Published(20, 1.4e-5, _by_method(1.045, 1.027, 1.028), _by_method(21, 1.5, 0.4)),
+    "foot": Published(20, 2.7e-5, _by_method(1.029, 1.016, 1.020), _by_method(29, 1.4, 0.6)),
+    "gargoyle": Published(20, 2.9e-5, _by_method(1.213, 1.032, 1.037), _by_method(29, 1.6, 0.7)),
+    "elephant": Published(40, 1.6e-5, _by_method(1.028, 1.022, 1.027), _by_method(44, 4.8, 1.1)),
+    "horse": Published(40, 1.8e-5, _by_method(1.035, 1.017, 1.077), _by_method(62, 4.1, 1.3)),
+    "hand": Published(106, 3.2e-6, _by_method(1.009, 1.008, 1.009), _by_method(903, 26, 3.8)),
+    "torso": Published(284, 1.4e-6, _by_method(1.004, 1.005), _by_method(86, 24)),
+    "isi-horse": Published(358, 8.4e-7, _by_method(1.009), _by_method(32)),
 }
 
 
 def model_of(path: Path) -> str | None:
-    """Return the name of the paper's model that a file has; None if it has none of them."""
+    """Return the name of the paper's model in a file name; None if there is none."""
     stem = re.sub(r"[^a-z0-9]", "", path.stem.lower())
     return next((name for name in MODELS if name.replace("-", "") == stem), None)
 
 
-#: What the paper compares; then what it had not: flips before circle patterns, cones in linear ABF, the exact metric.
+#: Methods that the paper compares; then others: circle patterns with flips, linear ABF with cones, the exact metric.
 METHODS = (*NAMES, "circle-patterns", "linear-abf", "exact")
 TABLE_1 = ("model", "triangles", "paper's", "cones", "curvature error, pi", "paper's error", "error ratio")
 TABLE_2 = ("model", "method", "QC mean", "paper's QC", "QC ratio", "time, s", "paper's time", "time ratio")
-# How their numbers are written.
+# Formats of their numbers.
 FORMS_1 = ("", ",d", "", "d", ".2e", ".2e", ".2f")
 FORMS_2 = ("", "", ".4f", ".3f", ".3f", ".2f", ".3g", ".3f")
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A mesh and what the methods made of it.
+    """A mesh and the results of the methods.
 
     Attributes:
-        name: the paper's where it has the model, else the file's.
-        published: the paper's numbers; None where it has none.
-        comparison: of the methods.
+        name: the name in the paper if it has the model, else that of the file.
+        published: the paper's numbers, or None.
+        comparison: the results of the methods.
     """
 
     name: str
@@ -100,11 +100,11 @@ class Model:
     @property
     def is_same(self) -> bool:
         """Whether the mesh has the resolution of the paper's."""
-        return self.published is not None and self.published.has_as_many(self.comparison.triangles)
+        return self.published is not None and self.published.has_same_size(self.comparison.triangles)
 
     @property
     def linear(self) -> Flattening:
-        """By the paper's method, which found the cones."""
+        """The result of the paper's method, which found the cones."""
         result = self.comparison["linear"].result
         assert result is not None
         return result
@@ -115,8 +115,8 @@ class Reproduction:
     """The paper's experiments.
 
     Attributes:
-        models: one or more, in the paper's order, then others.
-        failed: file and what was wrong with it.
+        models: one or more models, in the paper's order, then others.
+        failed: file names and errors of meshes that failed.
     """
 
     models: tuple[Model, ...]
@@ -156,23 +156,23 @@ class Reproduction:
         return rows
 
     def markdown(self) -> str:
-        """Return both tables, what is to be known of them, and the figures."""
+        """Return both tables with notes, and the figures, as Markdown."""
         figures = [f"![{title}]({name})\n\n{title}\n" for name, title in FIGURES.items()]
         return "\n".join([self.tables(), *figures])
 
     def tables(self) -> str:
-        """Return both tables, and what is to be known of them."""
+        """Return both tables with notes as Markdown."""
         lines = ["# Section 5 of the paper", ""]
         lines += [
             "Ben-Chen, Gotsman and Bunin, Conformal flattening by curvature prescription and metric scaling, 2008. "
-            "The greedy search finds the cones (epsilon 1); these and one cut are given to every method. Times are "
-            "from there to the layout; the paper's are of a processor of 1.4 GHz.",
+            "The greedy search finds the cones (epsilon 1); all methods use these cones and the same cut. Times are "
+            "those from the cones to the layout; the paper's are for a processor of 1.4 GHz.",
             "",
         ]
         other = [model for model in self.models if model.published is not None and not model.is_same]
         if other:
             listed = ", ".join(f"{m.name} ({m.comparison.triangles:,})" for m in other)
-            lines += [f"In another resolution than the paper's, so that numbers differ: {listed}.", ""]
+            lines += [f"In another resolution than in the paper, so that numbers differ: {listed}.", ""]
         if self.missing:
             lines += [f"Not among the files: {', '.join(self.missing)}.", ""]
         lines += [f"Could not be flattened: {name}: {why}\n" for name, why in self.failed]
@@ -180,17 +180,17 @@ class Reproduction:
             ("Table 1: curvature error", TABLE_1, self.table_1(), FORMS_1),
             ("Table 2: quasi-conformal distortion", TABLE_2, self.table_2(), FORMS_2),
         ):
-            lines += [f"## {title}", "", markdown(headings, _written(rows, forms))]
+            lines += [f"## {title}", "", markdown(headings, _cells(rows, forms))]
         lines += [notes([replace(model.comparison, name=model.name) for model in self.models])]
         return "\n".join(lines)
 
     def texts(self) -> dict[str, str]:
-        """Return the tables as Markdown, and as comma separated values, by file name."""
+        """Return the tables as Markdown and as comma-separated values, by file name."""
         one, two = as_csv(TABLE_1, self.table_1()), as_csv(TABLE_2, self.table_2())
         return dict(zip(TEXTS, (self.markdown(), one, two), strict=True))
 
     def figures(self, sight: Sight) -> dict[str, Figure]:
-        """Return the paper's figures, by file name."""
+        """Return the paper's figures by file name."""
         from ..view import draw_checker, draw_cones
         from . import pictures
 
@@ -201,7 +201,7 @@ class Reproduction:
             shown = model.comparison.drawn
             scale = pictures.same_scale(shown)
             quality.append(_row(pictures.quality_panels(shown, scale, sight), scale))
-            pairs = zip(shown, pictures.turned_alike(shown), strict=True)
+            pairs = zip(shown, pictures.aligned_layouts(shown), strict=True)
             layouts.append(
                 _row([pictures.layout_panel(result, f"{model.name}, {one.method}") for one, result in pairs])
             )
@@ -223,27 +223,30 @@ FIGURES = {
     "figure2.png": "Figure 2: cones, red where their curvature is positive, black where it is negative, and seams",
     "figure3.png": "Figure 3: quasi-conformal distortion by each method; the number is its mean",
     "figure4.png": "Figure 4: layouts by each method, with the same cones and cut",
-    "figure5.png": "Figure 5: a checkerboard, and the distortion, by the paper's method",
+    "figure5.png": "Figure 5: checkerboard and distortion by the paper's method",
 }
-#: All that is written.
+#: All files that are as_cell.
 FILES = (*TEXTS, *FIGURES)
 
 
 def reproduce(
     paths: Sequence[Path], *, methods: Sequence[str] = METHODS, progress: Progress | None = None
 ) -> Reproduction:
-    """Run the paper's experiments on mesh files, and on those in folders.
+    """Run the paper's experiments on mesh files.
 
     Args:
         paths: files, folders of files, or patterns; those named after the paper's models come first.
-        methods: to compare; the paper's own, "linear", is among them in any case.
-        progress: called with what is done and the fraction done.
+        methods: methods to compare; the paper's method, "linear", is always included.
+        progress: called with the current step and the completed fraction.
+
+    Returns:
+        The results, with the paper's tables and figures.
 
     Raises:
-        OptionError: a method is unknown, or a path names no mesh.
+        OptionError: a method is unknown, or a path matches no mesh.
         MeshError: none of the meshes can be flattened.
     """
-    files = sorted({Path(file) for path in paths for file in find_meshes(str(path))}, key=_place)
+    files = sorted({Path(file) for path in paths for file in find_meshes(str(path))}, key=_sort_key)
     methods = known_methods(methods if "linear" in methods else ("linear", *methods))
     models, failed = [], []
     for number, file in enumerate(files):
@@ -266,24 +269,24 @@ def reproduce(
     return Reproduction(tuple(models), tuple(failed))
 
 
-def _place(path: Path) -> tuple[int, str, str]:
+def _sort_key(path: Path) -> tuple[int, str, str]:
     name = model_of(path)
     return (len(MODELS) if name is None else list(MODELS).index(name), path.stem, str(path))
 
 
 def _row(panels: Sequence[Panel], quantities: Sequence[Quantity] = ()) -> Row:
-    """Return panels in a row, wide enough for their labels."""
+    """Return a row of panels, wide enough for their labels."""
     from ..view import Row
 
     inches = 2.2  # of height
     return Row([panel.with_room(inches) for panel in panels], quantities[:1], tallest=inches)
 
 
-def _written(rows: Sequence[Sequence[object]], forms: Sequence[str]) -> list[list[str]]:
-    """Return cells as they stand in a table."""
+def _cells(rows: Sequence[Sequence[object]], forms: Sequence[str]) -> list[list[str]]:
+    """Return the formatted cells of a table."""
     return [
         [
-            str(value) if isinstance(value, str) else written(value, form)  # type: ignore[arg-type]
+            str(value) if isinstance(value, str) else as_cell(value, form)  # type: ignore[arg-type]
             for value, form in zip(row, forms, strict=True)
         ]
         for row in rows

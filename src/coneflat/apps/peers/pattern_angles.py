@@ -1,4 +1,4 @@
-"""The angles of a circle pattern: the nearest to given ones that it can have, a quadratic program."""
+"""The angles of a circle pattern: the nearest feasible angles to given ones, by a quadratic program."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from ...base import BoolArray, FloatArray, IntArray
 from ...geometry import IntrinsicTriangulation
 from ...linalg import Limits, Point, factorize, minimise
 
-# Angles may shrink to this part of what they were, or to 0.02 radians where that is less; but never below the last,
-# radians.
+# Lower bound of an angle: the fraction LEAST_PART of the given one, at most 0.02 radians and at least LEAST_ANGLE.
 LEAST_PART, LEAST_ANGLE = 0.5, 1e-5
-# Circles meet at this angle at least, radians, also those around the two halves of a planar quad that is inscribed in a
-# circle, which are one: the equations are as steep as this is small.
+# Least intersection angle of circles, radians. It also applies to the two coincident circumcircles of an inscribed
+# quad. The smaller it is, the worse conditioned the equations are.
 LEAST_MEETING = 1e-4
 # The largest sum of angles opposite an edge.
 WIDEST_PAIR = np.pi - LEAST_MEETING
-# When to stop: largest error of a sum of angles, radians, which sums to that of curvature; Newton steps at most;
-# rounding of a sum of some angles, radians; halvings after which a step is taken for rounding; and part of the gradient
-# that a step must change, as where there is no solution the function falls without an end.
+# Stopping criteria: largest error of a sum of angles, radians, which is also that of curvature; largest number of
+# Newton steps; rounding of a sum of some angles, radians; halvings after which a step counts as rounding; and fraction
+# of the gradient that a step must change, because without a solution the function is unbounded below.
 ANGLE_LIMITS = Limits(1e-10, 40, goal=1e-12, halvings=40, halvings_below=40, least_change=1e-6)
 
 
@@ -41,29 +40,29 @@ class CoherentAngles:
 
     @property
     def converged(self) -> bool:
-        """Whether the angles sum to what they should."""
+        """Whether the sums of angles are correct."""
         return self.residual <= ANGLE_LIMITS.tolerance
 
 
 def coherent_angles(
     triangulation: IntrinsicTriangulation, angles: FloatArray, sums: FloatArray, is_summed: BoolArray
 ) -> CoherentAngles:
-    """Return the angles nearest to given ones, in the sum of squares, that belong to a flat circle pattern.
+    """Return the angles of a flat circle pattern that are nearest to given angles in the least squares sense.
 
-    They are positive, sum to pi in triangles and to what is wanted at vertices, and the two opposite an edge sum
-    to less than pi: the paper's quadratic program. Angles at a boundary are free.
+    They are positive, sum to pi in triangles and to a given value at vertices, and the two opposite an edge sum to less
+    than pi: the quadratic program of Kharevych, Springborn and Schroeder 2006. Angles at the boundary are free.
 
     Args:
-        triangulation: connected.
+        triangulation: a connected triangulation.
         angles: (3m,) opposite each half-edge, radians.
-        sums: (n,) what the angles at a vertex are to sum to.
-        is_summed: (n,) the vertices where that is asked.
+        sums: (n,) prescribed sum of the angles at each vertex, radians.
+        is_summed: (n,) vertices whose sum is prescribed.
 
     Notes:
-        Without the sums, each edge has a problem of its own, to project two angles to a triangle. The sums
-        are equations, whose multipliers minimise a convex function that has what they are off by for its gradient;
-        its second derivative is discontinuous where bounds become active or inactive; Newton's method still converges.
-        Where none holds, the first step is the least squares solution.
+        Without the sums, the problem separates into one problem for each edge: the projection of two angles to a
+        triangle of feasible pairs. The sums are equations, whose multipliers minimise a convex function; its gradient
+        is the error of the sums. Its second derivative is discontinuous where bounds become active or inactive, but
+        Newton's method still converges. If no bound is active, the first step is the least squares solution.
     """
     count = len(angles)
     rows = triangulation.face_count
@@ -86,17 +85,17 @@ def coherent_angles(
 
 @dataclass(eq=False)
 class _Dual:
-    """A convex function of the multipliers of equations A x = b, for x nearest to c within bounds."""
+    """The convex dual function of the multipliers of equations A x = b, for the x nearest to c within bounds."""
 
     angles: FloatArray
     least: FloatArray
     twin: IntArray
     equations: csr_matrix
     right: FloatArray
-    is_closed: bool  # then the last of the equations follows from the others
+    is_closed: bool  # if so, the last of the equations follows from the others
 
     def project(self, place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the angles for multipliers, and their derivatives by those before bounds: own and across."""
+        """Return the angles for multipliers, and their derivatives by the unbounded angles: own and across the edge."""
         free = self.angles + self.equations.T @ place
         is_inner = self.twin >= 0
         other = np.where(is_inner, self.twin, 0)
@@ -114,7 +113,7 @@ class _Dual:
         return Point(place, self.right - self.equations @ self.project(place)[0])
 
     def direction(self, here: Point, exactly: bool) -> tuple[FloatArray, bool]:
-        """Return the step, damped as much as the residual is large; there is none more exact."""
+        """Return the Newton step, with damping proportional to the residual; True, as there is no more exact step."""
         residual = here.residual
         _, own, across = self.project(here.place)
         slots = np.flatnonzero(across)
@@ -127,7 +126,7 @@ class _Dual:
             shape=(len(own), len(own)),
         )
         used = len(residual) - self.is_closed
-        # Relative to the residual, where rank is wanting.
+        # Damping relative to the residual covers a rank-deficient matrix.
         damping = np.clip(1e-5 * np.abs(residual[:used]).max(), 1e-13, 1e-6)
         equations = self.equations[:used]
         matrix = csc_matrix(equations @ derivative @ equations.T + damping * identity(used, format="csr"))

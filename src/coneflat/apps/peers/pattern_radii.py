@@ -1,4 +1,4 @@
-"""The radii of a circle pattern whose angles are known, by a convex function."""
+"""The radii of a circle pattern with given angles, by minimisation of a convex function."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from ...errors import ConvergenceError
 from ...linalg import Point, factorize, minimise
 from .pattern_angles import ANGLE_LIMITS, CoherentAngles
 
-# When to stop, from angles around the centre of a circle, radians; and the largest change of a log radius in one step.
+# Stopping criteria for the angles around the centre of a circle, radians; and largest change of a log radius per step.
 RADIUS_LIMITS = replace(ANGLE_LIMITS, steps=50, largest_step=5.0)
 
 
 @dataclass(frozen=True, eq=False)
 class CirclePattern:
-    """Circles around flat triangles.
+    """The circumcircles of flat triangles.
 
     Attributes:
-        lengths: (3m,) of the half-edges, both sides of an edge with the same bits.
+        lengths: (3m,) lengths of the half-edges, bitwise equal on both sides of an edge.
         residual: largest error of the angles around the centre of a circle, radians.
         steps: Newton steps.
     """
@@ -33,30 +33,30 @@ class CirclePattern:
 
 
 def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
-    """Return the circles that meet at the angles theta = pi - a - a', for a and a' opposite an edge.
+    """Return the circles that intersect at the angles theta = pi - a - a', for a and a' opposite an edge.
 
     Args:
         twin: (3m,) half-edges of a connected triangulation.
-        coherent: angles.
+        coherent: feasible angles.
 
     Raises:
-        ConvergenceError: radii differ by more than numbers hold.
+        ConvergenceError: ratios of radii exceed the range of double precision.
 
-    Notes:
+    References:
         L. Kharevych, B. Springborn, P. Schroeder, "Discrete conformal mappings via circle patterns", ACM Transactions
         on Graphics 25(2), 2006.
     """
     problem = RadiiProblem(twin, coherent)
     problem.base, steps = widest_pattern(problem)
-    # Where circles meet at a small angle, the last bit of a log radius turns theirs by a thousand times more than
-    # what is to be reached. As a small change of what was found, log radii have bits enough.
+    # If circles intersect at a small angle, the last bit of a log radius changes angles by a thousand times the
+    # tolerance. As small changes of a base value, log radii are accurate enough.
     found, more = minimise(problem, problem.evaluate(np.zeros_like(problem.base)), RADIUS_LIMITS)
     log_radius = problem.base + found.place
     spread = float(np.ptp(log_radius))
-    if not spread < 600:  # Squares of lengths, whose logs lie half as far from 0 each way, are to be finite.
+    if not spread < 600:  # Squares of lengths must be finite; their logs are at most half as large.
         raise ConvergenceError(
-            f"no circle pattern was found: the logs of radii came to differ by {spread:.3g}, more than numbers hold; "
-            "method 'exact', other cones or --repair may help"
+            f"no circle pattern was found: the logs of radii differ by {spread:.3g}, which overflows; method 'exact', "
+            "other cones or --repair may help"
         )
     log_radius -= (log_radius.max() + log_radius.min()) / 2
     half = problem.half_angles(found.place)
@@ -68,7 +68,7 @@ def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
 
 @dataclass(eq=False)
 class RadiiProblem:
-    """Find log radii rho for which the angles around each centre sum to a full turn.
+    """The problem of log radii rho for which the angles around each centre sum to 2 pi.
 
     The half angle at the centre of circle k over an edge towards l, which is the angle opposite it, is
 
@@ -82,8 +82,8 @@ class RadiiProblem:
 
     Attributes:
         twin: (3m,) half-edges.
-        coherent: what gives theta, and the angles opposite the boundary.
-        base: (m,) log radii, of which the variables are changes.
+        coherent: the angles, which give theta, and the angles opposite the boundary.
+        base: (m,) log radii; the variables are changes of them.
     """
 
     twin: IntArray
@@ -92,7 +92,7 @@ class RadiiProblem:
 
     @cached_property
     def sides(self) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
-        """Half-edges between two circles, the circle of each and the one across, and theta / 2."""
+        """Half-edges between two circles, the circles on their own and on the opposite side, and theta / 2."""
         slots = np.flatnonzero(self.twin >= 0)
         others, angles = self.twin[slots], self.coherent.angles
         return slots, slots // 3, others // 3, (np.pi - angles[slots] - angles[others]) / 2
@@ -103,7 +103,7 @@ class RadiiProblem:
         return (self.base[own] - self.base[other]) + (place[own] - place[other])
 
     def half_angles(self, place: FloatArray) -> FloatArray:
-        """Return (3m,) phi; those of the coherent angles at the boundary."""
+        """Return (3m,) the half angles phi; at the boundary, the coherent angles."""
         slots, _, _, half_theta = self.sides
         half = self.coherent.angles.copy()
         with np.errstate(over="ignore"):
@@ -112,39 +112,39 @@ class RadiiProblem:
         return half
 
     def excess(self, half: FloatArray) -> FloatArray:
-        """Return by how much half angles (3m,) around each centre exceed pi."""
+        """Return (m,) the sum of the half angles (3m,) around each centre minus pi."""
         excess: FloatArray = half.reshape(-1, 3).sum(axis=1) - np.pi
-        return excess - excess.mean()  # 0 but for rounding
+        return excess - excess.mean()  # the mean is 0 up to rounding
 
     def evaluate(self, place: FloatArray) -> Point:
-        """Return by how much the half angles around each centre exceed pi, which is minus the gradient."""
+        """Return the sum of the half angles around each centre minus pi, which is minus the gradient."""
         return Point(place, self.excess(self.half_angles(place)))
 
     def direction(self, here: Point, exactly: bool) -> tuple[FloatArray, bool]:
-        """Return the Newton step, which is exact."""
+        """Return the Newton step; True, as it is exact."""
         half_theta, gaps = self.sides[3], self._gaps(here.place)
         with np.errstate(over="ignore"):
             slope = np.sin(2 * half_theta) / (4 * (np.sinh(gaps / 2) ** 2 + np.sin(half_theta) ** 2))
         return self.solve(slope, here.residual), True
 
     def solve(self, weight: FloatArray, residual: FloatArray) -> FloatArray:
-        """Return the solution for weights of the sides, mean-free; on the way, the first radius is held."""
+        """Return the solution with zero mean for weights of the sides; the first radius is fixed in the solve."""
         _, own, other, _ = self.sides
         rows, columns = np.concatenate([own, own]), np.concatenate([own, other])
         matrix = csc_matrix((np.concatenate([weight, -weight]), (rows, columns)), (len(residual),) * 2)
-        held = csc_matrix(matrix[1:, 1:])
-        held.sort_indices()
-        solution = np.concatenate([[0.0], factorize(held).solve(residual[1:])])
+        reduced = csc_matrix(matrix[1:, 1:])
+        reduced.sort_indices()
+        solution = np.concatenate([[0.0], factorize(reduced).solve(residual[1:])])
         return solution - solution.mean()
 
 
 def widest_pattern(problem: RadiiProblem) -> tuple[FloatArray, int]:
-    """Return (m,) log radii, nearly, and the number of steps, from the dual problem.
+    """Return (m,) approximate log radii from the dual problem, and the number of steps.
 
-    Of all coherent angles with the same theta those of the pattern have the largest volume, as angles of ideal
-    hyperbolic prisms (I. Rivin 1994; G. Leibon 2002). An angle answers to a difference of log radii by a leap where
-    theta is small, but log radii answer to angles gently, log sin(theta + phi) - log sin(phi): Newton's method takes
-    ten steps here where it creeps from leap to leap there.
+    Among all coherent angles with the same theta, those of the pattern have the largest volume as angles of ideal
+    hyperbolic prisms (I. Rivin 1994; G. Leibon 2002). For small theta, an angle is nearly a step function of the
+    difference of log radii, but log radii are a smooth function of angles, log sin(theta + phi) - log sin(phi). So
+    Newton's method needs about ten steps for the dual problem, and many more for the primal one.
     """
     slots, own, other, half_theta = problem.sides
     half = problem.coherent.angles.copy()
@@ -157,14 +157,14 @@ def widest_pattern(problem: RadiiProblem) -> tuple[FloatArray, int]:
         weight = np.sin(one) * np.sin(two) / np.sin(2 * half_theta)
         radii = problem.solve(weight, np.bincount(own, weight * wanted, len(radii)) + problem.excess(half))
         change = weight * (wanted - (radii[own] - radii[other]))
-        room = one / np.maximum(-change, np.finfo(float).tiny)
-        part = min(1.0, 0.9 * float(room.min(initial=np.inf)))  # of the way, within the bounds of angles
-        half[slots] = one + part * change
-        for _ in range(30):  # while it goes beyond the top
+        limit = one / np.maximum(-change, np.finfo(float).tiny)
+        factor = min(1.0, 0.9 * float(limit.min(initial=np.inf)))  # of the step, within the bounds of angles
+        half[slots] = one + factor * change
+        for _ in range(30):  # while the step overshoots the maximum
             if not change @ np.log(np.sin(half[problem.twin[slots]]) / np.sin(half[slots])) < 0:
                 break
-            part /= 2
-            half[slots] = one + part * change
-        if np.abs(change).max(initial=0.0) <= 1e-5:  # radians: from here on radii converge faster
+            factor /= 2
+            half[slots] = one + factor * change
+        if np.abs(change).max(initial=0.0) <= 1e-5:  # radians: the primal problem now converges faster
             break
     return radii, steps

@@ -1,4 +1,4 @@
-"""Comparisons as pictures: side by side, in the same colours."""
+"""Figures of comparisons: panels in rows with a common colour scale."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ IN_A_ROW = 5
 
 @dataclass(frozen=True)
 class Sight:
-    """From where models are looked at.
+    """The view direction of models.
 
     Attributes:
         eye: direction to the eye, as in `draw_checker`.
         up: the models' upward axis, "x", "y" or "z".
 
     Raises:
-        OptionError: there is no such direction or axis.
+        OptionError: the direction or the axis is unknown.
     """
 
     eye: view.Eye = "front-right"
@@ -45,16 +45,16 @@ class Sight:
         view.eye_direction(self.eye, self.up)
 
     def panel(self, result: Flattening, draw: Callable[..., object], label: str, **more: Any) -> view.Panel:
-        """Return a panel in which a function of axes, a result and a look draws the model."""
+        """Return a panel in which a function of axes, a result and view options draws the model."""
         aspect = view.view_aspect(result.vertices[np.unique(result.faces)], self.eye, self.up)
         look = {"result": result, "eye": self.eye, "up": self.up, "dpi": DPI, **more}
         return view.Panel(aspect, lambda axes: draw(axes=axes, **look), label)
 
 
 def draw_layouts(comparison: Comparison) -> Figure:
-    """Return the layouts of all methods, coloured by quasi-conformal distortion, on one scale.
+    """Return a figure of the layouts of all methods, coloured by quasi-conformal distortion on one scale.
 
-    Beside them stands how often it is which by the first method.
+    The colour bar has a histogram of the distortion by the first method.
     """
     shown = comparison.drawn
     quantities = same_scale(shown)
@@ -64,13 +64,13 @@ def draw_layouts(comparison: Comparison) -> Figure:
             partial(view.fill_layout, result=result, quantity=quantity, dpi=DPI),
             labelled(entry.method, result),
         )
-        for entry, quantity, result in zip(shown, quantities, turned_alike(shown), strict=True)
+        for entry, quantity, result in zip(shown, quantities, aligned_layouts(shown), strict=True)
     ]
     return figure_of(in_rows(panels, quantities[:1]))
 
 
 def draw_qualities(comparison: Comparison, sight: Sight) -> Figure:
-    """Return the model with the quasi-conformal distortion of all methods, on one scale."""
+    """Return a figure of the model with the quasi-conformal distortion of all methods on one scale."""
     quantities = same_scale(comparison.drawn)
     panels = quality_panels(comparison.drawn, quantities, sight)
     return figure_of(in_rows(panels, quantities[:1]))
@@ -79,7 +79,7 @@ def draw_qualities(comparison: Comparison, sight: Sight) -> Figure:
 def quality_panels(
     entries: Sequence[Entry], quantities: Sequence[view.Quantity], sight: Sight
 ) -> list[view.Panel]:
-    """Return a panel of the model with a quantity for each method."""
+    """Return a panel of the model for each method, coloured by its quantity."""
     return [
         sight.panel(result, view.draw_quantity, labelled(entry.method, result), quantity=quantity)
         for entry, quantity in zip(entries, quantities, strict=True)
@@ -87,42 +87,42 @@ def quality_panels(
     ]
 
 
-def turned_alike(entries: Sequence[Entry]) -> list[Flattening]:
-    """Return the results of entries, each turned as a whole so that the first one's largest chart lies alike in it.
+def aligned_layouts(entries: Sequence[Entry]) -> list[Flattening]:
+    """Return the results of entries, each rotated to align its largest chart with that of the first one.
 
-    Those of other charts stay as they are.
+    Results with different charts are not rotated.
     """
     results = [entry.result for entry in entries if entry.result is not None]
-    return [_turned_like(result, results[0]) for result in results]
+    return [_rotated_to(result, results[0]) for result in results]
 
 
-def _turned_like(result: Flattening, model: Flattening) -> Flattening:
+def _rotated_to(result: Flattening, model: Flattening) -> Flattening:
     same = np.array_equal(result.faces, model.faces) and result.distortion.charts == model.distortion.charts
     if result is model or not same:
         return result
     count, chart = label_faces(model.uv_faces, len(model.uv))
     areas = np.bincount(chart, np.abs(signed_double_areas(model.corner_uv)), count)
-    # The corners of the chart of most area, as complex numbers.
+    # The corners of the chart with the largest area, as complex numbers.
     largest = chart == areas.argmax()
     one, other = ((each.corner_uv[largest] @ np.array([1, 1j])).ravel() for each in (result, model))
     product = np.vdot(one - one.mean(), other - other.mean())
     if product == 0:
         return result
-    turned = (result.uv @ np.array([1, 1j])) * (product / abs(product))
-    return replace(result, uv=np.stack([turned.real, turned.imag], axis=1))
+    rotated = (result.uv @ np.array([1, 1j])) * (product / abs(product))
+    return replace(result, uv=np.stack([rotated.real, rotated.imag], axis=1))
 
 
 def labelled(method: str, result: Flattening) -> str:
-    """Return a method and what it reached."""
+    """Return a label with the name of a method and its mean distortion."""
     return f"{method}: {result.distortion.qc_mean:.4f}"
 
 
 def same_scale(entries: Sequence[Entry]) -> list[view.Quantity]:
-    """Return the quasi-conformal distortion by each method, in colours that mean the same."""
+    """Return the quasi-conformal distortion by each method, with a common colour scale."""
     quantities = [view.conformal_distortion(entry.result) for entry in entries if entry.result is not None]
     if not quantities:
         return []
-    # Colours end at the distortion of the method in the middle, as most are far better than the worst.
+    # The scale is that of the median method, because most methods are far better than the worst.
     by_distortion = sorted((quantity.scale for quantity in quantities), key=lambda scale: scale.high)
     scale = by_distortion[(len(quantities) - 1) // 2]
     names = [f"QC, {entry.method}" for entry in entries if entry.result is not None]
@@ -137,7 +137,7 @@ def layout_panel(result: Flattening, label: str) -> view.Panel:
 
 
 def figure_of(rows: Sequence[view.Row], *, marks_of: Flattening | None = None) -> Figure:
-    """Return rows of panels as wide as a page."""
+    """Return a figure of rows of panels with the width of a page."""
     return view.compose(
         rows, marks=[] if marks_of is None else view.mark_handles(marks_of), dpi=DPI, width=10.0
     )
@@ -152,11 +152,11 @@ def in_rows(panels: Sequence[view.Panel], quantities: Sequence[view.Quantity] = 
 
 
 def open_folder(folder: Path, names: Iterable[str]) -> None:
-    """Make a folder if it is missing, for files of some names; worth doing before long work.
+    """Create a folder if it is missing, and check before long work that files can be written there.
 
     Raises:
-        OptionError: matplotlib, which draws the pictures, is not installed.
-        MeshFileError: the folder cannot be made, or a file not be written there.
+        OptionError: matplotlib, which draws the figures, is not installed.
+        MeshFileError: the folder cannot be created, or a file cannot be written there.
     """
     view.new_figure(1, 1)
     make_folder(folder)
@@ -165,7 +165,7 @@ def open_folder(folder: Path, names: Iterable[str]) -> None:
 
 
 def write_folder(folder: Path, contents: Mapping[str, str | Figure]) -> list[Path]:
-    """Write texts and figures by their names, and return the paths."""
+    """Write texts and figures, given by file name, and return the paths."""
     for name, content in contents.items():
         if isinstance(content, str):
             with atomic_write(folder / name, "w") as file:

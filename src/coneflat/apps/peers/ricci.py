@@ -1,4 +1,4 @@
-"""Discrete Ricci flow by circle packings with inversive distances."""
+"""Discrete Ricci flow with inversive distance circle packings."""
 
 from __future__ import annotations
 
@@ -27,33 +27,36 @@ from ...metric import checked_target
 from ...stages import ConeSolution, FlatMetric
 from .shared import failure_notes, flat_metric
 
-# Curvature error, radians, that counts as converged; steps at most; rounding; halvings; largest change of a log radius.
+# Tolerance of curvature, radians; largest number of steps; rounding; halvings; largest change of a log radius.
 LIMITS = Limits(1e-10, 200, goal=1e-13, halvings=30, largest_step=5.0)
-# Sum of the slopes at an edge, relative to their terms, that rounding makes.
+# Rounding error of the sum of the slopes at an edge, relative to their terms.
 NOISE = 1e-14
 
 
 def ricci_flow(
     mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, best_effort: bool = False
 ) -> FlatMetric:
-    """Return the flat metric of a circle packing with the inversive distances of the input's.
+    """Return the flat metric of a circle packing with the inversive distances of a packing on the input.
 
     Args:
-        mesh: connected.
+        mesh: a connected mesh.
         lengths: (m, 3) side lengths, model units.
-        solution: cones with their curvatures; on the boundary, which is free, radii stay as they are.
-        best_effort: return a metric that did not converge.
+        solution: cones with their curvatures; radii on the boundary, which is free, do not change.
+        best_effort: return a metric even if it did not converge.
 
     Raises:
         ConvergenceError: no metric was found, unless `best_effort`.
         CurvatureError: no metric has the curvatures.
 
     Notes:
-        M. Jin, J. Kim, X. Gu, "Discrete surface Ricci flow: theory and applications", 2007, minimised by Newton's
-        method; inversive distances after R. Guo, "Local rigidity of inversive distance circle packing", 2011,
-        and F. Luo, "Rigidity of polyhedral surfaces III", 2011; flips after A. Bobenko and C. Lutz, "Decorated
-        discrete conformal maps and convex polyhedral cusps", 2023: as first published, on the input's own triangles, a
-        solution need not exist.
+        The Ricci energy (Jin, Kim, Gu 2007) is minimised by Newton's method, with inversive distances (Guo 2011, Luo
+        2011). Without the flips of Bobenko and Lutz 2023, on the input's own triangles, a solution need not exist.
+
+    References:
+        M. Jin, J. Kim, X. Gu, "Discrete surface Ricci flow: theory and applications", 2007.
+        R. Guo, "Local rigidity of inversive distance circle packing", 2011.
+        F. Luo, "Rigidity of polyhedral surfaces III", 2011.
+        A. Bobenko, C. Lutz, "Decorated discrete conformal maps and convex polyhedral cusps", 2023.
     """
     border = mesh.is_boundary_vertex
     target, pinned = checked_target(mesh, np.where(border, 0.0, solution.target), border)
@@ -75,12 +78,12 @@ def ricci_flow(
 
 @dataclass(eq=False)
 class State(Point):
-    """Curvature for some radii, on the triangulation that is weighted Delaunay for them.
+    """The curvature for given radii, on the triangulation that is weighted Delaunay for them.
 
     Attributes:
-        weights: (3m,) twice the derivative of angles opposite each half-edge.
-        broken: triangles that break the triangle inequality; inadmissible where there is a boundary, as edges of it
-            cannot be flipped.
+        weights: (3m,) twice the derivative of the angle opposite each half-edge.
+        broken: number of triangles that break the triangle inequality; with a boundary, whose edges cannot be flipped,
+            such a state is inadmissible.
     """
 
     weights: FloatArray = field(default_factory=lambda: np.empty(0))
@@ -89,21 +92,21 @@ class State(Point):
 
 @dataclass(eq=False)
 class Packing:
-    """Find u, so that circles of radii g_i exp(u_i) with the inversive distances of the input have the curvature.
+    """The problem of log factors u for which circles of radii g_i exp(u_i) have the target curvature.
 
-    K(u) - target is the gradient of the Ricci energy (Jin, Kim, Gu 2007), convex for disjoint circles (Guo 2011;
-    Luo 2011), whose Hessian is the Laplacian with the weights h / l of the radical centres. Flipped to weighted
-    Delaunay by flips that keep the inversive distances, it has a minimum for all curvatures that sum to what
-    they must (Bobenko, Lutz 2023).
+    Inversive distances are those of the input. K(u) - target is the gradient of the Ricci energy (Jin, Kim, Gu 2007),
+    which is convex for disjoint circles (Guo 2011; Luo 2011). Its Hessian is the Laplacian with the weights h / l of
+    the radical centres. With flips to weighted Delaunay that preserve the inversive distances, it has a minimum for all
+    curvatures that satisfy Gauss-Bonnet (Bobenko, Lutz 2023).
 
     Attributes:
-        triangulation: with inversive distances for lengths; flipped in place.
+        triangulation: the triangulation, with inversive distances as lengths; flipped in place.
         radii: (n,) g, model units.
         target: (n,) curvature, radians; not used on the boundary.
-        border: (n,) True where radii stay.
+        border: (n,) whether the radius is fixed.
         pinned: (n,) True for one vertex of a closed surface.
         flips: half-edges flipped so far.
-        last: the state evaluated last, the one the triangulation belongs to.
+        last: the state evaluated last, to which the triangulation belongs.
     """
 
     triangulation: IntrinsicTriangulation
@@ -118,7 +121,7 @@ class Packing:
     def of(
         cls, mesh: TriangleMesh, lengths: FloatArray, target: FloatArray, border: BoolArray, pinned: BoolArray
     ) -> Packing:
-        """Put circles on the input, made Delaunay and then weighted Delaunay, neither of which changes the surface."""
+        """Return circles on the input, flipped to Delaunay and weighted Delaunay; the surface does not change."""
         triangulation, flips = intrinsic_delaunay(mesh, lengths)
         radii = packed_radii(triangulation.length.reshape(-1, 3), triangulation.faces)
         more = flip_to_weighted_delaunay(triangulation, radii, has_lengths=True)
@@ -126,12 +129,12 @@ class Packing:
         return cls(triangulation, radii, target, border, pinned, [flips, more])
 
     def lengths(self, place: FloatArray) -> FloatArray:
-        """Return (3m,) the lengths for u, the same bits on both sides of an edge."""
+        """Return (3m,) the lengths for u, bitwise equal on both sides of an edge."""
         one, two = ends_of(self.triangulation, self.radii * np.exp(place))
         return np.sqrt((one**2 + two**2) + 2 * self.triangulation.length * (one * two))
 
     def evaluate(self, place: FloatArray) -> State:
-        """Flip to weighted Delaunay for u and return the curvature there."""
+        """Return the state for u, after flips to weighted Delaunay."""
         triangulation = self.triangulation
         radii = self.radii * np.exp(place)
         flipped = flip_to_weighted_delaunay(triangulation, radii, has_lengths=False)
@@ -142,14 +145,14 @@ class Packing:
         curvature = angle_defect(triangulation.faces, corner_angles(sides), self.border)
         residual = np.where(self.border, 0.0, self.target - curvature)
         if self.pinned.any():
-            residual -= residual.mean()  # Gauss-Bonnet, but for rounding
+            residual -= residual.mean()  # 0 by Gauss-Bonnet, up to rounding
         weights = np.where(broken[:, None], 0.0, packing_weights(sides, radii[triangulation.faces])).ravel()
         is_admissible = not (self.border.any() and broken.any())
         self.last = State(place, residual, is_admissible, weights, int(broken.sum()))
         return self.last
 
     def direction(self, here: State, exactly: bool) -> tuple[FloatArray, bool]:
-        """Return the Newton step, which is exact."""
+        """Return the Newton step; True, as it is exact."""
         state = here if here is self.last else self.evaluate(here.place)
         count, tail = len(self.radii), self.triangulation.tail
         head = tail.reshape(-1, 3)[:, NEXT].ravel()
@@ -165,10 +168,10 @@ class Packing:
 
 
 def packed_radii(lengths: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (n,) the radii of circles at the vertices of which no two of a triangle overlap.
+    """Return (n,) radii of circles at the vertices, so that no two circles of a triangle overlap.
 
-    Each is the least, over the triangles around, of the radius in the packing of the triangle's three tangent circles,
-    (l_ij + l_ki - l_jk) / 2: inversive distances are 1 and more.
+    A radius is the minimum over the triangles around the vertex of (l_ij + l_ki - l_jk) / 2, the radius in the packing
+    of three tangent circles. So inversive distances are at least 1.
     """
     radii = np.full(int(faces.max()) + 1, np.inf)
     np.minimum.at(radii, faces.ravel(), slacks(lengths).ravel() / 2)
@@ -182,17 +185,17 @@ def ends_of(triangulation: IntrinsicTriangulation, values: FloatArray) -> tuple[
 
 
 def inversive_distances(triangulation: IntrinsicTriangulation, radii: FloatArray) -> FloatArray:
-    """Return (3m,) the inversive distances of circles whose centres are as far apart as edges are long."""
+    """Return (3m,) the inversive distances of circles whose centres have the edge lengths as distances."""
     one, two = ends_of(triangulation, radii)
     gap, both = triangulation.length - (one + two), triangulation.length + (one + two)
     return 1 + gap * both / (2 * (one * two))
 
 
 def packing_weights(sides: FloatArray, radii: FloatArray) -> FloatArray:
-    """Return (m, 3) twice the derivative of the angle at one end of each side by the log radius at the other.
+    """Return (m, 3) twice the derivative of the angle at one end of each side by the log radius at the other end.
 
-    Raising log g_j turns the angle at i by h_k / l_k, where h_k is the height of the radical centre over the side
-    between them (Guo 2011; D. Glickenstein 2011):
+    The derivative of the angle at i by log g_j is h_k / l_k, where h_k is the height of the radical centre over the
+    side between them (Guo 2011; D. Glickenstein 2011):
 
         2 h_k / l_k = cot a_k + (g_i^2 cot a_j + g_j^2 cot a_i) / l_k^2 - g_k^2 / (2 A)
     """
@@ -203,14 +206,14 @@ def packing_weights(sides: FloatArray, radii: FloatArray) -> FloatArray:
 
 
 def slopes(inversive: FloatArray, radii: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (m, 3) the slope of each triangle along its sides, and a bound of the terms that it is made of.
+    """Return (m, 3) the slope of each triangle along its sides, and (m, 3) a bound of its terms.
 
-    An edge is weighted Delaunay if the slopes from both sides do not sum to a negative number. Where the triangle
-    exists, its radical centre is at a height over the side with the sign of the slope.
+    An edge is weighted Delaunay if the sum of the slopes from both sides is not negative. If the triangle exists, the
+    height of its radical centre over the side has the sign of the slope.
 
     Args:
-        inversive: (m, 3) of the circles at the ends of the sides.
-        radii: (m, 3) of the circles at the corners.
+        inversive: (m, 3) inversive distances of the circles at the ends of the sides.
+        radii: (m, 3) radii of the circles at the corners.
     """
     c, jk, ik = inversive, inversive[:, NEXT], inversive[:, PREVIOUS]
     gi, gj, gk = radii[:, NEXT], radii[:, PREVIOUS], radii
@@ -224,17 +227,17 @@ def slopes(inversive: FloatArray, radii: FloatArray) -> tuple[FloatArray, FloatA
 def flip_to_weighted_delaunay(
     triangulation: IntrinsicTriangulation, radii: FloatArray, has_lengths: bool
 ) -> IntArray:
-    """Flip a triangulation, in place, until it is weighted Delaunay; return the half-edges flipped, in order.
+    """Flip a triangulation in place until it is weighted Delaunay, and return the flipped half-edges in order.
 
     Args:
-        triangulation: changed in place.
-        radii: (n,) of circles at the vertices.
-        has_lengths: whether flips keep the metric of its lengths; else its lengths are inversive distances, and flips
-            keep these (Bobenko, Lutz 2023).
+        triangulation: updated in place.
+        radii: (n,) radii of the circles at the vertices.
+        has_lengths: flips preserve the metric of its lengths; else its lengths are inversive distances, which flips
+            preserve (Bobenko, Lutz 2023).
     """
     twin, tail, length = triangulation.twin, triangulation.tail, triangulation.length
     flipped: list[int] = []
-    for _ in range(500):  # rounds after which flipping stops, though an edge fails the condition by rounding
+    for _ in range(500):  # limit of rounds, if edges still fail the condition by rounding
         inversive = inversive_distances(triangulation, radii) if has_lengths else length
         slope, size = (each.ravel() for each in slopes(inversive.reshape(-1, 3), radii[triangulation.faces]))
         sums = slope + slope[twin]
@@ -242,7 +245,7 @@ def flip_to_weighted_delaunay(
         bad = np.flatnonzero(fails & (twin // 3 != np.arange(len(twin)) // 3))
         if not len(bad):
             break
-        # The worst first, and in each round those whose quads have no triangle in common.
+        # The worst edges are flipped first; quads flipped in one round have no triangle in common.
         is_new = np.zeros(len(twin) // 3, dtype=bool)
         for h in bad[np.argsort(sums[bad], kind="stable")].tolist():
             one, two = h // 3, int(twin[h]) // 3
@@ -260,9 +263,10 @@ def flip_to_weighted_delaunay(
 
 
 def other_inversive_distance(e: float, b: float, c: float, b2: float, c2: float) -> float:
-    """Return the inversive distance along the other diagonal of the quad of two triangles on the edge e from u to v.
+    """Return the inversive distance along the other diagonal of the quad of two triangles at the edge e from u to v.
 
-    b, b2 are those of the apices from u; c, c2 from v. e is more than 1: tangent circles need no flip.
+    b and b2 are the inversive distances of the apices from u, c and c2 those from v. e is above 1, because edges of
+    tangent circles are never flipped.
     """
     across = b * b2 + c * c2 + e * (b * c2 + b2 * c)
     spread = [e * e + s * s + t * t + 2 * e * s * t - 1 for s, t in ((b, c), (b2, c2))]

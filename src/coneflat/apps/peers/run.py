@@ -1,4 +1,4 @@
-"""All methods on one mesh, with the same cones and the same cut; and as tables."""
+"""Comparison of methods on one mesh, with the same cones and the same cut, and its tables."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from ...errors import OptionError
 from .methods import METHODS, flatten_by
 from .packages import PEERS, installed_peers, run_peer
 
-# Options that do not say which cones there are, nor how to get from them to a layout.
+# Options that affect neither the cones nor the method from cones to a layout.
 SHARED = (
     "repair", "strict", "seams", "no_seams", "sharp_angle", "hide_seams", "seam_weights", "charts", "resolution",
     "padding", "tiles", "up",
 )  # fmt: skip
-# Those of them that name vertices of the input.
-NAMING = ("seams", "no_seams", "seam_weights")
-# The stages that lead from cones and cut to a layout.
+# Those of them that contain vertex indices of the input.
+VERTEX_OPTIONS = ("seams", "no_seams", "seam_weights")
+# The stages from cones and cut to a layout.
 TIMED = ("metric", "layout")
-#: The methods but those that stand in as they were used in 2008.
+#: The default methods, without the variants as used in 2008.
 COMPARED = tuple(name for name in METHODS if "/" not in name)
 
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """What one method made of a mesh.
+    """The result of one method.
 
     Attributes:
-        method: its name.
-        result: the flattening; None where there is none.
-        seconds: from the cones and the cut to the layout; of a peer all that it does.
-        note: what it does not do as the others do, or why there is no result.
+        method: name of the method.
+        result: the flattening; None if the method failed.
+        seconds: running time from the cones and the cut to the layout; of a peer, its total running time.
+        note: differences from the other methods, or the error if there is no result.
     """
 
     method: str
@@ -52,12 +52,12 @@ class Entry:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What several methods made of one mesh.
+    """The results of several methods on one mesh.
 
     Attributes:
-        name: of the mesh.
-        triangles: how many it has.
-        entries: one for each method, and for each peer.
+        name: name of the mesh.
+        triangles: its number of triangles.
+        entries: one for each method and each peer.
     """
 
     name: str
@@ -88,14 +88,17 @@ def compare_methods(
     Args:
         mesh, faces: as for `coneflat.flatten`.
         methods: names of `METHODS`; by default those without a /.
-        peers: names of other packages' methods, of `PEERS`; by default those that are installed.
-        progress: called with what is done and the fraction done.
-        options: arguments of `coneflat.flatten`, in one chart by default; those of cones hold for all, by the method
-            "exact" if they do not name another.
+        peers: names of methods of other packages, from `PEERS`; by default those that are installed.
+        progress: called with the current step and the completed fraction.
+        options: options of `coneflat.flatten`, with one chart by default. The cones and the cut are those of the method
+            in the options, "exact" by default, and are used for all methods.
+
+    Returns:
+        The results of all methods.
 
     Raises:
         OptionError: a method or peer is unknown or not installed.
-        MeshError: the mesh cannot be flattened, or cones not be found.
+        MeshError: the mesh cannot be flattened, or no cones were found.
     """
     methods = known_methods(methods)
     chosen = installed_peers() if peers is None else tuple(dict.fromkeys(peers))
@@ -119,10 +122,10 @@ def compare_methods(
     cones = dict(zip(base.cones.tolist(), base.curvatures.tolist(), strict=True)) or "none"
     same, same_faces = _with_cones(mesh, faces, base)
     shared = {name: value for name, value in options.items() if name in SHARED}
-    if same is not mesh and any(name in shared for name in NAMING):
+    if same is not mesh and any(name in shared for name in VERTEX_OPTIONS):
         raise OptionError(
-            "a cone lies where the repair split a vertex, so that the input's numbers do not tell which edges are "
-            f"meant: leave out {', '.join(name for name in NAMING if name in shared)}"
+            "a cone is at a vertex that the repair split, so vertex indices of the input are ambiguous: leave out "
+            f"{', '.join(name for name in VERTEX_OPTIONS if name in shared)}"
         )
     entries = []
     for done, name in enumerate(names, 1):
@@ -141,10 +144,10 @@ def compare_methods(
 
 
 def known_methods(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of methods, each once.
+    """Return the names of methods without repetitions.
 
     Raises:
-        OptionError: one is unknown, or there is none.
+        OptionError: a name is unknown, or there are no names.
     """
     names = tuple(dict.fromkeys(names))
     for name in names or ("",):
@@ -154,9 +157,9 @@ def known_methods(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def _with_cones(mesh: Any, faces: ArrayLike | None, base: Flattening) -> tuple[Any, ArrayLike | None]:
-    """Return the mesh on which numbers name the cones of a result: the input, or the repaired one.
+    """Return the mesh whose vertex indices identify the cones of a result: the input, or the repaired mesh.
 
-    A vertex that a repair split has copies that no number of the input tells apart.
+    The copies of a vertex that a repair split have the same index in the input.
     """
     origin = base.vertex_origin
     if origin is None or np.array_equal(origin[base.cones], base.cones):
@@ -165,9 +168,9 @@ def _with_cones(mesh: Any, faces: ArrayLike | None, base: Flattening) -> tuple[A
 
 
 def _entry(name: str, result: Flattening, base: Flattening) -> Entry:
-    """Return what a method made, where another made the base; what was done to the input is a note on that."""
-    said = () if result is base else base.notes
-    notes = [note.rstrip(".") for note in result.notes if note not in said]
+    """Return the entry of a method, without the notes on the input that are already on the base result."""
+    known = () if result is base else base.notes
+    notes = [note.rstrip(".") for note in result.notes if note not in known]
     if _cut_edges(result) != _cut_edges(base):
         notes.insert(0, "cut along other edges")
     return Entry(name, result, sum(result.seconds[stage] for stage in TIMED), "; ".join(notes))
@@ -178,13 +181,13 @@ def _cut_edges(result: Flattening) -> set[tuple[int, int]]:
 
 
 def _warm_up(method: str) -> None:
-    """Load what a method needs by a tetrahedron, so that its time is that of its work."""
+    """Run a method on a tetrahedron, so that its time does not include loading of modules."""
     vertices, faces = np.eye(4)[:, :3] - 0.25, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     with suppress(ConeflatError):
         flatten_by(method, vertices, faces, cones=dict.fromkeys(range(4), np.pi))
 
 
-#: Heading of each column, and how a number below it is written.
+#: Heading of each column, and the format of its numbers.
 COLUMNS = {
     "curvature error, pi": ".1e",
     "QC mean": ".4f",
@@ -200,7 +203,7 @@ COLUMNS = {
 
 
 def numbers(entry: Entry) -> list[float | int]:
-    """Return what the columns show of a method; NaN where there is nothing."""
+    """Return the values of the columns for a method; NaN if it failed."""
     if entry.result is None:
         return [math.nan] * len(COLUMNS)
     d = entry.result.distortion
@@ -218,34 +221,34 @@ def numbers(entry: Entry) -> list[float | int]:
     ]
 
 
-def written(value: float | int, form: str) -> str:
-    """Return a number as it stands in a table; nothing for NaN."""
+def as_cell(value: float | int, form: str) -> str:
+    """Return a number as the text of a table cell; empty for NaN."""
     if isinstance(value, float) and not math.isfinite(value):
         return ""
     return format(int(value) if form.endswith("d") else value, form)
 
 
 def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table."""
+    """Return a table as Markdown."""
     lines = [headings, ["---"] * len(headings), *rows]
     return "".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |\n" for line in lines)
 
 
 def comparison_rows(comparison: Comparison) -> list[list[str]]:
-    """Return a row of text for each method, without its note."""
+    """Return a row of cell texts for each method, without its note."""
     return [
-        [entry.method, *(written(n, form) for n, form in zip(numbers(entry), COLUMNS.values(), strict=True))]
+        [entry.method, *(as_cell(n, form) for n, form in zip(numbers(entry), COLUMNS.values(), strict=True))]
         for entry in comparison.entries
     ]
 
 
 def comparison_markdown(comparison: Comparison) -> str:
-    """Return the methods in a table, and what is to be said of them."""
+    """Return the table of methods and their notes as Markdown."""
     return f"{markdown(['method', *COLUMNS], comparison_rows(comparison))}\n{notes([comparison])}"
 
 
 def notes(comparisons: Sequence[Comparison]) -> str:
-    """Return a line for each note that methods have, with the meshes that it is about where there are several."""
+    """Return a line for each note on a method, with the names of the meshes if there are several."""
     meshes: dict[tuple[str, str], list[str]] = {}
     for comparison in comparisons:
         for entry in comparison.entries:
@@ -259,13 +262,13 @@ def notes(comparisons: Sequence[Comparison]) -> str:
 
 
 def comparison_csv(comparison: Comparison) -> str:
-    """Return the methods as comma separated values, at full precision."""
+    """Return the table of methods as comma-separated values, at full precision."""
     rows = [[entry.method, *numbers(entry), entry.note] for entry in comparison.entries]
     return as_csv(["method", *COLUMNS, "note"], rows)
 
 
 def as_csv(headings: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """Return comma separated values; NaN is left empty."""
+    """Return rows as comma-separated values; NaN is empty."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(headings)
@@ -275,7 +278,7 @@ def as_csv(headings: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 
 
 def comparison_lines(comparison: Comparison) -> Iterator[str]:
-    """Yield a line for each method, and the notes."""
+    """Yield the table of methods as aligned lines of text, and the notes."""
     rows = [["method", *COLUMNS], *comparison_rows(comparison)]
     first, *widths = (max(map(len, column)) for column in zip(*rows, strict=True))
     for name, *cells in rows:

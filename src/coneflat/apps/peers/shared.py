@@ -1,4 +1,4 @@
-"""What the methods to compare with share: layouts and metrics at the area of the mesh, and what is told of failures."""
+"""Functions shared by the compared methods: metrics and embeddings at the area of the mesh, and notes on failures."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ def failure_notes(what: str, steps: int, residual: float, unit: str, accepted: b
     """Return the note on a solve that did not converge, if its result is accepted.
 
     Args:
-        what: a clause, of what was not found.
-        steps: Newton steps.
-        residual, unit: of the quantity that the clause names last.
-        accepted: whether what there is will do.
+        what: a clause on the failure, which ends with the quantity of the residual.
+        steps: number of Newton steps.
+        residual, unit: value and unit of this quantity.
+        accepted: whether the result is still accepted.
 
     Raises:
-        ConvergenceError: it will not.
+        ConvergenceError: the result is not accepted, or the residual is not finite.
     """
     failure = f"{what} {off_by(residual, unit)} after {plural(steps, 'step')}"
     if not accepted or not np.isfinite(residual):
@@ -44,14 +44,14 @@ def flat_metric(
     """Return a metric on a flipped triangulation, at the area of the mesh; its boundary is free.
 
     Args:
-        mesh: connected.
+        mesh: a connected mesh.
         lengths: (m, 3) its side lengths.
         solution: its cones and their curvatures.
-        triangulation: gets the flat lengths.
-        flat: (3m,) lengths found.
+        triangulation: the flipped triangulation; its lengths are set to the flat ones.
+        flat: (3m,) flat lengths.
         log_scale: (n,) phi, up to a constant.
-        flips: half-edges flipped, in order.
-        steps: Newton steps.
+        flips: flipped half-edges, in order.
+        steps: number of Newton steps.
     """
     border, faces = mesh.is_boundary_vertex, triangulation.faces
     curvature = angle_defect(faces, corner_angles(flat.reshape(-1, 3)), border)
@@ -78,12 +78,12 @@ def embedding_metric(
     embed: Callable[[Cut], Embedding],
     holds_cones: bool = True,
 ) -> FlatMetric:
-    """Return what stands for a metric where a method maps the cut mesh itself; its boundary is free.
+    """Return the metric object of a method that maps the cut mesh directly; its boundary is free.
 
     Args:
-        mesh: connected.
+        mesh: a connected mesh.
         lengths: (m, 3) side lengths.
-        solution: the cones and what was asked of them.
+        solution: the cones and their curvatures.
         embed: maps the cut mesh.
         holds_cones: whether the method prescribes the cones' curvatures.
     """

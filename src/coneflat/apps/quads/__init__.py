@@ -1,1 +1,1 @@
-"""Integer grids: layouts whose grid lines close up on the surface, and the quads that they are."""
+"""Integer-grid maps and the quad meshes extracted from them."""

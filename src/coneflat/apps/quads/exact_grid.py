@@ -1,8 +1,8 @@
-"""Grid coordinates without rounding: the same point of the surface has the same place seen from all its triangles.
+"""Exact grid coordinates: a point of the surface has consistent coordinates in all triangles that contain it.
 
-Turns by quarters and whole translations are exact on numbers with a fixed number of binary places. So one corner of
-each vertex is rounded to such places, and carried around the vertex to the others (H.-C. Ebke, D. Bommes, M. Campen, L.
-Kobbelt, "QEx: robust quad mesh extraction", 2013). From there on nothing is rounded any more.
+Quarter turns and integer translations are exact for numbers with a fixed number of binary digits. So one corner of each
+vertex is rounded to such a number, and its coordinates are transported around the vertex to the other corners (H.-C.
+Ebke, D. Bommes, M. Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013). After that no rounding occurs.
 """
 
 from __future__ import annotations
@@ -21,22 +21,23 @@ from .layout import GRID_TOLERANCE, quarters_around
 if TYPE_CHECKING:
     from .integer_map import IntegerGrid
 
-# Grid units: what is so near a grid line is on it. Solvers leave 1e-12; what is on a line is to stay there.
+# Grid units: closer coordinates are snapped to a grid line. Errors of solvers are about 1e-12.
 SNAP_DISTANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class ExactGrid:
-    """A map onto the integer grid that is exact, in arrays as kernels take them.
+    """An exact integer-grid map, as arrays for compiled kernels.
 
     Attributes:
         mesh: the triangles.
-        corners: (m, 3, 2) grid coordinates, exact: across every edge one side is the other moved.
-        twin: (3m,) the other half-edge of each edge, -1 on the boundary.
+        corners: (m, 3, 2) exact grid coordinates: across every edge, the motion maps one side exactly to the other.
+        twin: (3m,) the opposite half-edge of each, -1 on the boundary.
         turns: (3m,) quarter turns from the coordinates of the half-edge's triangle to those of its twin's.
-        shifts: (3m, 2) likewise, added after turning; whole.
-        fans: corners, numbered along `faces.ravel()`: the first one of each vertex, on the boundary the most clockwise;
-            the second ones counterclockwise of these, where there are any; and so on.
+        shifts: (3m, 2) integer translations, added after the rotation.
+        fans: corners as indices into `faces.ravel()`: array k holds the corner of each vertex k steps counterclockwise
+            of its first corner, which on the boundary is the most clockwise one; vertices with fewer corners are left
+            out.
     """
 
     mesh: TriangleMesh
@@ -48,11 +49,11 @@ class ExactGrid:
 
 
 def exact_grid(grid: IntegerGrid) -> ExactGrid:
-    """Return an integer-grid map made exact.
+    """Return an integer-grid map with exact coordinates.
 
     Raises:
-        GridError: it is none: the two sides of an edge do not fit, a cone is no grid point or has another angle
-            than said, or a triangle is not counterclockwise.
+        GridError: the map is not an integer-grid map: the two sides of an edge do not match, a cone is not a grid
+            point or has a different angle than stated, or a triangle is not counterclockwise.
     """
     mesh = TriangleMesh(np.asarray(grid.vertices, np.float64), np.asarray(grid.faces, np.int64))
     given = np.ascontiguousarray(grid.corner_grid, np.float64)
@@ -62,18 +63,18 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
     turns, shifts = _crossings(grid, twin)
     fans = _fans(mesh, twin)
     most = max(float(np.abs(given).max()), float(np.abs(shifts).max(initial=0.0)), 1.0)
-    # Binary digits of a coordinate: those of a double, but for two, as sums of coordinates and shifts are to be exact.
+    # Coordinates have two binary digits less than a double, so that sums of coordinates and shifts are exact.
     step = np.ldexp(1.0, int(np.frexp(most)[1]) - 51)
     start = np.zeros((len(mesh.vertices), 2))
     start[mesh.faces.ravel()[fans[0]]] = step * np.round(given.reshape(-1, 2)[fans[0]] / step)
     whole = np.round(start)
     snapped = np.where(np.abs(start - whole) <= SNAP_DISTANCE, whole, start)
     exact = ExactGrid(mesh, given, twin, turns, shifts, fans)
-    corners, is_off = _carried(exact, snapped)
+    corners, is_off = _transport(exact, snapped)
     bad = mesh.faces[_signs(corners) <= 0]
-    if bad.size:  # Triangles flatter than that: their vertices are rounded only.
+    if bad.size:  # Snapping degenerates very thin triangles: their vertices are rounded, but not snapped.
         snapped[bad] = start[bad]
-        corners, is_off = _carried(exact, snapped)
+        corners, is_off = _transport(exact, snapped)
     exact = replace(exact, corners=corners)
     _require_map(exact, given, is_off)
     _require_cones(exact, grid)
@@ -81,7 +82,7 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
 
 
 def _crossings(grid: IntegerGrid, twin: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return (3m,), (3m, 2) the motions from each half-edge's triangle to its twin's, the inverses of those given."""
+    """Return (3m,), (3m, 2) the motions from each half-edge's triangle to its twin's, inverse to the given ones."""
     inner = twin >= 0
     turns, shifts = np.zeros(len(twin), dtype=np.int64), np.zeros((len(twin), 2))
     turns[inner] = np.asarray(grid.turns)[twin[inner]]
@@ -99,14 +100,14 @@ def _crossings(grid: IntegerGrid, twin: IntArray) -> tuple[IntArray, FloatArray]
 
 
 def turned(turns: IntArray, points: FloatArray) -> FloatArray:
-    """Return (k, 2) points turned by quarters (k,), without rounding."""
+    """Return (k, 2) points rotated by quarter turns (k,), without rounding."""
     cosine, sine = np.array([1.0, 0.0, -1.0, 0.0])[turns], np.array([0.0, 1.0, 0.0, -1.0])[turns]
     x, y = points[:, 0], points[:, 1]
     return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
 
 
 def _fans(mesh: TriangleMesh, twin: IntArray) -> list[IntArray]:
-    """Return the corners of vertices step by step counterclockwise, see `ExactGrid.fans`."""
+    """Return the corners around vertices in counterclockwise steps, see `ExactGrid.fans`."""
     flat, corner = mesh.faces.ravel(), np.arange(mesh.faces.size)
     first = np.full(len(mesh.vertices), -1, dtype=np.int64)
     first[flat[::-1]] = corner[::-1]
@@ -122,11 +123,11 @@ def _fans(mesh: TriangleMesh, twin: IntArray) -> list[IntArray]:
     return fans
 
 
-def _carried(exact: ExactGrid, start: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Return (m, 3, 2) the places of vertices (n, 2), carried from their first corners to the others.
+def _transport(exact: ExactGrid, start: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Return (m, 3, 2) the coordinates of all corners, transported from the first corners of the vertices (n, 2).
 
-    And (n,) which do not come back to where they were, or do though the surface turns by quarters around them and the
-    place is no grid point.
+    And (n,) whether a vertex is invalid: its coordinates differ after a full loop, or it has holonomy and is not a grid
+    point.
     """
     flat, here = exact.mesh.faces.ravel(), start.copy()
     corners, total = np.empty((len(flat), 2)), np.zeros(len(start), dtype=np.int64)
@@ -144,7 +145,7 @@ def _carried(exact: ExactGrid, start: FloatArray) -> tuple[FloatArray, BoolArray
 
 @compiled
 def turn(quarters: int, x: float, y: float) -> tuple[float, float]:
-    """Return a point turned counterclockwise by quarters from 0 to 3, without rounding."""
+    """Return a point rotated counterclockwise by 0 to 3 quarter turns, without rounding."""
     if quarters == 0:
         return x, y
     if quarters == 1:
@@ -155,19 +156,19 @@ def turn(quarters: int, x: float, y: float) -> tuple[float, float]:
 
 
 def _signs(corners: FloatArray) -> IntArray:
-    """Return (m,) the orientations of triangles, exact."""
+    """Return (m,) the exact orientation signs of triangles."""
     signs = np.empty(len(corners), dtype=np.int64)
     fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
     return signs
 
 
 def _require_map(exact: ExactGrid, given: FloatArray, is_off: BoolArray) -> None:
-    """Raise GridError unless the two sides of all edges fit, and all triangles are counterclockwise."""
+    """Raise GridError unless the two sides of all edges match, and all triangles are counterclockwise."""
     bad = np.flatnonzero(is_off)
     if len(bad):
         raise GridError(
-            f"{plural(len(bad), 'vertex', 'vertices')} around which the grid does not close, or turns though they are "
-            f"no grid points: {list_some(bad)}"
+            f"{plural(len(bad), 'vertex', 'vertices')} around which the grid does not close, or is rotated though they "
+            f"are not grid points: {list_some(bad)}"
         )
     off = np.abs(exact.corners - given).max(axis=(1, 2))
     bad = np.flatnonzero(~(off <= GRID_TOLERANCE))
@@ -184,21 +185,21 @@ def _require_map(exact: ExactGrid, given: FloatArray, is_off: BoolArray) -> None
 
 
 def _require_cones(exact: ExactGrid, grid: IntegerGrid) -> None:
-    """Raise GridError unless the inner vertices that have not four quarters of angle are the cones, on grid points."""
+    """Raise GridError unless the inner vertices with angles other than 2 pi are the cones and lie on grid points."""
     mesh = exact.mesh
     found = quarters_around(mesh, sides_between(exact.corners))
-    said = np.full(len(found), 4, dtype=np.int64)
-    said[np.asarray(grid.cones, np.int64)] = grid.quarters
+    expected = np.full(len(found), 4, dtype=np.int64)
+    expected[np.asarray(grid.cones, np.int64)] = grid.quarters
     inner = ~mesh.is_boundary_vertex & (np.bincount(mesh.faces.ravel(), minlength=len(found)) > 0)
-    bad = np.flatnonzero(inner & (found != said))
+    bad = np.flatnonzero(inner & (found != expected))
     if len(bad):
         raise GridError(
-            f"{plural(len(bad), 'vertex', 'vertices')} with other angles than said: {list_some(bad)}; vertex {bad[0]} "
-            f"has {found[bad[0]]} quarter turns, not {said[bad[0]]}"
+            f"{plural(len(bad), 'vertex', 'vertices')} with unexpected angles: {list_some(bad)}; vertex {bad[0]} "
+            f"has {found[bad[0]]} quarter turns, expected {expected[bad[0]]}"
         )
     place = exact.corners.reshape(-1, 2)[exact.fans[0]]
-    is_loose = np.zeros(len(found), dtype=bool)
-    is_loose[mesh.faces.ravel()[exact.fans[0]]] = (place != np.round(place)).any(axis=1)
-    bad = np.flatnonzero(inner & (said != 4) & is_loose)
+    is_off = np.zeros(len(found), dtype=bool)
+    is_off[mesh.faces.ravel()[exact.fans[0]]] = (place != np.round(place)).any(axis=1)
+    bad = np.flatnonzero(inner & (expected != 4) & is_off)
     if len(bad):
         raise GridError(f"{plural(len(bad), 'cone')} off the grid points: {list_some(bad)}")

@@ -1,4 +1,4 @@
-"""Quads out of an integer-grid map.
+"""Extraction of a quad mesh from an integer-grid map.
 
 H.-C. Ebke, D. Bommes, M. Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013.
 """
@@ -16,27 +16,31 @@ from .grid_points import LOST, GridPoints, Ports, find_points, find_ports, join_
 from .integer_map import IntegerGrid
 from .quad_mesh import QuadMesh, require_manifold
 
-# Squares at most: with about a kilobyte for each at the height of the work, what many machines have room for.
+# Largest number of squares; at about a kilobyte of peak memory for each, many machines have enough.
 MAX_SQUARES = 20_000_000
 
 
 def extract_quads(grid: IntegerGrid) -> QuadMesh:
     """Return the quad mesh whose edges are the grid lines of an integer-grid map.
 
-    Grid points of the surface are its vertices. From each, grid lines leave in as many directions as its angle has
-    quarter turns; they are followed for one unit, across triangles and seams, to the next grid points. Turning left at
-    each, the sides of a quad close after four. All of it is decided by exact signs.
+    The vertices are the grid points on the surface. From each, grid lines leave in as many directions as its angle has
+    quarter turns. They are traced for one unit, across triangles and seams, to the next grid points. A path that turns
+    left at each point closes after four sides, which bound a quad. All decisions use exact predicates.
 
-    Squares that the boundary cuts are left out, and counted. What is left is manifold: quads that then touch in a
-    point alone have a vertex each there.
+    Squares that the boundary cuts are left out and counted. The result is manifold: quads that touch in a single point
+    get separate vertices there.
 
     Raises:
-        GridError: the map is not an integer-grid map, so coarse that quads have a vertex twice, or of too many squares.
+        GridError: the map is not an integer-grid map, is so coarse that a quad has the same vertex twice, or has too
+            many squares.
+
+    References:
+        H.-C. Ebke, D. Bommes, M. Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013.
     """
     area = float(signed_double_areas(grid.corner_grid).sum()) / 2
     if area > MAX_SQUARES:
         raise GridError(
-            f"a grid of {area:,.0f} squares is too fine for quads, of which {MAX_SQUARES:,} are made at most"
+            f"a grid of {area:,.0f} squares is too fine: at most {MAX_SQUARES:,} quads can be extracted"
         )
     exact = exact_grid(grid)
     found = find_points(exact)
@@ -49,12 +53,12 @@ def extract_quads(grid: IntegerGrid) -> QuadMesh:
     if is_closed and left_out:
         raise GridError(f"{plural(left_out, 'square')} of the grid with other than four sides")
     area = float(signed_double_areas(exact.corners).sum()) / 2
-    # The sum over all triangles is rounded.
+    # The tolerance covers rounding of the sum over all triangles.
     if is_closed and abs(area - len(darts)) > 1e-3:
         raise GridError(f"{len(darts):,} quads cover a grid of {area:.3f} squares: some are missing")
     if not len(darts):
         raise GridError(
-            f"no whole square of the grid lies on the surface, of {area:.1f} squares: ask for more quads"
+            f"no complete square of the grid lies on the surface, of {area:.1f} squares: use more quads"
         )
     origin, quads, edge_count = _split_fans(darts, mates, ports.points)
     require_manifold(quads, len(origin), edge_count)
@@ -72,7 +76,7 @@ def extract_quads(grid: IntegerGrid) -> QuadMesh:
 
 
 def _require_pairs(mates: IntArray, ports: Ports) -> None:
-    """Raise GridError unless all ways from ports lead to others, or the boundary, and back."""
+    """Raise GridError unless each port leads to another port, which leads back, or to the boundary."""
     points = ports.points
     lost = np.flatnonzero(mates == LOST)
     if len(lost):
@@ -90,7 +94,7 @@ def _require_pairs(mates: IntArray, ports: Ports) -> None:
 
 
 def _turn_left(mates: IntArray, ports: Ports) -> IntArray:
-    """Return (k,) the port taken next with the quad on the left, clockwise of that arrived at; -1 for none."""
+    """Return (k,) the next port along the quad to the left of each port, clockwise of its mate; -1 for none."""
     clockwise = np.arange(len(mates)) - 1
     first, count = ports.start[:-1], np.diff(ports.start)
     some = count > 0
@@ -99,14 +103,14 @@ def _turn_left(mates: IntArray, ports: Ports) -> IntArray:
 
 
 def _close(following: IntArray, ports: Ports) -> tuple[IntArray, int]:
-    """Return (p, 4) the ports along the sides of each quad, and how many squares with a corner do not close."""
+    """Return (p, 4) the ports along the sides of each quad, and the number of squares that do not close."""
     steps = [np.arange(len(following))]
     for _ in range(4):
         steps.append(np.where(steps[-1] >= 0, following[steps[-1]], -1))
     around = np.stack(steps[:4], axis=1)
     closes = (steps[4] == steps[0]) & (around >= 0).all(axis=1)
     darts = around[closes & (around.min(axis=1) == steps[0])]
-    # A quarter turn lies between each port and the next counterclockwise, which the last on the boundary has not.
+    # There is a quarter turn between each port and its counterclockwise neighbour; the last on the boundary has none.
     is_corner = ~closes
     last = ports.start[1:][ports.is_boundary & (np.diff(ports.start) > 0)] - 1
     is_corner[last] = False
@@ -117,15 +121,15 @@ def _close(following: IntArray, ports: Ports) -> tuple[IntArray, int]:
 
 
 def _split_fans(darts: IntArray, mates: IntArray, points: IntArray) -> tuple[IntArray, IntArray, int]:
-    """Return (q,) the grid point of each vertex, (p, 4) the vertices of quads, and how many edges they have.
+    """Return (q,) the grid point of each vertex, (p, 4) the vertices of quads, and the number of their edges.
 
-    There is a vertex for each fan of quads around a point. Vertices are in the order of points.
+    There is one vertex for each fan of quads around a point. Vertices are in the order of points.
     """
     corner = np.arange(darts.size)
     after = np.roll(corner.reshape(-1, 4), -1, axis=1).ravel()
     corner_of = np.full(len(points), -1, dtype=np.int64)
     corner_of[darts.ravel()] = corner
-    # The quad on the other side of the edge runs from where the port leads to.
+    # The quad on the other side of the edge has the mate of the port.
     other = corner_of[mates[darts.ravel()]]
     shared = np.flatnonzero(other >= 0)
     one, two = shared, other[shared]
@@ -140,7 +144,7 @@ def _split_fans(darts: IntArray, mates: IntArray, points: IntArray) -> tuple[Int
 
 
 def _barycentric(exact: ExactGrid, found: GridPoints, points: IntArray) -> FloatArray:
-    """Return (q, 3) where in their triangles grid points lie; what is on a side or at a corner is exactly there."""
+    """Return (q, 3) barycentric coordinates of grid points in their triangles, exact on sides and at corners."""
     corners = exact.corners[found.faces[points]]
     offset = corners - found.own_places[points][:, None]
     one, two = offset[:, [1, 2, 0]], offset[:, [2, 0, 1]]

@@ -1,4 +1,4 @@
-"""Sharp edges of a surface, what lies between them, and meshes refined for them."""
+"""Sharp edges of a surface, the patches between them, and mesh refinement for them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...mesh import CutMesh, label_components, open_along, tie_key
 
 
 def sharp_edges(mesh: TriangleMesh, angle: float) -> IntArray:
-    """Return the inner edges that bend by more than an angle, radians."""
+    """Return the inner edges with a dihedral angle above a bound, radians."""
     return np.flatnonzero(np.abs(dihedral_angles(mesh)) > angle)
 
 
@@ -23,9 +23,9 @@ def lengths_along(mesh: TriangleMesh, edges: IntArray) -> FloatArray:
 
 
 def without_stubs(mesh: TriangleMesh, edges: IntArray, least: float) -> IntArray:
-    """Return which of some edges (k,) are kept when stubs are dropped.
+    """Return the indices of the edges (k,) that remain after stubs are removed.
 
-    A stub ends where no other one goes on, in less than two edges or before it is as long as is asked.
+    A stub is a chain with a free end and fewer than two edges, or shorter than `least`.
     """
     kept = np.arange(len(edges))
     lengths = lengths_along(mesh, edges)
@@ -43,7 +43,7 @@ def without_stubs(mesh: TriangleMesh, edges: IntArray, least: float) -> IntArray
 
 
 def patches_of(mesh: TriangleMesh, edges: IntArray) -> tuple[int, IntArray]:
-    """Return into how many patches edges part a mesh, and (m,) that of each triangle."""
+    """Return the number of patches into which edges divide a mesh, and (m,) the patch of each triangle."""
     glued = ~mesh.is_boundary_edge
     glued[edges] = False
     pairs = mesh.edge_faces[glued]
@@ -51,33 +51,33 @@ def patches_of(mesh: TriangleMesh, edges: IntArray) -> tuple[int, IntArray]:
 
 
 def dangling(mesh: TriangleMesh, edges: IntArray) -> IntArray:
-    """Return which of some edges (k,) have the same patch on both sides."""
+    """Return the indices of the edges (k,) that have the same patch on both sides."""
     _, patch = patches_of(mesh, edges)
     one, two = patch[mesh.edge_faces[edges]].T
     return np.flatnonzero(one == two)
 
 
 def border_of(mesh: TriangleMesh, edges: IntArray, number: int) -> IntArray:
-    """Return which of some edges (k,) part one patch from another one, those of the chain that does so the longest.
+    """Return the indices of the edges (k,) on the longest chain between a patch and another patch.
 
-    Where none does, those that lie in it; empty if it has none of either.
+    If there is no such chain, return the edges inside the patch; the result may be empty.
     """
     _, patch = patches_of(mesh, edges)
     one, two = patch[mesh.edge_faces[edges]].T
     beside = (one == number) | (two == number)
-    parting = np.flatnonzero(beside & (one != two))
-    if not len(parting):
+    border = np.flatnonzero(beside & (one != two))
+    if not len(border):
         return np.flatnonzero(beside)
     chain, _ = feature_chains(mesh, edges)
     lengths = lengths_along(mesh, edges)
-    longest = int(np.argmax(np.bincount(chain[parting], lengths[parting])))
-    return parting[chain[parting] == longest]
+    longest = int(np.argmax(np.bincount(chain[border], lengths[border])))
+    return border[chain[border] == longest]
 
 
 def feature_chains(mesh: TriangleMesh, edges: IntArray) -> tuple[IntArray, IntArray]:
-    """Return (k,) the chain of each edge, between where other than two meet, and (k, 2) how many do at its ends.
+    """Return (k,) the chain of each edge, and (k, 2) the number of edges that meet at its ends.
 
-    The boundary counts as three edges more.
+    Chains end at vertices where the number of edges is not two. A boundary vertex counts as three further edges.
     """
     ends = mesh.edges[edges]
     degree = np.bincount(ends.ravel(), minlength=len(mesh.vertices)) + 3 * mesh.is_boundary_vertex
@@ -95,9 +95,9 @@ class Opened:
     Attributes:
         mesh: the mesh.
         edges: (k,) the features, inner edges.
-        cut: the mesh cut open along them, with the vertex that each of its own comes from.
-        quarters: (c,) the quarter turns that the angle at each vertex on the boundary of the open mesh is to have: at
-            least one, two where it is straight; 0 inside.
+        cut: the mesh cut open along them, with the original vertex of each of its vertices.
+        quarters: (c,) the target angle at each boundary vertex of the open mesh in quarter turns: at least one, two
+            where it is straight; 0 inside.
     """
 
     mesh: TriangleMesh
@@ -107,7 +107,7 @@ class Opened:
 
     @property
     def nodes(self) -> IntArray:
-        """Vertices on features or the boundary that are to lie on grid points: where these meet, end or turn."""
+        """Vertices on features or the boundary that must lie on grid points: where these meet, end or turn."""
         border = np.flatnonzero(self.quarters > 0)
         turns = np.zeros(len(self.mesh.vertices), dtype=bool)
         turns[self.cut.origin[border[self.quarters[border] != 2]]] = True
@@ -118,25 +118,25 @@ class Opened:
 
     @property
     def irregular(self) -> IntArray:
-        """The inner ones of them whose angles sum to other than four quarter turns."""
+        """The inner nodes with an angle sum other than four quarter turns."""
         total = np.bincount(self.cut.origin, self.quarters, len(self.mesh.vertices)).astype(np.int64)
         return np.flatnonzero((total > 0) & (total != 4) & ~self.mesh.is_boundary_vertex)
 
     @property
     def is_feature(self) -> BoolArray:
-        """(e,) True for edges of the mesh that are features."""
+        """(e,) whether each edge of the mesh is a feature."""
         mask = np.zeros(len(self.mesh.edges), dtype=bool)
         mask[self.edges] = True
         return mask
 
 
 def opened(mesh: TriangleMesh, edges: IntArray, lengths: FloatArray) -> Opened:
-    """Return a mesh cut open along edges (k,), with angles rounded to quarter turns; lengths are (m, 3)."""
+    """Return a mesh cut open along edges (k,), with angles rounded to quarter turns; `lengths` has shape (m, 3)."""
     cut = open_along(mesh, edges)
     angles = corner_angles(lengths)
     sums = np.bincount(cut.mesh.faces.ravel(), angles.ravel(), len(cut.origin)) / (np.pi / 2)
     rounded = np.maximum(np.rint(sums), 1).astype(np.int64)
-    # Corners of an octagon, in the middle between one and two, are none, whatever rounding says.
+    # Corners of an octagon, with 1.5 quarter turns, count as straight independently of rounding errors.
     rounded[(rounded == 1) & (sums > 1.45)] = 2
     return Opened(mesh, edges, cut, np.where(cut.mesh.is_boundary_vertex, rounded, 0))
 
@@ -144,41 +144,43 @@ def opened(mesh: TriangleMesh, edges: IntArray, lengths: FloatArray) -> Opened:
 def split_for_features(
     vertices: FloatArray, faces: IntArray, features: IntArray, longest: float
 ) -> tuple[TriangleMesh, IntArray, IntArray]:
-    """Return a finer mesh of the same surface, its features as edges, and the one of those given that each is part of.
+    """Return a finer mesh of the same surface, (f,) its feature edges, and (f,) the given feature that contains each.
 
-    Edges are split until none is longer than wanted, nor than a part of the patch between features that it lies in; and
-    those that join vertices on features or the boundary without being such, so that straight sides leave every triangle
-    room. Of triangles whose edges are too long the longest is always split before others (M.-C. Rivara, "Algorithms for
-    refining triangular grids suitable for adaptive and multigrid techniques", 1984), so that angles do not become ever
-    smaller.
+    Edges are split until none is longer than `longest`, or than a quarter of the square root of the area of its patch.
+    Edges that join two vertices on features or the boundary, without being such edges, are split too, because straight
+    sides could degenerate their triangles. The longest edge of a triangle is always split first, so that angles do not
+    become arbitrarily small.
 
     Args:
         vertices, faces: (n, 3), (m, 3) the mesh; its vertices remain the first ones.
         features: (k, 2) pairs of vertices.
-        longest: what no edge is to exceed.
+        longest: largest edge length.
+
+    References:
+        M.-C. Rivara, "Algorithms for refining triangular grids suitable for adaptive and multigrid techniques", 1984.
     """
     mesh = TriangleMesh(vertices, faces)
     edges, origin = edge_indices(mesh, features), np.arange(len(features))
-    for _ in range(30):  # each halves edges
+    for _ in range(30):  # each round halves edges
         marked = _too_long(mesh, edges, longest)
         if not marked.any():
             break
-        mesh, edges, origin = _split(mesh, edges, origin, _closed(mesh, marked))
+        mesh, edges, origin = _split(mesh, edges, origin, _with_longest_sides(mesh, marked))
     return _split(mesh, edges, origin, _chords(mesh, edges))
 
 
 def split_faces(
     mesh: TriangleMesh, edges: IntArray, origin: IntArray, faces: IntArray
 ) -> tuple[TriangleMesh, IntArray, IntArray]:
-    """Return a mesh in which all sides of some faces are split, its features (k,) and the origin of each of these."""
+    """Return a mesh with all sides of some faces split, its features (k,), and (k,) the origin of each."""
     marked = np.zeros(len(mesh.edges), dtype=bool)
     marked[mesh.halfedge_edges.reshape(-1, 3)[faces]] = True
-    mesh, edges, origin = _split(mesh, edges, origin, _closed(mesh, marked))
+    mesh, edges, origin = _split(mesh, edges, origin, _with_longest_sides(mesh, marked))
     return _split(mesh, edges, origin, _chords(mesh, edges))
 
 
 def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
-    """Return (k,) the edges of pairs of vertices (k, 2)."""
+    """Return (k,) the indices of the edges between pairs of vertices (k, 2)."""
     n = len(mesh.vertices)
     keys = mesh.edges[:, 0] * n + mesh.edges[:, 1]
     low, high = pairs.min(axis=1, initial=n), pairs.max(axis=1, initial=0)
@@ -188,7 +190,7 @@ def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
 
 
 def _too_long(mesh: TriangleMesh, edges: IntArray, longest: float) -> BoolArray:
-    """Return (e,) the edges longer than what their patches allow."""
+    """Return (e,) whether each edge is longer than its patches allow."""
     count, patch = patches_of(mesh, edges)
     areas = np.linalg.norm(face_normals(mesh.vertices, mesh.faces), axis=1) / 2
     allowed = np.minimum(longest, np.sqrt(np.bincount(patch, areas, count)) / 4)[patch]
@@ -199,7 +201,7 @@ def _too_long(mesh: TriangleMesh, edges: IntArray, longest: float) -> BoolArray:
 
 
 def _chords(mesh: TriangleMesh, edges: IntArray) -> BoolArray:
-    """Return (e,) the edges that join vertices on features or the boundary and are none themselves."""
+    """Return (e,) whether each edge joins two vertices on features or the boundary without being such an edge."""
     is_fixed = mesh.is_boundary_edge.copy()
     is_fixed[edges] = True
     on = np.zeros(len(mesh.vertices), dtype=bool)
@@ -207,8 +209,8 @@ def _chords(mesh: TriangleMesh, edges: IntArray) -> BoolArray:
     return on[mesh.edges].all(axis=1) & ~is_fixed
 
 
-def _closed(mesh: TriangleMesh, marked: BoolArray) -> BoolArray:
-    """Return marks with the longest side of every triangle that has one."""
+def _with_longest_sides(mesh: TriangleMesh, marked: BoolArray) -> BoolArray:
+    """Return (e,) marks extended by the longest side of every triangle that has a marked side."""
     marked, longest = marked.copy(), _longest_sides(mesh, np.ones(len(marked), dtype=bool))
     sides = mesh.halfedge_edges.reshape(-1, 3)
     while True:
@@ -220,9 +222,9 @@ def _closed(mesh: TriangleMesh, marked: BoolArray) -> BoolArray:
 
 
 def _longest_sides(mesh: TriangleMesh, among: BoolArray) -> IntArray:
-    """Return (m,) the longest edge of each triangle among some (e,), if it has any.
+    """Return (m,) the longest edge of each triangle among the given edges (e,), if it has any.
 
-    Of equal ones it is the same, whatever the numbering.
+    The choice among equal edges does not depend on the numbering.
     """
     lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
     key = tie_key(mesh.vertices)[mesh.edges].sum(axis=1)
@@ -238,7 +240,7 @@ def _longest_sides(mesh: TriangleMesh, among: BoolArray) -> IntArray:
 def _split(
     mesh: TriangleMesh, edges: IntArray, origin: IntArray, marked: BoolArray
 ) -> tuple[TriangleMesh, IntArray, IntArray]:
-    """Return a mesh with marked edges split in the middle, its features (k,) and the origin of each of these."""
+    """Return a mesh with marked edges split at their midpoints, its features (k,), and (k,) the origin of each."""
     n = len(mesh.vertices)
     middle = np.full(len(marked), -1)
     middle[marked] = n + np.arange(int(marked.sum()))

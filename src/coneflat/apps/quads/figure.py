@@ -1,4 +1,4 @@
-"""Quads in pictures: their edges, and the vertices where other than four meet."""
+"""Figures of quad meshes: edges and irregular vertices."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from .quad_mesh import QuadMesh
 
-#: Of vertices with fewer quads, and with more: told apart with any colour vision, and by how dark they are.
+#: Colours of vertices with less and with more than four quads; distinguishable in colour blindness and in grey.
 FEWER_COLOR, MORE_COLOR = "#0072b2", "#e69f00"
 
 
@@ -26,16 +26,16 @@ def draw_quads(
     irregular: bool = True,
     dpi: float = DOTS_PER_INCH,
 ) -> None:
-    """Draw a mesh of quads with its edges, and dots where other than four meet inside: blue fewer, orange more.
+    """Draw a quad mesh with its edges and dots at irregular vertices: blue for valence below four, orange above.
 
     Args:
         quads: the mesh.
-        axes: matplotlib axes to draw in; their own lines and ticks are turned off.
+        axes: matplotlib axes to draw in; their lines and ticks are turned off.
         irregular: draw the dots.
-        eye, up, dpi: as of `draw_checker`.
+        eye, up, dpi: as in `draw_checker`.
 
     Raises:
-        OptionError: an option makes no sense.
+        OptionError: an option is invalid.
     """
     from matplotlib.collections import LineCollection
 
@@ -71,7 +71,7 @@ def draw_quads(
 
 
 def irregular_handles(quads: QuadMesh) -> list[Any]:
-    """Return what a legend of matplotlib takes to name the dots, with how many there are."""
+    """Return the legend handles of matplotlib for the dots, labelled with valences and counts."""
     from matplotlib.lines import Line2D
 
     dot: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 5.5, "markeredgecolor": "black"}

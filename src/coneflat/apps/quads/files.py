@@ -1,4 +1,4 @@
-"""Files of integer grids, OBJ whose UVs are the grid and NPZ, and of meshes of quads."""
+"""Files of integer grids (OBJ with grid coordinates as UVs, and NPZ) and of quad meshes."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ from .quad_mesh import QuadMesh
 
 Check: TypeAlias = Callable[["str | PathLike[str]"], Path]
 
-#: Endings of the files that `write_quads` writes.
+#: Extensions of the files that `write_quads` writes.
 QUAD_FORMATS = (".obj", ".ply", ".glb", ".npz")
-#: Returns a path with which `write_quads` can be expected to succeed; raises what it would raise otherwise.
+#: Checks in advance whether `write_quads` can write a path; returns it as a `Path`, or raises the same errors.
 check_quads_output: Check = partial(checked_target, endings=QUAD_FORMATS, what="quads are written as")
-#: Arrays from which a mesh of quads is made again.
+#: Arrays from which a quad mesh is restored.
 _NAMES = ("vertices", "quads", "faces", "barycentric", "surface_vertices", "surface_faces", "report")
-#: Endings of the files that `write_grid` writes and `read_grid` reads.
+#: Extensions of the files that `write_grid` writes and `read_grid` reads.
 GRID_FORMATS = (".obj", ".npz")
-#: The same for `write_grid`.
+#: The same check for `write_grid`.
 check_grid_output: Check = partial(checked_target, endings=GRID_FORMATS, what="integer grids are written as")
-#: The arrays of an integer grid, and its numbers.
+#: Names of the arrays of an integer grid, and of its numbers.
 _ARRAYS, _NUMBERS = (
     [field.name for field in fields(IntegerGrid) if str(field.type).endswith(kind)]
     for kind in ("Array", "float")
@@ -60,27 +60,26 @@ _ARRAYS, _NUMBERS = (
 _REPORT = re.compile(rb"(?m)^# grid (\{.*\})[ \t]*\r?$")
 _LINE = re.compile(rb"(?m)^l +(\d+) +(\d+)[ \t]*\r?$")
 _HEAD = (
-    "# An integer grid by coneflat: texture coordinates are in squares of the grid, which goes on across seams.",
-    "# seam V W TURNS X Y: across the edge from V to W, p of the triangle on its right is R p + (X, Y) in that on its",
-    "# left, R being so many quarter turns to the left. Other edges are no seams.",
+    "# An integer grid by coneflat. Texture coordinates are in units of the grid, which continues across seams.",
+    "# seam V W TURNS X Y: the point p in the triangle right of the edge from V to W is R p + (X, Y) in the triangle",
+    "# left of it, where R is a rotation by TURNS quarter turns counterclockwise. Other edges are not seams.",
     "# Lines (l) are sharp edges on grid lines.",
 )
 
 
 def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
-    """Write a mesh of quads, in full or not at all, and return the path.
+    """Write a quad mesh atomically and return the path.
 
-    An .obj has the fewest digits from which the same numbers are read; a .ply is binary, coordinates as doubles. A
-    .glb, which knows no quads, has two triangles for each, and their edges as lines; see `_write_glb`. An .npz has
-    all arrays of the `QuadMesh`, from which `read_quads` makes it again, and the irregular vertices with
-    their valences.
+    An .obj has as many digits as are needed to read the same numbers; a .ply is binary with double coordinates. A .glb,
+    which has no quads, has two triangles for each and their edges as lines; see `_write_glb`. An .npz has all arrays of
+    the `QuadMesh`, from which `read_quads` restores it, and the irregular vertices with their valences.
 
     Args:
         path: the file.
-        mesh: what to write.
+        mesh: the quad mesh.
 
     Raises:
-        UnknownFormatError: the ending is not one of `QUAD_FORMATS`.
+        UnknownFormatError: the extension is not one of `QUAD_FORMATS`.
         MeshFileError: the file cannot be written.
     """
     path = check_quads_output(path)
@@ -90,7 +89,7 @@ def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
 
 
 def write_quads_stream(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
-    """Write a mesh of quads to a binary stream; ending: one of `QUAD_FORMATS`, see `write_quads`."""
+    """Write a quad mesh to a binary stream; `ending` is one of `QUAD_FORMATS`, see `write_quads`."""
     if ending == ".obj":
         stream.writelines(lines_of("v", mesh.vertices, b"\n"))
         stream.writelines(lines_of("f", mesh.quads + 1, b"\n"))
@@ -120,7 +119,7 @@ def _write_quads_npz(mesh: QuadMesh, stream: IO[bytes]) -> None:
 
 
 def holds_quads(path: str | PathLike[str]) -> bool:
-    """Return whether a file is an archive with quads, whatever else may be wrong with it."""
+    """Return whether a file is an .npz archive with quads; its content is not validated."""
     path = as_path(path)
     try:
         with zipfile.ZipFile(path) as archive:
@@ -130,11 +129,11 @@ def holds_quads(path: str | PathLike[str]) -> bool:
 
 
 def read_quads(path: str | PathLike[str]) -> QuadMesh:
-    """Return a mesh of quads that was written as .npz.
+    """Return a quad mesh from an .npz file.
 
     Raises:
-        UnknownFormatError: the ending is another.
-        MeshFileError: the file is not there, may not be read, or holds no mesh of quads.
+        UnknownFormatError: the extension is not .npz.
+        MeshFileError: the file does not exist, cannot be read, or does not contain a quad mesh.
     """
     path = as_path(path)
     known_ending(path, (".npz",), "quads with their surface are read from")
@@ -161,20 +160,20 @@ def _quad_mesh(reading: CheckedArrays) -> QuadMesh:
 _LINE_MATERIAL: dict[str, Any] = {
     "name": "edges",
     "pbrMetallicRoughness": {"baseColorFactor": [0.02] * 3 + [1.0], "metallicFactor": 0.0},
-    # Lines have no side to be lit from.
+    # Lines have no normals for lighting.
     "extensions": {"KHR_materials_unlit": {}},
 }
 
 
 def _write_glb(mesh: QuadMesh, stream: IO[bytes]) -> None:
-    """Write a mesh of quads as GLB: two triangles for each quad, and its edges as lines, so that quads are seen.
+    """Write a quad mesh as GLB: two triangles for each quad, and the edges of quads as visible lines.
 
-    The first primitive has the vertices in their order and the triangles on either side of the shorter diagonal of quad
-    after quad; the second has the edges, a hundredth of the mean edge above the quads: nearer,
-    and viewers draw them in dashes. All are 32-bit floats.
+    The first primitive has the vertices in their order, and for each quad the two triangles at its shorter diagonal.
+    The second has the edges, raised above the quads by a hundredth of the mean edge length; closer lines
+    appear dashed in viewers. Coordinates are 32-bit floats.
 
     Raises:
-        MeshFileError: it is larger than GLB can be.
+        MeshFileError: the file would be larger than GLB allows.
     """
     normals = shading_normals(vertex_normals(mesh.vertices, mesh.triangles))
     ends = mesh.vertices[mesh.edges]
@@ -208,20 +207,19 @@ def _write_glb(mesh: QuadMesh, stream: IO[bytes]) -> None:
 
 
 def write_grid(path: str | PathLike[str], grid: IntegerGrid) -> Path:
-    """Write an integer grid, in full or not at all, and return the path.
+    """Write an integer grid atomically and return the path.
 
-    An .obj has the place of every triangle corner as texture coordinates in units of the grid, with all their
-    digits: the form in which programs that extract quads take it, libQEx among them. The quarter turns and
-    translations of seam edges, and the measures of the grid, stand in comments. An .npz has all arrays of the
-    `IntegerGrid`, and `seams` (k, 2), pairs of vertices with their `seam_turns` (k,) and `seam_shifts` (k, 2), as the
-    comments have them.
+    An .obj has the grid coordinates of every triangle corner as texture coordinates, with all digits, as programs that
+    extract quads expect them, for example libQEx. Comments contain the quarter turns and translations of seam edges and
+    the measures of the grid. An .npz has all arrays of the `IntegerGrid`, and the content of these comments: `seams`
+    (k, 2), pairs of vertices, with `seam_turns` (k,) and `seam_shifts` (k, 2).
 
     Args:
         path: the file.
-        grid: what to write.
+        grid: the integer grid.
 
     Raises:
-        UnknownFormatError: the ending is not one of `GRID_FORMATS`.
+        UnknownFormatError: the extension is not one of `GRID_FORMATS`.
         MeshFileError: the file cannot be written.
     """
     path = check_grid_output(path)
@@ -231,11 +229,11 @@ def write_grid(path: str | PathLike[str], grid: IntegerGrid) -> Path:
 
 
 def _write_grid_obj(grid: IntegerGrid, stream: IO[bytes]) -> None:
-    # A corner of the same vertex at the same place is the same point.
+    # Corners of the same vertex with equal coordinates share a point.
     keys = np.concatenate([grid.faces.reshape(-1, 1), grid.corner_grid.reshape(-1, 2)], axis=1)
     points, number_of = np.unique(keys, axis=0, return_inverse=True)
-    told = {**grid.report(), "notes": list(grid.notes)}
-    stream.write(("\n".join([*_HEAD, f"# grid {json.dumps(told)}"]) + "\n").encode("ascii"))
+    report = {**grid.report(), "notes": list(grid.notes)}
+    stream.write(("\n".join([*_HEAD, f"# grid {json.dumps(report)}"]) + "\n").encode("ascii"))
     edges, turns, shifts = _seams(grid)
     rows = np.concatenate([edges + 1, turns[:, None], shifts], axis=1)
     stream.writelines(lines_of("# seam", rows, b"\n"))
@@ -249,9 +247,9 @@ def _write_grid_obj(grid: IntegerGrid, stream: IO[bytes]) -> None:
 
 
 def _seams(grid: IntegerGrid) -> tuple[IntArray, IntArray, IntArray]:
-    """Return (k, 2) seam edges, (k,) turns and (k, 2) shifts; the triangle on the left of an edge is moved to.
+    """Return (k, 2) seam edges, (k,) turns and (k, 2) shifts of the motion from their right to their left triangle.
 
-    An edge is a seam where the motion across it is not none.
+    An edge is a seam if the motion across it is not the identity.
     """
     mesh = TriangleMesh(grid.vertices, grid.faces)
     here = mesh.edge_halfedges[~mesh.is_boundary_edge, 0]
@@ -264,21 +262,21 @@ def _write_grid_npz(grid: IntegerGrid, stream: IO[bytes]) -> None:
     edges, turns, shifts = _seams(grid)
     arrays: dict[str, Any] = {name: getattr(grid, name) for name in _ARRAYS}
     arrays |= {"seams": edges, "seam_turns": turns, "seam_shifts": shifts}
-    told = {**grid.report(), "notes": list(grid.notes)}
-    np.savez(stream, **arrays, report=np.array(json.dumps(told)))
+    report = {**grid.report(), "notes": list(grid.notes)}
+    np.savez(stream, **arrays, report=np.array(json.dumps(report)))
 
 
 def read_grid(path: str | PathLike[str]) -> IntegerGrid:
     """Return an integer grid from an .npz or .obj file.
 
-    Of an .obj nothing is needed but triangles and their texture coordinates, in units of the grid: quarter turns,
-    translations and cones follow from these. Measures are those in the comments of `write_grid`, else not numbers.
+    An .obj needs triangles with texture coordinates in units of the grid only; quarter turns, translations and cones
+    follow from these. Measures are read from the comments of `write_grid`; without these they are NaN.
 
     Raises:
-        UnknownFormatError: the ending is another.
-        MeshFileError: the file is not there, may not be read, or holds no manifold of triangles with UVs.
-        MeshError: it has no vertices or faces, or some that do not exist.
-        GridError: the UVs are not an integer-grid map: triangles are flipped, or sides of seams do not fit.
+        UnknownFormatError: the extension is not one of `GRID_FORMATS`.
+        MeshFileError: the file does not exist, cannot be read, or does not contain a manifold triangle mesh with UVs.
+        MeshError: the mesh has no vertices or faces, or indices of vertices that do not exist.
+        GridError: the UVs are not an integer-grid map: triangles are flipped, or sides of seams do not match.
     """
     path = as_path(path)
     if known_ending(path, GRID_FORMATS, "integer grids are read from") == ".npz":
@@ -299,27 +297,27 @@ def _grid_of_obj(path: Path, content: bytes) -> IntegerGrid:
     known = {} if match is None else _known(path, match[1])
     features = np.array(_LINE.findall(content), dtype=np.int64).reshape(-1, 2) - 1
     if len(features) and not (features.min() >= 0 and features.max() < len(mesh.vertices)):
-        raise MeshFileError(f"{path} has lines between vertices that it does not have")
+        raise MeshFileError(f"{path} has lines with vertex indices that do not exist")
     return grid_of_corners(mesh.vertices, faces, places, **known, features=features)
 
 
 def _require_mesh(path: Path, vertices: FloatArray, faces: IntArray) -> None:
-    """Raise MeshFileError unless triangles are a manifold, and all run the same way round."""
+    """Raise MeshFileError unless the triangles are a consistently oriented manifold."""
     used, numbers = np.unique(faces, return_inverse=True)
     again = numbers.reshape(-1, 3)
     try:
         checked = check_mesh(vertices[used], again)
     except MeshError as error:
-        # What follows is how to repair it, which a map does not survive.
+        # The rest of the message advises a repair, which would break the map.
         raise MeshFileError(f"{path} holds no integer grid: {str(error).split(';')[0]}") from error
     if (checked.mesh.faces != again).any():
         raise MeshFileError(
-            f"{path} holds no integer grid: neighbouring triangles run in opposite directions"
+            f"{path} holds no integer grid: neighbouring triangles have opposite orientations"
         )
 
 
 def _known(path: Path, text: bytes) -> dict[str, Any]:
-    """Return the measures and notes that a comment has."""
+    """Return the measures and notes in a comment."""
     try:
         report = json.loads(text)
         known: dict[str, Any] = {name: float(number(report[name])) for name in _NUMBERS if name in report}
@@ -356,6 +354,6 @@ def _grid_of_archive(reading: CheckedArrays) -> IntegerGrid:
     turns, shifts, _ = find_motions(TriangleMesh(vertices, faces), grid.corner_grid)
     if (turns != grid.turns).any() or (shifts != grid.shifts).any():
         raise MeshFileError(
-            f"{reading.path} holds no integer grid: its turns and shifts are not those of its corners"
+            f"{reading.path} holds no integer grid: its turns and shifts do not match its corners"
         )
     return grid

@@ -1,9 +1,10 @@
-"""The points of an integer grid on a surface, each once, and the grid lines that join them.
+"""The points of an integer grid on a surface, and the grid lines that connect them.
 
-A point lies inside a triangle, within an edge or at a vertex; which, exact signs decide (H.-C. Ebke, D. Bommes, M.
-Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013). Lines are followed for one unit from point to point,
-across triangles and seams, just beside themselves, on their left or on their right, so they never meet a vertex: exact
-signs tell which two sides of a triangle a line crosses, and one along edges is not a special case.
+Exact predicates decide whether a point lies inside a triangle, on an edge or at a vertex (H.-C. Ebke, D. Bommes, M.
+Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013). Lines are traced for one unit from point to point, across
+triangles and seams. A traced line is symbolically displaced by an infinitesimal distance to its left or right, so that
+it never meets a vertex: exact signs give the two sides of a triangle that it crosses, and a line along edges is not a
+special case.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ from ...base import BoolArray, FloatArray, IntArray, compiled, dots
 from ...geometry import fill_orientations, orientation
 from .exact_grid import ExactGrid, turn, turned
 
-#: Where a port leads to no other: the boundary is in the way, or something is wrong with the map.
+#: Values for a port without a mate: its line ends at the boundary, or the map is invalid.
 BOUNDARY, LOST = -1, -2
 # The directions of ports.
 AXES = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
 
-# A map and its points as kernels take them: corners, twin, turns and shifts of an `ExactGrid`, start and places of
+# A map and its points as arguments of kernels: corners, twin, turns and shifts of an `ExactGrid`, start and places of
 # `GridPoints`.
 Grid: TypeAlias = tuple[FloatArray, IntArray, IntArray, FloatArray, IntArray, FloatArray]
 
@@ -32,12 +33,12 @@ class GridPoints:
     """The grid points of a surface.
 
     Attributes:
-        start: (m + 1,) triangle f, with its boundary, holds the entries from start[f] to start[f + 1].
-        places: (e, 2) their coordinates in the triangle, sorted by the second, then by the first.
-        points: (e,) the point of each entry; those on edges and at vertices have several.
-        entry: (p,) the entry that a point is known by.
+        start: (m + 1,) the closed triangle f contains the entries from start[f] to start[f + 1].
+        places: (e, 2) coordinates of the entries in the triangle, sorted by the second, then by the first coordinate.
+        points: (e,) the point of each entry; points on edges and at vertices have several entries.
+        entry: (p,) a representative entry of each point.
         faces: (p,) the triangle of that entry.
-        sides: (p,) where in that triangle the point lies: within side 0 to 2, at corner 3 to 5, or inside, 6.
+        sides: (p,) position of the point in that triangle: 0 to 2 on a side, 3 to 5 at a corner, 6 inside.
     """
 
     start: IntArray
@@ -49,7 +50,7 @@ class GridPoints:
 
     @property
     def own_places(self) -> FloatArray:
-        """(p, 2) coordinates of each point in its own triangle."""
+        """(p, 2) coordinates of each point in the triangle of its representative entry."""
         return self.places[self.entry]
 
 
@@ -59,10 +60,10 @@ class Ports:
 
     Attributes:
         start: (p + 1,) point v has the ports from start[v] to start[v + 1].
-        faces: (k,) the triangle that a port leads into, or along whose side it leads.
+        faces: (k,) the triangle that contains the start of the grid line, inside or along a side.
         directions: (k,) 0 to 3, quarter turns from the first axis of that triangle's coordinates.
         places: (k, 2) the coordinates of the point in that triangle.
-        is_boundary: (p,) whether the point is on the boundary, where the first port has none clockwise of it.
+        is_boundary: (p,) whether the point is on the boundary, where the first port has no clockwise neighbour.
     """
 
     start: IntArray
@@ -88,11 +89,11 @@ def find_points(exact: ExactGrid) -> GridPoints:
     signs = found.reshape(-1, 3)
     within = (signs >= 0).all(axis=1)
     faces, places, on = faces[within], places[within], signs[within] == 0
-    # The corner that two sides have is opposite the third.
+    # The common corner of two sides is opposite the third side.
     sides = np.choose(on.sum(axis=1), [6, on.argmax(axis=1), 3 + on.argmin(axis=1)])
     label = _same_point(exact, faces, places, sides)
     _, entry, points = np.unique(label, return_index=True, return_inverse=True)
-    # In the order in which triangles have them.
+    # Points are numbered in the order of triangles.
     rank = np.argsort(entry)
     number = np.empty(len(rank), dtype=np.int64)
     number[rank] = np.arange(len(rank))
@@ -102,7 +103,7 @@ def find_points(exact: ExactGrid) -> GridPoints:
 
 
 def _candidates(corners: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return (k,) triangles and (k, 2) grid points, row by row, all those in them among few others."""
+    """Return (k,) triangles and (k, 2) candidate grid points: all in the triangles, and a few others."""
     low, high = np.ceil(corners[..., 1].min(axis=1)), np.floor(corners[..., 1].max(axis=1))
     faces, y = _ranges(low, high)
     least, most = np.full(len(y), np.inf), np.full(len(y), -np.inf)
@@ -118,14 +119,14 @@ def _candidates(corners: FloatArray) -> tuple[IntArray, FloatArray]:
 
 
 def _ranges(low: FloatArray, high: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the numbers from each low to its high one, one after the other: whose, and what."""
+    """Return the concatenated integer ranges from low to high: (k,) the index of the range, and (k,) the integer."""
     counts = np.maximum(high - low + 1, 0).astype(np.int64)
     owner = np.repeat(np.arange(len(counts)), counts)
     return owner, low[owner] + np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _same_point(exact: ExactGrid, faces: IntArray, places: FloatArray, sides: IntArray) -> IntArray:
-    """Return a number for each place in a triangle, the same for those of one point."""
+    """Return (k,) a label for each entry, equal for entries of the same point."""
     at_vertex = (sides >= 3) & (sides < 6)
     on_edge = sides < 3
     label = np.arange(len(faces)) + len(exact.mesh.vertices)
@@ -143,7 +144,7 @@ def _same_point(exact: ExactGrid, faces: IntArray, places: FloatArray, sides: In
 
 @compiled
 def find_entry(start: IntArray, places: FloatArray, face: int, x: float, y: float) -> int:
-    """Return the entry of a triangle at a place, -1 where there is none."""
+    """Return the entry of a triangle at given coordinates, -1 if there is none."""
     low, high = start[face], start[face + 1]
     while low < high:
         middle = (low + high) // 2
@@ -195,13 +196,14 @@ def find_ports(exact: ExactGrid, found: GridPoints) -> Ports:
 
 
 def _directions(start: FloatArray, end: FloatArray, closed: BoolArray) -> IntArray:
-    """Return (w, 4) the directions from (w, 2) counterclockwise up to others, which count if closed; then -1.
+    """Return (w, 4) the axis directions in angles from `start` counterclockwise to `end`, padded with -1.
 
-    The angle between is at most half a turn. Signs of differences and comparisons are exact.
+    `start` and `end` have shape (w, 2). An angle is at most half a turn; it includes `start`, and `end` only if
+    `closed`. Signs of differences and comparisons are exact.
     """
     x, y = start.T
     d = np.select([(x > 0) & (y >= 0), y > 0, x < 0], [0, 1, 2], 3)
-    # One of x and y is not multiplied by 0, so the products are exact.
+    # The components of an axis are 0 and 1 or -1, so the products are exact.
     d = (d + (_cross(start, AXES[d]) != 0)) % 4
     found = np.full((len(d), 4), -1)
     goes_on = np.ones(len(d), dtype=bool)
@@ -222,7 +224,7 @@ def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def join_ports(exact: ExactGrid, found: GridPoints, ports: Ports) -> IntArray:
-    """Return (k,) the port that each leads to, BOUNDARY or LOST."""
+    """Return (k,) the mate of each port: the port at the other end of its grid line, BOUNDARY or LOST."""
     ends = np.empty((len(ports.faces), 3), dtype=np.int64)
     grid = exact.corners, exact.twin, exact.turns, exact.shifts, found.start, found.places
     _follow_all(grid, ports.places, ports.faces, ports.directions, ends)
@@ -237,9 +239,9 @@ def join_ports(exact: ExactGrid, found: GridPoints, ports: Ports) -> IntArray:
 def _ports_back(
     exact: ExactGrid, found: GridPoints, ports: Ports, entry: IntArray, face: IntArray, direction: IntArray
 ) -> IntArray:
-    """Return (k,) the port of the point of each entry that leads into a triangle in a direction, or LOST.
+    """Return (k,) the port of the point of each entry in a given triangle and direction, or LOST.
 
-    If the direction runs along the side of the triangle that is most counterclockwise, the port is the neighbour's.
+    If the direction is along the most counterclockwise side of the triangle, the port belongs to the neighbour.
     """
 
     def keys(points: IntArray, faces: IntArray, directions: IntArray) -> IntArray:
@@ -276,7 +278,7 @@ def _ports_back(
 def _follow_all(
     grid: Grid, port_places: FloatArray, port_faces: IntArray, directions: IntArray, ends: IntArray
 ) -> None:
-    """Fill in (k, 3) the entry where each port leads to, see `_follow`, its triangle and the direction there."""
+    """Fill in (k, 3) the entry at the end of each port's grid line, see `_follow`, its triangle and the direction."""
     parts = np.empty(12)
     for k in range(len(port_faces)):
         f, d = port_faces[k], directions[k]
@@ -292,22 +294,24 @@ def _follow_all(
 def _follow(
     grid: Grid, f: int, x: float, y: float, d: int, on_left: bool, parts: FloatArray
 ) -> tuple[int, int, int]:
-    """Return the triangle and the entry where a unit's way ends, and its direction there.
+    """Return the triangle and the entry at the end of a grid line of one unit, and its direction there.
 
     Args:
+        grid: the map and its points.
         f, x, y, d: triangle, coordinates and direction at the start.
-        on_left: follow the line just left of itself, so that what is on it lies right; or just right of it.
-        parts: (12,) scratch, see `orientation`.
+        on_left: displace the line to its left, so that points on it count as right of it; else to its right.
+        parts: (12,) buffer, see `orientation`.
 
     Returns:
-        For the entry BOUNDARY, where the way leaves the surface; LOST, where it ends at no grid point.
+        Triangle, entry and direction. The entry is BOUNDARY if the line leaves the surface, and LOST if it does not
+        end at a grid point.
     """
     corners, twin, turns, shifts, start, places = grid
     along_x, along_y = turn(d, 1.0, 0.0)
     to_x, to_y = x + along_x, y + along_y
     for _ in range(len(corners) + 2):
         c = corners[f]
-        left, on, inside = 0, 0, True  # Bit i is that of corner i.
+        left, on, inside = 0, 0, True  # Bit i stands for corner i.
         for i in range(3):
             a, b = (i + 1) % 3, (i + 2) % 3
             inside &= orientation(c[a, 0], c[a, 1], c[b, 0], c[b, 1], to_x, to_y, parts) >= 0
@@ -320,8 +324,8 @@ def _follow(
         out = -1
         for i in range(3):
             a, b = (i + 1) % 3, (i + 2) % 3
-            # It leaves through the side from a corner on its right to one on its left; or, if it runs along a side
-            # and just outside of it, through that.
+            # The line leaves through the side from a corner on its right to one on its left; or, if it is along a
+            # side and displaced outwards, through that side.
             upwards = (left >> b) & 1 and not (left >> a) & 1
             beside = (on >> a) & (on >> b) & 1 and ((left >> i) & 1) != on_left
             if upwards or beside:

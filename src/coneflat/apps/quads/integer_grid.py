@@ -1,4 +1,4 @@
-"""Seamless maps to the integer grid: the squares of the plane become quads of the surface."""
+"""Computation of integer-grid maps: seamless maps for which unit squares of the plane become quads of the surface."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from ...options import WordOrVertices
 from .integer_map import IntegerGrid
 from .layout import GRID_TOLERANCE, aligned
 from .options import QUADS, QuadOptions
-from .round_layout import grid_near, grid_of, noted
-from .sharp import not_taken, sharp_layouts
+from .round_layout import grid_near, grid_of, with_note
+from .sharp import sharp_layouts, unsupported
 
-# What the grid wants of a flattening: three, five or six quads at a cone, and rotations that are quarter turns.
+# Options of the flattening for a grid: three, five or six quads at a cone, and rotations by quarter turns.
 OPTIONS = {
     "quantise": np.pi / 2,
     "correct_handles": True,
@@ -42,29 +42,33 @@ def integer_grid(
     sharp_angle: float | str | None = None,
     **options: Any,
 ) -> IntegerGrid:
-    """Return a map of a surface to the integer grid, seamless: unit squares become quads that meet across seams.
+    """Return a seamless map of a surface to the integer grid: unit squares become quads that match across seams.
 
     Args:
-        mesh, faces: as `coneflat.flatten` takes them; or a `Flattening` with cones quantised to quarter turns.
-        quads: about so many unit squares cover the surface; None: 10,000, unless a size is given.
-        size: of a square in model units, instead.
-        stretch: from angles, 0, to areas, 1: what the map keeps; see `StretchEnergy`.
-        sharp_angle: radians: edges at which the surface bends by more come to lie on grid lines, and the boundary with
-            them; None for none.
-        options: of `coneflat.flatten`; by default cones have three, five or six quads. Cones that are given have
-            curvatures, multiples of pi/2; on surfaces with handles, or several boundaries, few have a grid. boundary
-            may be "auto", too, and is by default: "straight" where that has a grid and cones are not given, or "free".
+        mesh, faces: as for `coneflat.flatten`; or a `Flattening` with cones quantised to quarter turns.
+        quads: approximate number of unit squares that cover the surface; None: 10,000, unless `size` is given.
+        size: edge length of a square in model units; replaces `quads`.
+        stretch: trade-off between angles (0) and areas (1); see `StretchEnergy`.
+        sharp_angle: radians; edges with a larger dihedral angle, and the boundary, are put on grid lines; None for
+            none.
+        options: those of `coneflat.flatten`; by default cones have three, five or six quads. Given cones need
+            curvatures, multiples of pi/2; on surfaces with handles or several boundaries, a grid rarely exists for
+            them. boundary may also be "auto", the default: "straight" if such a grid is found and cones are not given,
+            else "free".
+
+    Returns:
+        The map, with its cones and measures.
 
     Raises:
-        GridError: no grid of this size was found that flips no triangle.
-        MeshError, CurvatureError, OptionError, SeamError, MetricError: as `coneflat.flatten`.
+        GridError: no grid of this size without flipped triangles was found.
+        MeshError, CurvatureError, OptionError, SeamError, MetricError: as for `coneflat.flatten`.
 
     Notes:
-        A smooth layout with quantised cones (Kaelberer, Nieser, Polthier, "QuadCover", 2007) is scaled; translations of
-        seams and places of cones are rounded together, to the lattice point that is nearest by the energy that going
-        there costs at least; and the layout is relaxed with these (integer-grid maps: Bommes, Campen, Ebke, Alliez,
-        Kobbelt 2013), from the smooth one by steps that flip no triangle. Edges from cone to cone are split
-        before.
+        A smooth layout with quantised cones (Kaelberer, Nieser, Polthier, "QuadCover", 2007) is scaled. Translations of
+        seams and positions of cones are rounded together, to the nearest lattice point in the metric of the least
+        energy that a displacement needs. The layout is then relaxed to these constraints (integer-grid maps: Bommes,
+        Campen, Ebke, Alliez, Kobbelt 2013), from the smooth one by steps that flip no triangle. Edges between cones are
+        split before.
 
     Examples:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
@@ -76,7 +80,7 @@ def integer_grid(
     """
     wanted, name = (size, "size") if size is not None else (QUADS if quads is None else quads, "quads")
     if quads is not None and size is not None:
-        raise OptionError("quads and size say the same: give one of them")
+        raise OptionError("quads and size must not be given together")
     if not (np.isfinite(wanted) and wanted > 0):
         raise OptionError(f"{name} must be a positive number, not {wanted!r}")
     progress = options.pop("progress", None)
@@ -84,7 +88,7 @@ def integer_grid(
     search = _Search(mesh, faces, quads or QUADS, size, StretchEnergy(stretch), options, progress, stages)
     if isinstance(mesh, Flattening):
         if faces is not None or options or sharp_angle is not None:
-            raise OptionError("a flattening has its faces and options: none can be given beside it")
+            raise OptionError("a flattening already has faces and options: no others can be given")
         found = search.of_result(mesh)
     elif sharp_angle is not None:
         found = search.with_lines(sharp_angle, options.pop("boundary", "auto"))
@@ -94,14 +98,14 @@ def integer_grid(
 
 
 def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the grid wants of a flattening with these options; cones that are given are not searched for.
+    """Return the default options of the flattening for a grid; given cones are not searched for.
 
     Raises:
-        OptionError: they have other curvatures than multiples of pi/2.
+        OptionError: curvatures of given cones are not multiples of pi/2.
     """
     given = options.get("cones", "auto")
-    # With straight sides, what is said of cones holds for both copies of the surface, glued to each other at the
-    # boundary: a corner of pi/2 is a cone of pi there.
+    # With straight sides, bounds of cone angles apply to the double of the surface, two copies glued along the
+    # boundary, where a corner of pi/2 is a cone of pi.
     if isinstance(given, str):
         return OPTIONS if options.get("boundary") != "straight" else {**OPTIONS, "min_cone_angle": np.pi / 2}
     parsed = WordOrVertices((), "cone").parse("cones", given)
@@ -109,7 +113,7 @@ def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
         quarters = np.nan if curvature is None else curvature / (np.pi / 2)
         if not abs(quarters - np.rint(quarters)) <= GRID_TOLERANCE:
             raise OptionError(
-                f"cones of a grid have curvatures that are multiples of pi/2; that of vertex {vertex} is "
+                f"cones of a grid must have curvatures that are multiples of pi/2; that of vertex {vertex} is "
                 f"{'not given' if curvature is None else f'{curvature:g}'}"
             )
     return {"charts": "one"}
@@ -117,7 +121,7 @@ def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """What is asked of a grid; attributes are the arguments of `integer_grid`, and the times of the stages."""
+    """The search for a grid; attributes are the arguments of `integer_grid` and a stopwatch."""
 
     mesh: Any
     faces: ArrayLike | None
@@ -129,36 +133,36 @@ class _Search:
     stages: Stopwatch
 
     def with_boundary(self, boundary: Any) -> IntegerGrid:
-        """Return a grid with a boundary as `integer_grid` takes it."""
+        """Return a grid for the option `boundary` of `integer_grid`."""
         if boundary != "auto":
             return self._of_flattening(boundary)
         may_be_straight = isinstance(self.options.get("cones", "auto"), str)
         if not (may_be_straight and self._has_boundary()):
             return self._of_flattening("free")
         try:
-            return self._of_flattening("straight", whole_sides=True)
+            return self._of_flattening("straight", all_sides=True)
         except (CurvatureError, MetricError) as error:
-            why = f"The boundary cuts squares, as none was found with it on grid lines: {error}."
-        return noted(self._of_flattening("free"), why)
+            why = f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {error}."
+        return with_note(self._of_flattening("free"), why)
 
     def with_lines(self, sharp_angle: float | str, boundary: Any) -> IntegerGrid:
-        """Return a grid with as many sharp edges on grid lines as can be, and the boundary with them."""
+        """Return a grid with the boundary and as many sharp edges as possible on grid lines."""
         boundary = "free" if boundary == "auto" else boundary
         with self.stages("grid"):
             found, why = self._along_axes({**self.options, "sharp_angle": sharp_angle, "boundary": boundary})
         if found is not None:
             return found
-        return noted(self._of_flattening(boundary), f"No sharp edge is on a grid line: {why}.")
+        return with_note(self._of_flattening(boundary), f"No sharp edge is on a grid line: {why}.")
 
     def _has_boundary(self) -> bool:
         given, repair = as_input(self.mesh, self.faces), bool(self.options.get("repair", False))
         return bool(check_mesh(given.vertices, given.faces, repair=repair).mesh.is_boundary_edge.any())
 
-    def _of_flattening(self, boundary: Any, whole_sides: bool = False) -> IntegerGrid:
-        """Return the grid of a flattening with a boundary; with straight sides, all on grid lines if that is wanted.
+    def _of_flattening(self, boundary: Any, all_sides: bool = False) -> IntegerGrid:
+        """Return the grid of a flattening with a boundary; `all_sides` requires all straight sides on grid lines.
 
         Raises:
-            GridError: there is none, or straight sides are on no grid lines where they are wanted there.
+            GridError: there is no grid, or required sides are not on grid lines.
         """
         options = {**self.options, "boundary": boundary}
         self.stages.done = 0.0
@@ -166,15 +170,15 @@ class _Search:
             result = flatten(
                 self.mesh, self.faces, progress=self.progress, **{**_defaults(options), **options}
             )
-        # What a map does not keep of its promises is not what the grid does not keep.
-        told = tuple(note for note in result.notes if note not in broken_promises(result))
-        found = self.of_result(result, options, whole_sides)
-        return replace(found, notes=(*told, *found.notes))
+        # Unmet guarantees of the map do not apply to the grid.
+        notes = tuple(note for note in result.notes if note not in broken_promises(result))
+        found = self.of_result(result, options, all_sides)
+        return replace(found, notes=(*notes, *found.notes))
 
     def of_result(
-        self, result: Flattening, options: dict[str, Any] | None = None, whole_sides: bool = False
+        self, result: Flattening, options: dict[str, Any] | None = None, all_sides: bool = False
     ) -> IntegerGrid:
-        """Return the grid of a flattening with some options; None for one that was given."""
+        """Return the grid of a flattening; `options` are None if the user gave the flattening."""
         is_straight = result.settings.get("boundary") == "straight"
         self.stages.done = 1.0
         with self.stages("grid"), using_threads(result.settings.get("threads", THREADS)):
@@ -185,25 +189,25 @@ class _Search:
                 if not loose:
                     return grid_of(layout, self.energy)
                 why = (
-                    f"{plural(loose, 'edge')} of the boundary {'is' if loose == 1 else 'are'} on no grid line: "
-                    "straight sides of different loops do not point in the same directions, up to quarter turns"
+                    f"{plural(loose, 'edge')} of the boundary {'is' if loose == 1 else 'are'} not on a grid line: "
+                    "straight sides of different loops are not parallel up to quarter turns"
                 )
             except GridError as error:
-                # A triangle between straight sides may have no room; edges that join two of them are split below.
+                # Straight sides may degenerate a triangle between them; edges that join two of them are split below.
                 if not is_straight:
                     raise
                 layout, why = None, str(error)
-            if options is not None and not not_taken(options, OPTIONS):
-                # Relaxation turns them, which is not conformal.
-                turned, _ = self._along_axes(options)
-                if turned is not None:
-                    return turned
-            if whole_sides or layout is None:
+            if options is not None and not unsupported(options, OPTIONS):
+                # Relaxing rotates the sides, which is not conformal.
+                rotated, _ = self._along_axes(options)
+                if rotated is not None:
+                    return rotated
+            if all_sides or layout is None:
                 raise GridError(why)
-            return noted(grid_of(layout, self.energy), f"{why}.")
+            return with_note(grid_of(layout, self.energy), f"{why}.")
 
     def _along_axes(self, options: dict[str, Any]) -> tuple[IntegerGrid | None, str]:
-        """Return a grid with the boundary on grid lines, and as many sharp edges as can be; or none, and why."""
+        """Return a grid with the boundary and as many sharp edges as possible on grid lines; or None and the reason."""
         why = "none is long enough for quads of this size"
         for layout, features, notes in sharp_layouts(
             self.mesh, self.faces, self.quads, self.size, options, OPTIONS, self.progress

@@ -1,4 +1,4 @@
-"""A map of a surface to the integer grid, the motions across its edges, and the map of given corners."""
+"""Integer-grid maps: the result class, the motions across edges, and the construction from corner coordinates."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from .transitions import UNITS
 
 @dataclass(frozen=True, eq=False)
 class IntegerGrid:
-    """A map of a surface to the plane in which grid lines go on across seams: m triangles, n vertices.
+    """A map of a surface to the plane in which grid lines continue across seams: m triangles, n vertices.
 
-    A half-edge h = 3 f + i is the side of triangle f opposite its corner i, from corner i + 1 to corner i + 2. What is
-    x in the frame of the triangle across it is R x + shifts[h] in its own, R being turns[h] quarter turns to the left.
+    A half-edge h = 3 f + i is the side of triangle f opposite its corner i, from corner i + 1 to corner i + 2. A point
+    x in the frame of the triangle across it is R x + shifts[h] in the frame of f, where R is a rotation by turns[h]
+    quarter turns counterclockwise.
 
     Attributes:
         vertices: (n, 3) positions in model units.
         faces: (m, 3) vertex indices.
-        corner_grid: (m, 3, 2) the point of the grid of every triangle corner, in units of the grid; no triangle is
-            flipped.
+        corner_grid: (m, 3, 2) grid coordinates of every triangle corner, in units of the grid; no triangle is flipped.
         turns: (3m,) from 0 to 3; -1 on the boundary.
         shifts: (3m, 2) integers; 0 on the boundary.
-        cones: (s,) vertices that lie on grid points and have other than four quads.
-        quarters: (s,) how many they have, the quarter turns of their angle.
-        size: of a square of the grid, in model units: the root of the surface's area by the grid's.
-        move_rms, move_max: by how much rounding has moved the cones, in units of the grid.
-        energy_before, energy: the mean distortion that was minimised, in the smooth layout and in the grid.
-        qc_before, qc_mean: quasi-conformal distortion, the mean by area, likewise.
-        least_area: of any triangle, over what it should have.
-        notes: what was done, one sentence each.
+        cones: (s,) vertices on grid points whose number of quads is not four.
+        quarters: (s,) the number of quads at each cone: its angle in quarter turns.
+        size: edge length of a square of the grid in model units: square root of the surface area over the grid's area.
+        move_rms, move_max: root mean square and largest displacement of cones by rounding, in units of the grid.
+        energy_before, energy: the mean distortion that is minimised, in the smooth layout and in the grid.
+        qc_before, qc_mean: mean quasi-conformal distortion, weighted by area, in the smooth layout and in the grid.
+        least_area: least area of a triangle divided by its ideal area.
+        notes: one sentence each.
         corners: (k,) further vertices on grid points, where straight sides of the boundary, or sharp edges, meet at an
-            angle; sides and these lie on grid lines.
-        corner_quarters: (k,) the quarter turns of their angle.
+            angle; these sides and edges lie on grid lines.
+        corner_quarters: (k,) their angles in quarter turns.
         features: (f, 2) vertices of sharp edges that lie on grid lines.
-        seconds: wall time of each stage; files do not keep it.
+        seconds: wall time of each stage; not stored in files.
 
     Examples:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
@@ -76,15 +76,15 @@ class IntegerGrid:
     seconds: dict[str, float] = field(default_factory=dict)
 
     def report(self) -> dict[str, float | None]:
-        """Return the numbers among the attributes by name, as JSON takes them: None for what is not known."""
+        """Return the numeric attributes by name, ready for JSON; unknown values are None."""
         numbers = {name: value for name, value in vars(self).items() if isinstance(value, float)}
         return {name: float(value) if np.isfinite(value) else None for name, value in numbers.items()}
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the grid as .obj or .npz, in full or not at all, and return the path; see `write_grid`.
+        """Write the grid as .obj or .npz, atomically, and return the path; see `write_grid`.
 
         Raises:
-            UnknownFormatError: the ending is another.
+            UnknownFormatError: the extension is not .obj or .npz.
             MeshFileError: the file cannot be written.
         """
         from .files import write_grid
@@ -93,11 +93,12 @@ class IntegerGrid:
 
     @staticmethod
     def load(path: str | PathLike[str]) -> IntegerGrid:
-        """Return the grid that an .npz or .obj file holds; see `read_grid`.
+        """Return the grid in an .npz or .obj file; see `read_grid`.
 
         Raises:
-            UnknownFormatError: the ending is another.
-            MeshFileError: the file is not there, may not be read, or holds no manifold of triangles with UVs.
+            UnknownFormatError: the extension is not .obj or .npz.
+            MeshFileError: the file does not exist, cannot be read, or does not contain a manifold triangle mesh with
+                UVs.
             GridError: the UVs are not an integer-grid map.
         """
         from .files import read_grid
@@ -106,14 +107,14 @@ class IntegerGrid:
 
 
 def find_motions(mesh: TriangleMesh, corner_grid: FloatArray) -> tuple[IntArray, IntArray, float]:
-    """Return (3m,) quarter turns and (3m, 2) shifts of half-edges, and by how much they miss, in units of the grid.
+    """Return (3m,) quarter turns and (3m, 2) shifts of half-edges, and their largest error in units of the grid.
 
-    They take the triangle across a half-edge to its own, as those of `IntegerGrid` do: what is nearest to that among
-    quarter turns and whole translations. -1 and 0 on the boundary.
+    They are the quarter turns and integer translations that map the triangle across a half-edge to its own as closely
+    as possible, as in `IntegerGrid`; -1 and 0 on the boundary.
 
     Args:
         mesh: m triangles.
-        corner_grid: (m, 3, 2) the place of every triangle corner.
+        corner_grid: (m, 3, 2) grid coordinates of every triangle corner.
     """
     z = np.ascontiguousarray(corner_grid).view(np.complex128)[..., 0]
     starts, ends = z[:, NEXT].ravel(), z[:, PREVIOUS].ravel()
@@ -122,7 +123,7 @@ def find_motions(mesh: TriangleMesh, corner_grid: FloatArray) -> tuple[IntArray,
     pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
     off = 0.0
     for h, t in (pairs.T, pairs[:, ::-1].T):
-        # The angle of own over other, without dividing by a side of no length.
+        # The angle of the quotient of the sides, computed without dividing by a side of zero length.
         turn = (ends[h] - starts[h]) * np.conj(starts[t] - ends[t])
         turns[h] = np.rint(np.angle(turn) / (np.pi / 2)).astype(np.int64) % 4
         motion = UNITS[turns[h]]
@@ -140,16 +141,16 @@ def grid_of_corners(
     corner_grid: FloatArray,
     **known: float | tuple[str, ...] | IntArray,
 ) -> IntegerGrid:
-    """Return the integer grid that corners of triangles are in, with all that follows from their places.
+    """Return the integer grid of given corner coordinates, with the motions and cones that follow from them.
 
     Args:
-        vertices, faces: (n, 3), (m, 3) a manifold mesh whose triangles run the same way round.
-        corner_grid: (m, 3, 2) the place of every triangle corner, in units of the grid.
-        known: measures of the grid, notes and features; measures left out are not a number, but for the size.
+        vertices, faces: (n, 3), (m, 3) a consistently oriented manifold mesh.
+        corner_grid: (m, 3, 2) grid coordinates of every triangle corner.
+        known: measures of the grid, notes and features; missing measures are NaN, except the size, which is computed.
 
     Raises:
-        GridError: triangles are flipped, or the sides of seams are not copies of each other by quarter turns and
-            whole translations.
+        GridError: triangles are flipped, or the sides of seams are not related by quarter turns and integer
+            translations.
     """
     mesh = TriangleMesh(vertices, faces)
     flat = signed_double_areas(corner_grid)
@@ -162,8 +163,8 @@ def grid_of_corners(
     turns, shifts, off = find_motions(mesh, corner_grid)
     if not off <= GRID_TOLERANCE:
         raise GridError(
-            f"the sides of a seam miss each other by {off:.2g} squares, up to quarter turns and whole translations: "
-            "this is not an integer-grid map"
+            f"the sides of a seam differ by {off:.2g} squares, up to quarter turns and integer translations: this is "
+            "not an integer-grid map"
         )
     quarters = quarters_around(mesh, sides_between(corner_grid))
     is_used = np.bincount(faces.ravel(), minlength=len(vertices)) > 0
@@ -185,7 +186,7 @@ def grid_of_corners(
 
 
 def _between_sides(mesh: TriangleMesh, corner_grid: FloatArray) -> BoolArray:
-    """Return (n,) whether the edges of the boundary at a vertex are all on grid lines; none are inside."""
+    """Return (n,) whether each vertex is on the boundary and both boundary edges there are on grid lines."""
     border = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
     starts, ends = (corner_grid[:, which].reshape(-1, 2)[border] for which in (NEXT, PREVIOUS))
     is_on = ((starts == ends) & (starts == np.rint(starts))).any(axis=1)

@@ -1,4 +1,4 @@
-"""Integer linear algebra: equations in integers, and the lattice points nearest to a given one."""
+"""Integer linear algebra: solution of integer equations, and the lattice points nearest to a given point."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ import scipy.linalg
 from ...base import FloatArray, IntArray, compiled
 from ...errors import GridError
 
-# Places of the search tree that are visited in all, at most.
+# Largest number of visited nodes of the search tree.
 MAX_VISITS = 200_000
 
 
-class WholeSolutions(NamedTuple):
-    """All whole solutions of equations: one of them (n,), and a basis (n, d) of what may be added to it."""
+class IntegerSolutions(NamedTuple):
+    """All integer solutions of linear equations: one solution (n,), and a basis (n, d) of the homogeneous solutions."""
 
     one: IntArray
     basis: IntArray
 
 
-def whole_solutions(rows: IntArray, right: IntArray) -> WholeSolutions | None:
-    """Return the whole x with rows x = right; None if there is none.
+def integer_solutions(rows: IntArray, right: IntArray) -> IntegerSolutions | None:
+    """Return all integer vectors x with rows x = right; None if there are none.
 
     Args:
-        rows: (r, n), dependent ones among them are no harm.
-        right: (r,).
+        rows: (r, n) coefficients; rows may be linearly dependent.
+        right: (r,) right-hand side.
 
     Notes:
-        Unimodular column operations make the rows a staircase (the Hermite normal form; Cohen, "A course in
-        computational algebraic number theory", 1993, Section 2.4). Pivots are the smallest entries, and of these those
-        in the sparsest columns, so that entries stay small.
+        Unimodular column operations bring the rows to echelon form (the Hermite normal form; Cohen, "A course in
+        computational algebraic number theory", 1993, Section 2.4). Pivots are the smallest entries, and among these
+        the ones in the sparsest columns, so that entries stay small.
     """
     count = rows.shape[1]
     work = np.concatenate([rows.astype(np.int64), np.eye(count, dtype=np.int64)])
@@ -48,14 +48,14 @@ def whole_solutions(rows: IntArray, right: IntArray) -> WholeSolutions | None:
         quotient, rest = divmod(missing, int(work[i, pivot]))
         if rest:
             return None
-        # The column is zero in all rows before, so that what held goes on to hold.
+        # The column is zero in all previous rows, so these remain satisfied.
         one += quotient * work[len(rows) :, pivot]
         open_columns[pivot] = False
-    return WholeSolutions(one, work[len(rows) :, open_columns].copy())
+    return IntegerSolutions(one, work[len(rows) :, open_columns].copy())
 
 
 def _eliminate(work: IntArray, row: int, open_columns: IntArray) -> int | None:
-    """Make all entries of a row in open columns 0 but one, by operations on columns; return the column of that."""
+    """Return the column of a row's only nonzero entry in open columns, after column operations; None if all are 0."""
     columns = np.flatnonzero(open_columns)
     while True:
         entries = np.abs(work[row, columns])
@@ -69,19 +69,19 @@ def _eliminate(work: IntArray, row: int, open_columns: IntArray) -> int | None:
         others = columns[filled][columns[filled] != pivot]
         times = np.rint(work[row, others] / work[row, pivot]).astype(np.int64)
         work[:, others] -= work[:, [pivot]] * times
-        # Near what 64 bits hold; entries of seams stay below a hundred.
+        # This bound protects against overflow of 64 bits; entries for seams stay below a hundred.
         if np.abs(work[:, others]).max() > 2**40:
             raise GridError(f"the equations between {work.shape[1]} translations of seams overflow")
 
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """The whole vectors one + basis y, and how far they are from each other.
+    """The integer vectors one + basis y for integer y, with a metric.
 
     Attributes:
-        one: (d,) one of them.
+        one: (d,) one vector.
         basis: (d, k) integers.
-        gram: (d, d) scalar products of all vectors.
+        gram: (d, d) the scalar product.
     """
 
     one: IntArray
@@ -89,23 +89,23 @@ class Lattice:
     gram: FloatArray
 
     def where(self, row: IntArray, value: int) -> Lattice | None:
-        """Return the part where (d,) row times the vector is an integer; None where there is none."""
-        within = whole_solutions((row @ self.basis)[None], np.array([value - int(row @ self.one)]))
+        """Return the vectors whose product with `row` (d,) is `value`, as a lattice; None if there are none."""
+        within = integer_solutions((row @ self.basis)[None], np.array([value - int(row @ self.one)]))
         if within is None:
             return None
         return replace(self, one=self.one + self.basis @ within.one, basis=self.basis @ within.basis)
 
     def reduced(self) -> Lattice:
-        """Return the same lattice by a basis that is nearly orthogonal."""
+        """Return the same lattice with a nearly orthogonal basis."""
         return replace(self, basis=self.basis @ self._reduction()[1])
 
     def nearest(self, place: FloatArray, count: int, visits: int = MAX_VISITS) -> IntArray:
-        """Return (k, d) the vectors nearest to a real one (d,), the nearest first.
+        """Return (k, d) the vectors nearest to a real vector (d,), in the order of their distance, at most `count`.
 
-        The first k = count found are exact if the search ends by itself; it begins at Babai's point and ends after so
-        many visits of places in any case.
+        The search starts at Babai's point and stops after the given number of visits of nodes. The result is exact if
+        the search is complete before.
 
-        Notes:
+        References:
             C. P. Schnorr, M. Euchner, "Lattice basis reduction: improved practical algorithms", 1994.
         """
         size = self.basis.shape[1]
@@ -123,7 +123,7 @@ class Lattice:
         return nearest
 
     def _reduction(self) -> tuple[FloatArray, IntArray]:
-        """Return an upper triangular root of the reduced basis' scalar products, and (k, k) what reduces it."""
+        """Return the Cholesky factor of the reduced basis' Gram matrix, and (k, k) the change of basis."""
         change = np.eye(self.basis.shape[1], dtype=np.int64)
         root = np.ascontiguousarray(scipy.linalg.cholesky(self.basis.T @ self.gram @ self.basis))
         reduce_basis(root, change)
@@ -132,10 +132,10 @@ class Lattice:
 
 @compiled
 def reduce_basis(root: FloatArray, basis: IntArray) -> None:
-    """Reduce the columns of an upper triangular matrix in place, and those of `basis` likewise (LLL)."""
+    """Reduce the columns of an upper triangular matrix in place (LLL), and apply the same operations to `basis`."""
     size = len(root)
     k, steps = 1, 0
-    # Where rounding exchanges two for ever, less than reduced will do.
+    # The limit of steps covers endless exchanges caused by rounding; the basis is then less reduced.
     while k < size and steps < 200 * size:
         steps += 1
         for j in range(k - 1, -1, -1):
@@ -167,10 +167,10 @@ def reduce_basis(root: FloatArray, basis: IntArray) -> None:
 def enumerate_points(
     root: FloatArray, target: FloatArray, found: IntArray, squares: FloatArray, visits: int
 ) -> int:
-    """Fill the whole vectors nearest to a target, in any order, and their squared distances; return how many.
+    """Fill in the integer vectors nearest to a target, unordered, and their squared distances; return their number.
 
-    Depth first from the last coordinate; at each depth integers by their distance, so that the first leaf is
-    Babai's point.
+    The search is depth first from the last coordinate. At each depth, integers are tried in the order of their
+    distance, so that the first leaf is Babai's point.
     """
     size, most = len(target), len(squares)
     here = np.zeros(size, dtype=np.int64)
@@ -209,7 +209,7 @@ def enumerate_points(
             depth += 1
             if depth == size:
                 break
-        # The next nearest integer: to the other side, one further.
+        # The next nearest integer is on the other side, one further away.
         here[depth] += step[depth]
         step[depth] = -step[depth] - (1 if step[depth] > 0 else -1)
     return number

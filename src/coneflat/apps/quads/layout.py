@@ -1,4 +1,4 @@
-"""Layouts in units of a grid: straight sides, charts turned to each other, along the creases, and edges split."""
+"""Layouts in units of a grid: straight sides, alignment of charts with each other and with creases, edge splits."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from ...geometry import (
 from ...layout import SeamChains, find_chains, rest_sides
 from ...mesh import NEXT, PREVIOUS, label_components, label_faces, point_vertices
 
-# Radians, or squares, by which what is to be straight, parallel up to quarter turns, or in one place may be off: far
-# more than rounding, far less than what matters.
+# Tolerance, in radians or squares, for sides to be straight or parallel up to quarter turns, and for points to
+# coincide: far above rounding, far below relevant differences.
 GRID_TOLERANCE = 1e-6
 
 
@@ -33,13 +33,13 @@ def _none() -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """Straight sides of a boundary, each a piece that no seam and no corner parts.
+    """Straight sides of a boundary, without seams or corners inside a side.
 
     Attributes:
         corners: (k,) vertices where sides meet at an angle.
-        points: (q,) points on sides, those of the ends included; one of two sides is there twice.
+        points: (q,) points on sides, including their ends; a point on two sides occurs twice.
         side: (q,) the side of each.
-        axis: (l,) what points of a side have in common: 0 for x, 1 for y.
+        axis: (l,) the common coordinate of the points of each side: 0 for x, 1 for y.
     """
 
     corners: IntArray = field(default_factory=_none)
@@ -49,7 +49,7 @@ class Sides:
 
     @property
     def directions(self) -> FloatArray:
-        """(l, 2) of the sides, along the axes."""
+        """(l, 2) unit vectors along the sides."""
         return np.eye(2)[1 - self.axis]
 
 
@@ -58,13 +58,13 @@ class Layout:
     """A layout in units of a grid.
 
     Attributes:
-        mesh: of all components.
+        mesh: the mesh with all components.
         lengths: (m, 3) side lengths of its triangles in model units, column i opposite corner i.
         corners: (m, 3) the point at each triangle corner.
-        points: (u,) of the plane.
-        cones: (s,) vertices, inside the surface.
-        sides: straight ones of the boundary, along the axes.
-        size: of a square of the grid, in model units.
+        points: (u,) points in the plane.
+        cones: (s,) inner vertices.
+        sides: straight sides of the boundary, along the axes.
+        size: edge length of a square of the grid in model units.
     """
 
     mesh: TriangleMesh
@@ -76,13 +76,13 @@ class Layout:
     size: float
 
     @property
-    def whole(self) -> IntArray:
-        """Vertices that are to lie on grid points: cones, and corners of straight sides."""
+    def nodes(self) -> IntArray:
+        """Vertices that must lie on grid points: cones, and corners of straight sides."""
         return np.concatenate([self.cones, self.sides.corners])
 
     @property
     def vertex(self) -> IntArray:
-        """(u,) the vertex of each point."""
+        """(u,) the vertex of the mesh for each point."""
         return point_vertices(self.mesh.faces, self.corners, len(self.points))
 
     @property
@@ -97,36 +97,36 @@ class Layout:
 
     @property
     def area(self) -> float:
-        """Of the plane: how many squares the layout covers."""
+        """The area of the layout in squares."""
         return float(self.double_areas().sum()) / 2
 
     def double_areas(self) -> FloatArray:
-        """Return (m,) twice the areas of triangles in the plane, negative for those flipped."""
+        """Return (m,) twice the signed areas of triangles in the plane, negative for flipped ones."""
         return signed_double_areas(as_pairs(self.points)[self.corners])
 
     def scaled(self, factor: float) -> Layout:
-        """Return a layout of so many times the squares."""
+        """Return the layout with the number of squares multiplied by a factor."""
         times = float(np.sqrt(factor))
         return replace(self, points=times * self.points, size=self.size / times)
 
     def chains(self, quarter_turns: bool = False) -> SeamChains:
-        """Return the seams as chains between vertices that are to lie on grid points; see `find_chains`."""
-        return find_chains(self.mesh, self.corners, self.points, self.whole, quarter_turns=quarter_turns)
+        """Return the seams as chains between vertices that must lie on grid points; see `find_chains`."""
+        return find_chains(self.mesh, self.corners, self.points, self.nodes, quarter_turns=quarter_turns)
 
 
 def aligned(result: Flattening, quads: float | None, size: float | None) -> Layout:
-    """Return the layout of a flattening, turned so that the grid follows creases, bends and boundaries.
+    """Return the layout of a flattening, rotated so that the grid is aligned with creases and boundaries.
 
     Charts are joined at some seams, and a cone of each component is at the origin.
 
     Args:
-        result: with quantised cones.
-        quads: unit squares that it is to cover.
-        size: of a square in model units, instead.
+        result: a flattening with quantised cones.
+        quads: number of unit squares that the layout covers.
+        size: edge length of a square in model units; replaces `quads`.
 
     Raises:
         GridError: triangles are flipped.
-        SeamError: the sides of a seam are not rigid copies of each other.
+        SeamError: the sides of a seam are not congruent.
     """
     mesh = TriangleMesh(result.vertices, result.faces)
     own = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
@@ -152,9 +152,9 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Layo
 
 
 def joined_charts(layout: Layout) -> tuple[Layout, IntArray]:
-    """Return a layout with charts moved to each other, so that none of `joining_chains` moves a point.
+    """Return a layout with the charts of each component joined, and (u,) the component of each point.
 
-    And (u,) the component of each point.
+    The motion across each of the chains that `joining_chains` returns becomes the identity.
     """
     chains, points = layout.chains(), layout.points.copy()
     chart, component = charts_of(layout, chains)
@@ -180,18 +180,18 @@ def joined_charts(layout: Layout) -> tuple[Layout, IntArray]:
 
 
 def at_origin(layout: Layout, component: IntArray) -> Layout:
-    """Return a layout with the first cone or corner of each component, or else the first point on a side, at 0."""
-    at = np.concatenate([first_points(layout.vertex)[layout.whole], layout.sides.points])[::-1]
+    """Return a layout with the first cone or corner of each component, or the first point on a side, at the origin."""
+    at = np.concatenate([first_points(layout.vertex)[layout.nodes], layout.sides.points])[::-1]
     origins = np.zeros(int(component.max(initial=-1)) + 1, dtype=np.complex128)
-    origins[component[at]] = layout.points[at]  # the first one stays, as the last to be written
+    origins[component[at]] = layout.points[at]  # in reverse order, so that the first point is written last
     return replace(layout, points=layout.points - origins[component])
 
 
 def _crease_angles(layout: Layout, component: IntArray) -> FloatArray:
-    """Return the angle of each component that most of its bending is along, up to quarter turns.
+    """Return (c,) the main direction of the creases of each component, an angle up to quarter turns.
 
-    An edge counts for the curvature it carries, its length times its dihedral angle (Cohen-Steiner and Morvan 2003),
-    one on the boundary as a right angle.
+    The weight of an edge is its length times its dihedral angle (Cohen-Steiner and Morvan 2003); boundary edges count
+    with a right angle.
     """
     mesh, (starts, ends) = layout.mesh, layout.ends
     one = mesh.edge_halfedges[:, 0]
@@ -201,9 +201,9 @@ def _crease_angles(layout: Layout, component: IntArray) -> FloatArray:
 
 
 def _side_angles(layout: Layout, component: IntArray) -> tuple[BoolArray, FloatArray]:
-    """Return (c,) whether the boundary of each component is made of sides at right angles, and where these point.
+    """Return (c,) whether the boundary of each component consists of sides at right angles, and (c,) their direction.
 
-    component: (u,) that of each point.
+    component: (u,) the component of each point.
     """
     starts, ends = (each[layout.border] for each in layout.ends)
     vector, label = layout.points[ends] - layout.points[starts], component[starts]
@@ -216,7 +216,7 @@ def _side_angles(layout: Layout, component: IntArray) -> tuple[BoolArray, FloatA
 def _directions(
     weights: FloatArray, vectors: ComplexArray, component: IntArray, label: IntArray
 ) -> FloatArray:
-    """Return the mean direction of weighted vectors, up to quarter turns, for each component; label: those of them."""
+    """Return (c,) the mean direction of weighted vectors up to quarter turns; `label` is the component of each."""
     fourth, count = weights * (vectors / np.abs(vectors)) ** 4, int(component.max(initial=-1)) + 1
     angles: FloatArray = (
         np.angle(np.bincount(label, fourth.real, count) + 1j * np.bincount(label, fourth.imag, count)) / 4
@@ -225,7 +225,7 @@ def _directions(
 
 
 def find_sides(layout: Layout, is_straight: BoolArray) -> Sides:
-    """Return the sides of a layout whose straight ones, at (u,) points of components, lie along the axes."""
+    """Return the straight sides of a layout, along the axes; `is_straight` (u,) marks points of such components."""
     mesh, points, border = layout.mesh, layout.points, layout.border
     starts, ends = (each[border] for each in layout.ends)
     kept = is_straight[starts]
@@ -248,7 +248,7 @@ def find_sides(layout: Layout, is_straight: BoolArray) -> Sides:
 
 
 def quarters_around(mesh: TriangleMesh, sides: ComplexArray) -> IntArray:
-    """Return (n,) the angle around each vertex in quarter turns, rounded; sides: (m, 3) of triangles in the plane."""
+    """Return (n,) the angle around each vertex in quarter turns, rounded; `sides` (m, 3) are those in the plane."""
     angles = signed_angles(sides)
     sums = np.bincount(mesh.faces.ravel(), angles.ravel(), len(mesh.vertices))
     return np.rint(sums / (np.pi / 2)).astype(np.int64)
@@ -265,7 +265,7 @@ def charts_of(layout: Layout, chains: SeamChains) -> tuple[IntArray, IntArray]:
 
 
 def joining_chains(chains: SeamChains, chart: IntArray) -> IntArray:
-    """Return chains that join the charts of each component, and none too many; chart: (u,) that of each point."""
+    """Return the chains of a spanning forest of the charts, connected by seams; `chart` (u,) is that of each point."""
     joined = np.arange(int(chart.max(initial=-1)) + 1)
     kept = []
     _, firsts = np.unique(chains.chain, return_index=True)
@@ -278,14 +278,14 @@ def joining_chains(chains: SeamChains, chart: IntArray) -> IntArray:
 
 
 def first_points(vertex: IntArray) -> IntArray:
-    """Return (n,) the first point of each vertex; vertex: (u,) that of each point."""
+    """Return (n,) the first point of each vertex; `vertex` (u,) is the vertex of each point."""
     first = np.zeros(int(vertex.max(initial=-1)) + 1, dtype=np.int64)
     first[vertex[::-1]] = np.arange(len(vertex))[::-1]
     return first
 
 
-# Triangles that one with given sides split falls apart into, by their corners: 0 to 2 its own, 3 + i the middle of the
-# side opposite corner i. The sides split are the bits of the index.
+# Triangles into which a triangle with split sides is divided, by their corners: 0 to 2 are its own, 3 + i is the
+# midpoint of the side opposite corner i. The bits of the index are the split sides.
 PIECES: tuple[tuple[tuple[int, int, int], ...], ...] = (
     ((0, 1, 2),),
     ((0, 1, 3), (0, 3, 2)),
@@ -298,18 +298,18 @@ PIECES: tuple[tuple[tuple[int, int, int], ...], ...] = (
 )
 
 
-def between_whole(layout: Layout) -> BoolArray:
-    """Return (e,) the edges between two vertices that are to lie on grid points.
+def between_nodes(layout: Layout) -> BoolArray:
+    """Return (e,) whether each edge joins two vertices that must lie on grid points.
 
-    A triangle of three such has no place where these come to lie in a row.
+    A triangle of three such vertices degenerates if they are rounded to collinear points.
     """
-    is_whole = np.zeros(len(layout.mesh.vertices), dtype=bool)
-    is_whole[layout.whole] = True
-    return np.asarray(is_whole[layout.mesh.edges].all(axis=1))
+    is_node = np.zeros(len(layout.mesh.vertices), dtype=bool)
+    is_node[layout.nodes] = True
+    return np.asarray(is_node[layout.mesh.edges].all(axis=1))
 
 
 def split_edges(layout: Layout, is_split: BoolArray) -> Layout:
-    """Return a layout of the same surface with edges split in the middle; is_split: (e,)."""
+    """Return a layout of the same surface with the edges `is_split` (e,) split at their midpoints."""
     mesh, corners, points = layout.mesh, layout.corners, layout.points
     edge_of = mesh.halfedge_edges.reshape(-1, 3)
     number = np.full(len(mesh.edges), -1)
@@ -322,20 +322,20 @@ def split_edges(layout: Layout, is_split: BoolArray) -> Layout:
         for both in ((mesh.faces, number[edge_of]), (corners, own))
     )
     places = np.take_along_axis(_six_places(layout.lengths)[origin], piece, axis=1)
-    whole_mesh = TriangleMesh(np.concatenate([mesh.vertices, middle]), faces)
+    split_mesh = TriangleMesh(np.concatenate([mesh.vertices, middle]), faces)
     lengths: FloatArray = np.abs(places[:, PREVIOUS] - places[:, NEXT])
     new_points = np.concatenate([points, points[pairs].mean(axis=1)])
-    # Other edges come first along the seams now, so that charts may be joined at other chains.
+    # The order of edges along the seams changes, so charts may be joined at other chains.
     split, component = joined_charts(
-        replace(layout, mesh=whole_mesh, lengths=lengths, corners=new_corners, points=new_points)
+        replace(layout, mesh=split_mesh, lengths=lengths, corners=new_corners, points=new_points)
     )
-    # Components whose boundary has straight sides go on to have them.
+    # Components whose boundary has straight sides still have them.
     sides = find_sides(split, np.isin(component, component[layout.sides.points]))
     return at_origin(replace(split, sides=sides), component)
 
 
 def _pieces(kind: IntArray) -> tuple[IntArray, IntArray]:
-    """Return (t,) the triangle of each piece, in order, and (t, 3) its corners; kind: (m,) the sides split."""
+    """Return (t,) the triangle of each piece, sorted, and (t, 3) its corners; `kind` (m,) encodes the split sides."""
     origin, corners = [], []
     for which, pieces in enumerate(PIECES):
         at = np.flatnonzero(kind == which)
@@ -348,7 +348,7 @@ def _pieces(kind: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _middle_points(corners: IntArray, is_split: BoolArray, count: int) -> tuple[IntArray, IntArray]:
-    """Return (m, 3) the point in the middle of each side that is split, from `count`, and (k, 2) between which."""
+    """Return (m, 3) the midpoints of split sides, numbered from `count`, and (k, 2) the end points of the sides."""
     ends = np.sort(np.stack([corners[:, NEXT], corners[:, PREVIOUS]], axis=-1), axis=-1)
     pairs, index = np.unique(ends[is_split], axis=0, return_inverse=True)
     own = np.full(corners.shape, -1)
@@ -357,7 +357,7 @@ def _middle_points(corners: IntArray, is_split: BoolArray, count: int) -> tuple[
 
 
 def _six_places(lengths: FloatArray) -> ComplexArray:
-    """Return (m, 6) corners of triangles with given sides, and the middles of these, in the plane."""
+    """Return (m, 6) the corners of triangles with given side lengths in the plane, and the midpoints of their sides."""
     sides = rest_sides(lengths)
     places = np.stack([np.zeros(len(sides)), sides[:, 2], -sides[:, 1]], axis=1)
     middles = (places[:, NEXT] + places[:, PREVIOUS]) / 2

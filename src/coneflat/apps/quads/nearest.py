@@ -1,4 +1,4 @@
-"""The points of a triangle mesh that are nearest to others in space: of all of it, or near where a point was before."""
+"""Nearest points of a triangle mesh to points in space: on the whole mesh, or near a previous point."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 
 from ...base import FloatArray, IntArray, compiled
 
-# Triangles in a box of the lowest level.
+# Triangles per leaf of the tree of boxes.
 LEAF_TRIANGLES = 4
 
 
 def surface_distances(vertices: FloatArray, faces: IntArray, queries: FloatArray) -> FloatArray:
-    """Return (q,) the distances of points from a surface; all triangles are considered, in a tree of boxes.
+    """Return (q,) the exact distances of points from a surface, by a tree of bounding boxes.
 
     Args:
         vertices, faces: (n, 3), (m, 3) the surface.
-        queries: (q, 3).
+        queries: (q, 3) points.
     """
     corners = np.ascontiguousarray(vertices[faces], dtype=np.float64)
-    order = _halved(corners.mean(axis=1))
+    order = _leaf_order(corners.mean(axis=1))
     low, high = corners.min(axis=1)[order], corners.max(axis=1)[order]
     low, high = (
         low.reshape(-1, LEAF_TRIANGLES, 3).min(axis=1),
@@ -36,8 +36,8 @@ def surface_distances(vertices: FloatArray, faces: IntArray, queries: FloatArray
     return np.sqrt(squares)
 
 
-def _halved(centres: FloatArray) -> IntArray:
-    """Return triangles ordered by place, a power of two times `LEAF_TRIANGLES` of them; some come twice."""
+def _leaf_order(centres: FloatArray) -> IntArray:
+    """Return triangles in the order of the tree's leaves, 2**k * `LEAF_TRIANGLES` of them; some occur twice."""
     leaves = 2 ** max(0, int(np.ceil(np.log2(len(centres) / LEAF_TRIANGLES))))
     order = np.arange(leaves * LEAF_TRIANGLES) * len(centres) // (leaves * LEAF_TRIANGLES)
     groups = 1
@@ -55,10 +55,10 @@ def _halved(centres: FloatArray) -> IntArray:
 def _fill_squares(
     tree: FloatArray, order: IntArray, corners: FloatArray, queries: FloatArray, squares: FloatArray
 ) -> None:
-    """Fill (q,) the squared distances of points from triangles.
+    """Fill in (q,) the squared distances of points from triangles.
 
-    tree: (2 k - 1, 6) boxes, least and greatest corner: node i is above 2 i + 1 and 2 i + 2, the last k hold
-        `LEAF_TRIANGLES` each, in their order.
+    tree: (2 k - 1, 6) boxes, lowest and highest corner; the children of node i are 2 i + 1 and 2 i + 2. The last k
+        nodes are leaves with `LEAF_TRIANGLES` triangles each, in the order of `order`.
     """
     first_leaf = len(tree) // 2
     stack = np.empty(128, dtype=np.int64)
@@ -82,7 +82,7 @@ def _fill_squares(
             one, two = 2 * node + 1, 2 * node + 2
             if _box_square(tree[one], point) < _box_square(tree[two], point):
                 one, two = two, one
-            stack[top] = one  # the farther
+            stack[top] = one  # the farther child
             stack[top + 1] = two
             top += 2
         squares[q] = best
@@ -101,11 +101,11 @@ def _box_square(box: FloatArray, point: FloatArray) -> float:
 def nearest_in_triangle(
     point: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray, weights: FloatArray
 ) -> float:
-    """Return the squared distance of a point from a triangle, and fill where in it, barycentric, the nearest point is.
+    """Return the squared distance of a point from a triangle, and fill in the nearest point's barycentric coordinates.
 
-    Inside, what is nearest is the foot of the perpendicular; else it is the nearest on a side.
+    The nearest point is the foot of the perpendicular if this is inside the triangle, else the nearest point on a side.
     """
-    # Number by number: arrays would be made for each sum of two.
+    # Scalars instead of arrays avoid temporary arrays.
     bx, by, bz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     cx, cy, cz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
     px, py, pz = point[0] - a[0], point[1] - a[1], point[2] - a[2]
@@ -114,7 +114,7 @@ def nearest_in_triangle(
     area, v, w = bb * cc - bc * bc, cc * pb - bc * pc, bb * pc - bc * pb
     if area > 0 and v >= 0 and w >= 0 and v + w <= area:
         v, w = v / area, w / area
-        weights[0] = max(1 - v - w, 0.0)  # but for rounding
+        weights[0] = max(1 - v - w, 0.0)  # rounding can make it negative
         weights[1] = v
         weights[2] = w
         x, y, z = px - v * bx - w * cx, py - v * by - w * cy, pz - v * bz - w * cz
@@ -156,13 +156,13 @@ class Stars:
 
     @classmethod
     def of(cls, vertices: FloatArray, faces: IntArray) -> Stars:
-        """Return a mesh with its stars."""
+        """Return a mesh with the triangles around each vertex."""
         degree = np.bincount(faces.ravel(), minlength=len(vertices))
         star = np.argsort(faces.ravel(), kind="stable") // 3
         return cls(vertices, faces, np.concatenate([[0], np.cumsum(degree)]), star)
 
     def at(self, on_faces: IntArray, barycentric: FloatArray) -> FloatArray:
-        """Return (q, 3) the points that lie in triangles (q,) at barycentric coordinates (q, 3)."""
+        """Return (q, 3) the positions of points given by triangles (q,) and barycentric coordinates (q, 3)."""
         places: FloatArray = np.einsum("qi,qix->qx", barycentric, self.vertices[self.faces[on_faces]])
         return places
 
@@ -177,15 +177,15 @@ class Stars:
 
 
 def slide_near(surface: Stars, targets: FloatArray, on_faces: IntArray, barycentric: FloatArray) -> None:
-    """Move points of a surface to where they are nearest to targets, from triangle to triangle, downhill.
+    """Move points along a surface to local minima of the distance to their targets.
 
-    A point goes on to a triangle with a common vertex while that is nearer to its target; so it never jumps to
-    another sheet of the surface that happens to be near.
+    A point moves to a triangle with a common vertex as long as this is nearer to its target. So it never jumps to a
+    different sheet of the surface nearby.
 
     Args:
         surface: the triangles.
         targets: (q, 3).
-        on_faces, barycentric: (q,), (q, 3) the points, changed.
+        on_faces, barycentric: (q,), (q, 3) the points, updated in place.
     """
     _slide(surface.vertices, surface.faces, surface.start, surface.star, targets, on_faces, barycentric)
 

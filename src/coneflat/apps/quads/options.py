@@ -1,4 +1,4 @@
-"""The options of quads: their own, and those of a flattening that make sense for them."""
+"""Options of quads: their own, and the options of a flattening that apply to them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ...options import (
     strength,
 )
 
-#: Where nothing else is said: how many quads, and rounds of smoothing, of which more change little.
+#: Defaults: the number of quads, and the rounds of smoothing; further rounds change little.
 QUADS, ROUNDS = 10_000, 10
 
 
@@ -28,24 +28,24 @@ QUADS, ROUNDS = 10_000, 10
 class QuadOptions(ConeNumber, ConeBounds, RunOptions):
     """Quads.
 
-    What is not here, or has another default, is what quads need of a flattening: `OPTIONS` of `integer_grid`.
+    Other options of the flattening, and other defaults, are fixed by `OPTIONS` of `integer_grid`.
 
     Attributes:
-        quads: About how many quads; 10,000 unless a size is given.
-        size: The length of their edges in model units, instead.
-        stretch: What quads are to be alike in: from angles, 0, to sizes as well, 1.
+        quads: Approximate number of quads; 10,000 unless size is given.
+        size: Length of the edges of quads in model units; replaces quads.
+        stretch: Trade-off between equal angles (0) and also equal sizes (1) of quads.
         smooth: Rounds of smoothing on the surface; 0 for none.
-        sharp_angle: Edges at which the surface bends by more lie on grid lines, and the boundary with them: quads run
-            along them.
+        sharp_angle: Put edges with a larger dihedral angle, and the boundary, on grid lines, so that edges of quads
+            follow them.
         cones: auto: the search finds them. Or vertices, each with its curvature, a multiple of pi/2: pi/2 for three
-            quads, -pi/2 for five. On surfaces with handles few that are given have a grid.
-        boundary: straight: it lies on grid lines, between corners that the search finds like cones, and no square is
-            lost. free: it runs across squares, and those that it cuts are left out. auto: straight where such a grid is
-            found, unless cones are given.
-        min_cone_angle: The sharpest cone, pi/2 for each quad at it; with straight sides it is pi/2, one quad, at
-            corners.
-        max_cone_angle: The widest saddle; 3pi is six quads.
-        max_cones: The search stops at so many cones per component.
+            quads, -pi/2 for five. On surfaces with handles, a grid rarely exists for given cones.
+        boundary: straight: the boundary lies on grid lines, between corners that the search finds together with the
+            cones, and no square is lost. free: the boundary cuts squares, which are left out. auto: straight if such a
+            grid is found and cones are not given, else free.
+        min_cone_angle: Smallest cone angle, pi/2 for each quad at the cone; with a straight boundary it is pi/2, one
+            quad, at corners.
+        max_cone_angle: Largest cone angle; 3pi is six quads.
+        max_cones: Largest number of cones per component, at which the search stops.
     """
 
     quads: int | None = option(None, COUNT)

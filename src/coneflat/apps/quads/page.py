@@ -1,4 +1,4 @@
-"""A page of quads: rectangles of quads take the place of charts, and a square of the board is a quad."""
+"""The interactive page of a quad mesh: rectangles of quads replace charts, and each checkerboard square is a quad."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 
 @dataclass(frozen=True, eq=False)
 class Domains:
-    """A parting of a mesh of p quads into rectangles of quads.
+    """A partition of a mesh of p quads into d rectangular domains.
 
     Attributes:
-        domain: (p,) of each quad.
-        places: (p, 4, 2) integers: where the corners of each quad lie in its rectangle, whose least is (0, 0).
-        sides: (d, 2) quads along x and along y of each, y being no more.
+        domain: (p,) the domain of each quad.
+        places: (p, 4, 2) integer coordinates of the corners of each quad in its rectangle, from (0, 0).
+        sides: (d, 2) number of quads along x and along y, which is at most that along x.
         is_cut: (4p,) whether side i of quad q, 4 q + i, from its corner i to the next, is on the border of a domain.
     """
 
@@ -38,32 +38,32 @@ class Domains:
 
 
 def find_domains(mesh: QuadMesh) -> Domains:
-    """Return the rectangles that lines from irregular vertices part a mesh of quads into.
+    """Return the rectangles into which lines from irregular vertices divide a quad mesh.
 
-    From each irregular vertex all lines set out at one time, and each ends where it meets another, or the boundary.
-    Other pieces, like a torus without irregular vertices, are divided by lines from their first vertex.
+    Lines start at all irregular vertices simultaneously, and each ends where it meets another line or the boundary.
+    Pieces that are not rectangles, such as a torus without irregular vertices, are divided by lines from one vertex.
     """
     twin, starts = _twins(mesh), mesh.quads.ravel()
     is_cut = twin < 0
     reached = np.zeros(len(mesh.vertices), dtype=bool)
     reached[starts[is_cut]] = True
-    # Inside, four sides set out from a regular vertex; on the boundary two, as the last one is of no quad.
+    # Four half-edges leave a regular inner vertex; two leave one on the boundary, as the third edge's is missing.
     leaving = np.bincount(starts, minlength=len(mesh.vertices))
     odd = np.where(mesh.is_boundary_vertex, leaving > 2, leaving != 4)
     seeds = np.flatnonzero(odd)
     while True:
-        _ride(seeds, starts, twin, is_cut, reached)
-        found, is_bad = _laid_out(twin, is_cut, len(mesh.quads))
+        _trace(seeds, starts, twin, is_cut, reached)
+        found, is_bad = _unfold(twin, is_cut, len(mesh.quads))
         if not is_bad.any():
             return found
-        # One more vertex of each that is not a rectangle: the first whose lines are not all there.
+        # Each domain that is not a rectangle gets one more start vertex: the first with an uncut side.
         first = np.flatnonzero(is_bad[np.repeat(found.domain, 4)] & ~is_cut)
         _, one_of = np.unique(np.repeat(found.domain, 4)[first], return_index=True)
         seeds = np.unique(starts[first[one_of]])
 
 
 def _twins(mesh: QuadMesh) -> IntArray:
-    """Return (4p,) the side of the quad across each side; -1 on the boundary."""
+    """Return (4p,) the opposite half-edge of each side; -1 on the boundary."""
     one, two = mesh.quads.ravel(), np.roll(mesh.quads, -1, axis=1).ravel()
     count = len(mesh.vertices)
     keys, back = one * count + two, two * count + one
@@ -72,21 +72,21 @@ def _twins(mesh: QuadMesh) -> IntArray:
     return np.where(keys[order[at]] == back, order[at], -1)
 
 
-def _ride(seeds: IntArray, starts: IntArray, twin: IntArray, is_cut: BoolArray, reached: BoolArray) -> None:
-    """Cut along the lines from some vertices, in place; all go on by one side at a time."""
+def _trace(seeds: IntArray, starts: IntArray, twin: IntArray, is_cut: BoolArray, reached: BoolArray) -> None:
+    """Cut along the lines from some vertices, in place; all lines advance by one side at a time."""
     reached[seeds] = True
-    riders = np.flatnonzero(np.isin(starts, seeds) & ~is_cut)
-    while len(riders):
-        is_cut[riders] = is_cut[twin[riders]] = True
-        arrived = starts[_next(riders)]
-        # Of those that arrive together one goes on, so that there is a straight line through every vertex.
+    fronts = np.flatnonzero(np.isin(starts, seeds) & ~is_cut)
+    while len(fronts):
+        is_cut[fronts] = is_cut[twin[fronts]] = True
+        arrived = starts[_next(fronts)]
+        # Of the lines that arrive at a vertex together, one continues, so that each vertex has a straight line.
         _, first = np.unique(arrived, return_index=True)
-        riders = riders[np.sort(first)]
-        riders = riders[~reached[starts[_next(riders)]]]
-        reached[starts[_next(riders)]] = True
-        beside = twin[_next(riders)]
+        fronts = fronts[np.sort(first)]
+        fronts = fronts[~reached[starts[_next(fronts)]]]
+        reached[starts[_next(fronts)]] = True
+        beside = twin[_next(fronts)]
         on = _next(beside)
-        riders = on[(beside >= 0) & ~is_cut[on]]
+        fronts = on[(beside >= 0) & ~is_cut[on]]
 
 
 def _next(side: IntArray) -> IntArray:
@@ -94,8 +94,8 @@ def _next(side: IntArray) -> IntArray:
     return side - side % 4 + (side + 1) % 4
 
 
-def _laid_out(twin: IntArray, is_cut: BoolArray, count: int) -> tuple[Domains, BoolArray]:
-    """Return the domains as they lie in the plane, and which of them are not rectangles."""
+def _unfold(twin: IntArray, is_cut: BoolArray, count: int) -> tuple[Domains, BoolArray]:
+    """Return the domains unfolded in the plane, and which of them are not rectangles."""
     inner = np.flatnonzero(~is_cut)
     number, domain = label_components(count, inner // 4, twin[inner] // 4)
     turn, origin = np.full(count, -1), np.zeros((count, 2), dtype=np.int64)
@@ -109,7 +109,7 @@ def _laid_out(twin: IntArray, is_cut: BoolArray, count: int) -> tuple[Domains, B
         _, first = np.unique(twin[sides] // 4, return_index=True)
         sides = sides[first]
         here, there = sides // 4, twin[sides] // 4
-        # The side runs the other way in the quad across.
+        # The side has the opposite direction in the neighbouring quad.
         turn[there] = (turn[here] + sides % 4 + 2 - twin[sides] % 4) % 4
         end = origin[here] + _turned(turn[here], SQUARE[(sides + 1) % 4])
         origin[there] = end - _turned(turn[there], SQUARE[twin[sides] % 4])
@@ -124,10 +124,10 @@ def _laid_out(twin: IntArray, is_cut: BoolArray, count: int) -> tuple[Domains, B
     fits = (flat[inner] == flat[_next(across)]).all(axis=1) & (flat[_next(inner)] == flat[across]).all(axis=1)
     is_bad = sides.prod(axis=1) != np.bincount(domain, minlength=number)
     is_bad[domain[inner[~fits] // 4]] = True
-    upright = sides[:, 1] > sides[:, 0]
-    lying = places[..., ::-1] * [-1, 1] + np.stack([sides[:, 1], 0 * sides[:, 1]], axis=1)[domain][:, None]
-    places = np.where(upright[domain][:, None, None], lying, places)
-    sides = np.where(upright[:, None], sides[:, ::-1], sides)
+    is_tall = sides[:, 1] > sides[:, 0]
+    rotated = places[..., ::-1] * [-1, 1] + np.stack([sides[:, 1], 0 * sides[:, 1]], axis=1)[domain][:, None]
+    places = np.where(is_tall[domain][:, None, None], rotated, places)
+    sides = np.where(is_tall[:, None], sides[:, ::-1], sides)
     return Domains(domain, places, sides, is_cut), is_bad
 
 
@@ -137,9 +137,9 @@ def _turned(turn: IntArray, vectors: IntArray) -> IntArray:
 
 
 def arranged(domains: Domains) -> tuple[IntArray, int]:
-    """Return (p, 4, 2) integers where corners of quads lie if all rectangles lie apart, and the side of a square.
+    """Return (p, 4, 2) integer coordinates of quad corners with all rectangles packed, and the side of the square.
 
-    They lie in rows, the tallest below, so that all are about square; a gap of one quad is around each.
+    Rectangles are packed in rows, the tallest at the bottom, into about a square, with a gap of one quad around each.
     """
     sides = domains.sides + 1
     order = np.lexsort((-sides[:, 0], -sides[:, 1]))
@@ -155,10 +155,10 @@ def arranged(domains: Domains) -> tuple[IntArray, int]:
 
 
 def page_of_quads(quads: QuadMesh, *, name: str = "Quads", show: str | None = None, **look: Any) -> str:
-    """Return the page of a mesh of quads as text; arguments and errors are those of `page_of`.
+    """Return the HTML page of a quad mesh; arguments and errors are those of `page_of`.
 
-    Triangles are halves of quads. Charts, which it shows first, are the rectangles of `find_domains`, laid out apart,
-    and seams their borders. Irregular vertices are cones: red where fewer than four quads meet, black where more do.
+    Triangles are halves of quads. Charts, which are shown first, are the rectangles of `find_domains`, and seams are
+    their borders. Irregular vertices are cones: red if fewer than four quads meet there, black if more.
     """
     domains = find_domains(quads)
     result, charts = as_flattening(quads, domains), len(domains.sides)
@@ -179,7 +179,7 @@ def page_of_quads(quads: QuadMesh, *, name: str = "Quads", show: str | None = No
 
 
 def as_flattening(quads: QuadMesh, domains: Domains) -> Flattening:
-    """Return the triangles of quads with UVs in which all are squares of one size, in rectangles that lie apart."""
+    """Return the triangles of quads with UVs in which all quads are squares of one size, in disjoint rectangles."""
     places, side = arranged(domains)
     corner_uv = places.reshape(-1, 2)[quads.triangle_corners] / side
     result = flattening_of(Mapped(quads.vertices, quads.triangles, corner_uv, len(quads.quads), 0, 0))

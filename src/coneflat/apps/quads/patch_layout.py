@@ -1,4 +1,4 @@
-"""A layout with sharp edges along the axes: the patches between them, flattened with straight sides and joined."""
+"""Layouts with sharp edges along the axes: the patches between them are flattened with straight sides and joined."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class PatchError(GridError):
 
 
 class CoarseError(PatchError):
-    """A patch cannot be flattened as some of its triangles, `faces`, are too coarse."""
+    """A patch cannot be flattened because some of its triangles, `faces`, are too coarse."""
 
 
 def sharp_layout(
@@ -40,17 +40,17 @@ def sharp_layout(
     """Return a seamless layout of a mesh with sharp edges along the axes, in units of a grid.
 
     Args:
-        opened: the mesh, opened along its sharp edges.
+        opened: the mesh, cut open along its sharp edges.
         lengths: (m, 3) side lengths of its triangles.
-        size: of a square of the grid.
-        options: what is asked of the cones inside patches.
-        tell: called before each patch is flattened with its number and how many there are.
+        size: edge length of a square of the grid.
+        options: options of the cones inside patches.
+        tell: progress function, called before each patch is flattened, with its index and the number of patches.
 
     Raises:
         CoarseError: triangles are too coarse.
         PatchError: a patch has no flat metric with angles of quarter turns.
-        ConvergenceError: patches cannot be brought together, as far as is known.
-        GridError: sides and seams, each turned to the nearest axis, contradict each other.
+        ConvergenceError: no layout was found in which the patches match.
+        GridError: the nearest axes of sides and seams contradict each other.
     """
     layout = _flat_patches(opened, lengths, size, options, tell)
     layout, component = joined_charts(replace(layout, points=_fitting(opened, layout)))
@@ -63,7 +63,7 @@ def sharp_layout(
 def _flat_patches(
     opened: Opened, lengths: FloatArray, size: float, options: Options, tell: Callable[[int, int], None]
 ) -> Layout:
-    """Return all patches of an opened mesh, flattened at their own areas, that do not fit each other yet.
+    """Return the layout of all patches of an opened mesh, each with its own area; they do not match yet.
 
     Raises:
         CoarseError: triangles are too coarse.
@@ -75,7 +75,7 @@ def _flat_patches(
     areas = double_areas(lengths)
     for number, (part, vertices, faces) in enumerate(parts):
         tell(number, len(parts))
-        # What all have in common is the mean of squares by area, to which small ones add little.
+        # The overall distortion is a root mean square weighted by area, to which small patches contribute little.
         share = float(areas[faces].sum() / areas.mean() / len(areas))
         distortion = options.distortion * min(max(1.0, 1 / np.sqrt(len(parts) * share)), 3.0)
         try:
@@ -102,37 +102,37 @@ def _flat_patches(
 def _flat_patch(
     mesh: TriangleMesh, lengths: FloatArray, quarters: IntArray, distortion: float, options: Options
 ) -> tuple[FloatArray, IntArray, IntArray]:
-    """Return a connected patch flattened conformally, with angles of whole quarter turns on its boundary.
+    """Return the conformal flattening of a connected patch, with multiples of pi/2 as angles on its boundary.
 
-    Points (u, 2) of the plane, (m, 3) that at each triangle corner, and cones, vertices inside. Triangles that are too
-    coarse for straight sides may be flipped.
+    The results are points (u, 2) in the plane, (m, 3) the point of each triangle corner, and cones, inner vertices.
+    Triangles that are too coarse for straight sides may be flipped.
 
     Args:
         mesh: the patch.
         lengths: (m, 3) side lengths.
-        quarters: (n,) the quarter turns of the angle at each vertex on the boundary.
-        distortion: the area distortion allowed, the standard deviation of the log of the scale by area.
-        options: what else is asked of the cones inside.
+        quarters: (n,) the angle at each boundary vertex in quarter turns.
+        distortion: largest area distortion allowed: standard deviation of the log scale, weighted by area.
+        options: other options of the cones.
 
     Raises:
-        CurvatureError: no cones inside make up for the corners.
+        CurvatureError: no inner cones have the total curvature that the corners require.
         ConvergenceError, MetricError: no metric was found.
     """
     corners = np.where(mesh.is_boundary_vertex, (np.pi / 2) * (2 - quarters), 0.0)
     solution = _cones(mesh, lengths, corners, distortion, options)
     choices = ExactChoices(scale_at_cones=False, boundary=straight_boundary(mesh, solution.target))
-    # Rotations along handles are not quarter turns yet, nor are loops of the boundary parallel: both come to be so when
-    # patches are brought together.
+    # Holonomy along handles is not yet a multiple of a quarter turn, and different boundary loops are not yet parallel.
+    # Both are corrected when the patches are joined.
     metric = exact_flat_metric(mesh, lengths, solution, choices)
     seams = find_seams(mesh, solution.cones, lengths.ravel()[mesh.edge_halfedges[:, 0]])
-    laid_out = lay_out(metric, Cut(cut_open(mesh, seams).mesh, seams))
-    return laid_out.points, laid_out.corners, solution.cones
+    layout = lay_out(metric, Cut(cut_open(mesh, seams).mesh, seams))
+    return layout.points, layout.corners, solution.cones
 
 
 def _cones(
     mesh: TriangleMesh, lengths: FloatArray, corners: FloatArray, distortion: float, options: Options
 ) -> ConeSolution:
-    """Return cones inside a patch whose (n,) corners are given: these are taken off the curvature to be made up for."""
+    """Return the inner cones of a patch with prescribed corners (n,), whose curvature is subtracted from its own."""
     surface = Surface.of(mesh, lengths)
     inside = ~mesh.is_boundary_vertex
     total = 4 * mesh.euler_characteristic - round(float(corners.sum()) / (np.pi / 2))
@@ -160,7 +160,7 @@ def _cones(
 
 
 def _along_axes(mesh: TriangleMesh, corners: IntArray, points: ComplexArray) -> ComplexArray:
-    """Return points of a patch turned so that most of its boundary is along the axes."""
+    """Return the points of a patch, rotated so that most of its boundary is along the axes."""
     border = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
     side = points[corners[:, PREVIOUS].ravel()[border]] - points[corners[:, NEXT].ravel()[border]]
     angle = float(np.angle((np.abs(side) * (side / np.abs(side)) ** 4).sum()) / 4)
@@ -168,20 +168,20 @@ def _along_axes(mesh: TriangleMesh, corners: IntArray, points: ComplexArray) -> 
 
 
 def _fitting(opened: Opened, layout: Layout) -> ComplexArray:
-    """Return the points of patches relaxed so that sides are straight, along the axes, and quarter turns of each other.
+    """Return the relaxed points of patches: sides are along the axes, and both sides of seams match by quarter turns.
 
     Raises:
-        ConvergenceError: they cannot be without flipping a triangle, as far as is known.
-        GridError: sides and seams, each turned to the nearest axis, contradict each other.
+        ConvergenceError: no such layout without flipped triangles was found.
+        GridError: the nearest axes of sides and seams contradict each other.
     """
     sides = _all_sides(opened, layout, layout.chains(quarter_turns=True))
     offsets = np.full(len(sides.axis), np.nan)
     constraints = PointConstraints(
         lines=Lines(sides.points, sides.side, sides.directions, offsets) if len(offsets) else None,
         quarter_turns=True,
-        nodes=layout.whole,
+        nodes=layout.nodes,
     )
-    # Patches of one size meet more easily.
+    # Patches of equal scale are easier to join.
     points, energy = as_pairs(layout.points), StretchEnergy(1.0)
     try:
         found = relax(
@@ -193,13 +193,13 @@ def _fitting(opened: Opened, layout: Layout) -> ComplexArray:
 
 
 def _all_sides(opened: Opened, layout: Layout, chains: SeamChains) -> Sides:
-    """Return the sides that lie along the axes: of the boundary, and the left ones of chains of features."""
+    """Return the sides along the axes: sides of the boundary, and the left sides of feature chains."""
     points = layout.points
     border = find_sides(layout, np.ones(len(points), dtype=bool))
     feature = opened.is_feature[chains.edges]
     left, chain = chains.left[feature], chains.chain[feature]
     along = points[left[:, 1]] - points[left[:, 0]]
-    # Twice the direction, so that to and fro are the same.
+    # The doubled angle makes opposite directions equal.
     numbers, which = np.unique(chain, return_inverse=True)
     double = np.abs(along) * (along / np.abs(along)) ** 2
     sums = np.bincount(which, double.real, len(numbers))

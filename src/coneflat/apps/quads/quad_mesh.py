@@ -1,4 +1,4 @@
-"""A mesh of quads on a triangle mesh."""
+"""Quad meshes on a triangle mesh."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class QuadMesh:
-    """A manifold mesh of quads whose vertices lie on a triangle mesh.
+    """A manifold quad mesh whose vertices lie on a triangle mesh.
 
     Attributes:
-        vertices: (q, 3) positions, on the surface.
-        quads: (p, 4) vertex indices, oriented as the surface is.
-        faces: (q,) the triangle of the surface that each vertex lies in.
-        barycentric: (q, 3) where in it.
-        left_out: squares of the grid that were left out, as the boundary of the surface cuts them.
-        area_left_out: of the grid on the surface that is under no quad, in squares: beside boundaries that are not
-            on grid lines; negative, should a quad lie over a hole.
+        vertices: (q, 3) positions on the surface.
+        quads: (p, 4) vertex indices, with the orientation of the surface.
+        faces: (q,) the triangle of the surface that contains each vertex.
+        barycentric: (q, 3) barycentric coordinates in this triangle.
+        left_out: number of squares of the grid that were left out because the boundary of the surface cuts them.
+        area_left_out: area of the grid that quads do not cover, in squares, next to boundaries that are not on grid
+            lines; negative if a quad covers a hole.
         surface: the triangle mesh.
-        notes: what was done, and what falls short, one sentence each.
-        seconds: wall time of each stage; files do not keep it.
+        notes: notes on the computation and on problems, one sentence each.
+        seconds: wall time of each stage; not stored in files.
 
     Examples:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
@@ -56,7 +56,7 @@ class QuadMesh:
 
     @cached_property
     def _edges(self) -> tuple[IntArray, IntArray]:
-        """Edges as vertex pairs (e, 2), the smaller index first, and the number of quads beside each (e,)."""
+        """Edges as vertex pairs (e, 2), the smaller index first, and (e,) the number of quads at each."""
         tails, heads = self.quads.ravel(), np.roll(self.quads, -1, axis=1).ravel()
         order, first = sort_pairs(tails, heads, len(self.vertices))
         pairs = np.sort(np.stack([tails, heads], axis=1)[order[first]], axis=1)
@@ -69,19 +69,19 @@ class QuadMesh:
 
     @property
     def is_boundary_edge(self) -> BoolArray:
-        """(e,) True for edges with one quad."""
+        """(e,) whether each edge has a single quad."""
         return self._edges[1] == 1
 
     @cached_property
     def is_boundary_vertex(self) -> BoolArray:
-        """(q,) True for vertices on the boundary."""
+        """(q,) whether each vertex is on the boundary."""
         mask = np.zeros(len(self.vertices), dtype=bool)
         mask[self.edges[self.is_boundary_edge]] = True
         return mask
 
     @cached_property
     def triangle_corners(self) -> IntArray:
-        """(2p, 3) corners of quads, 4 q + i, of the two triangles on either side of each quad's shorter diagonal."""
+        """(2p, 3) corners of quads, 4 q + i, of the two triangles on both sides of each quad's shorter diagonal."""
         corners = self.vertices[self.quads]
         one, two = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
         turn = np.where(dots(one, one) <= dots(two, two), 0, 1)
@@ -90,7 +90,7 @@ class QuadMesh:
 
     @property
     def triangles(self) -> IntArray:
-        """(2p, 3) vertex indices of these triangles, those of each quad one after the other."""
+        """(2p, 3) vertex indices of the triangles of `triangle_corners`, two consecutive ones per quad."""
         return self.quads.ravel()[self.triangle_corners]
 
     @cached_property
@@ -110,15 +110,15 @@ class QuadMesh:
 
     @property
     def surface_euler(self) -> int:
-        """That of the surface, which is the same unless squares were left out; vertices without a face do not count."""
+        """Euler characteristic of the surface without unused vertices; equal to that of the quads if left_out is 0."""
         unused = len(self.surface.vertices) - len(np.unique(self.surface.faces))
         return self.surface.euler_characteristic - unused
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the mesh as .obj, .ply, .glb or .npz, in full or not at all, and return the path; see `write_quads`.
+        """Write the mesh as .obj, .ply, .glb or .npz, atomically, and return the path; see `write_quads`.
 
         Raises:
-            UnknownFormatError: the ending is another.
+            UnknownFormatError: the extension is another one.
             MeshFileError: the file cannot be written.
         """
         from .files import write_quads
@@ -126,7 +126,7 @@ class QuadMesh:
         return write_quads(path, self)
 
     def figure_rows(self, look: Look) -> tuple[list[Row], list[Any]]:
-        """Return the rows of a figure of the kind "quads" by `make_figure`, and what its legend names."""
+        """Return the rows and the legend handles of a figure of the kind "quads" for `make_figure`."""
         from ..view import Row
         from .figure import draw_quads, irregular_handles
 
@@ -134,11 +134,11 @@ class QuadMesh:
 
     @staticmethod
     def load(path: str | PathLike[str]) -> QuadMesh:
-        """Return a mesh that was saved as .npz, with the surface that it lies on.
+        """Return a quad mesh from an .npz file, with its surface.
 
         Raises:
-            UnknownFormatError: the ending is another.
-            MeshFileError: the file is not there, may not be read, or holds no mesh of quads.
+            UnknownFormatError: the extension is not .npz.
+            MeshFileError: the file does not exist, cannot be read, or does not contain a quad mesh.
         """
         from .files import read_quads
 
@@ -146,31 +146,32 @@ class QuadMesh:
 
 
 def require_manifold(quads: IntArray, vertex_count: int, edge_count: int) -> None:
-    """Raise GridError unless all quads have four vertices, and all edges a pair of vertices of their own.
+    """Raise GridError unless all quads have four different vertices, and no two edges have the same two vertices.
 
     Args:
         quads: (p, 4) vertex indices.
-        vertex_count, edge_count: how many there are on the surface.
+        vertex_count, edge_count: number of vertices and edges on the surface.
     """
     again = np.flatnonzero((np.diff(np.sort(quads, axis=1), axis=1) == 0).any(axis=1))
     if len(again):
         raise GridError(
             f"{plural(len(again), 'quad')} of {len(quads):,} with a vertex twice ({list_some(again)}): the grid is too "
-            "coarse; ask for more quads"
+            "coarse; use more quads"
         )
     _, first = sort_pairs(quads.ravel(), np.roll(quads, -1, axis=1).ravel(), vertex_count)
     missing = edge_count - int(first.sum())
     if missing:
         raise GridError(
-            f"{plural(missing, 'edge')} of {edge_count:,} between vertices that have one already: the grid is too "
-            "coarse; ask for more quads"
+            f"{plural(missing, 'edge')} of {edge_count:,} with the same vertices as another edge: the grid is too "
+            "coarse; use more quads"
         )
 
 
 def least_jacobians(points: FloatArray, quads: IntArray) -> FloatArray:
-    """Return (p,) the least scaled Jacobian of each quad: sines of its angles, seen along the normal.
+    """Return (p,) the least scaled Jacobian of each quad: the signed sines of its angles, projected along its normal.
 
-    The normal is that of the two diagonals; 1 is a rectangle's, and below 0 a quad is flipped at a corner.
+    The normal is the cross product of the diagonals. The value is 1 for a rectangle, and negative if a corner is
+    flipped.
     """
     corners = points[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])

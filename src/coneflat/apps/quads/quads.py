@@ -1,4 +1,4 @@
-"""Quad meshes of surfaces."""
+"""Quad meshing of surfaces."""
 
 from __future__ import annotations
 
@@ -29,22 +29,25 @@ def quads(
     smooth: int = ROUNDS,
     **options: Any,
 ) -> QuadMesh:
-    """Return a quad mesh of a surface: all faces are quads, and irregular vertices are the cones of a flattening.
+    """Return a quad mesh of a surface; all faces are quads, and irregular vertices are the cones of a flattening.
 
     Args:
-        mesh, faces: as `coneflat.flatten` takes them; or an `IntegerGrid`, and of the options only `smooth` and
-            `progress`.
-        quads: about how many; None: 10,000, unless a size is given.
-        size: of a quad's edges in model units, instead.
-        stretch: from angles, 0, to areas, 1: what quads are to be alike in; see `integer_grid`.
-        sharp_angle: radians: quads' edges run along edges at which the surface bends by more; None for none.
+        mesh, faces: as for `coneflat.flatten`; or an `IntegerGrid`, which accepts the options `smooth` and `progress`
+            only.
+        quads: approximate number of quads; None: 10,000, unless `size` is given.
+        size: length of the edges of quads in model units; replaces `quads`.
+        stretch: trade-off between equal angles (0) and also equal areas (1); see `integer_grid`.
+        sharp_angle: radians; edges of quads follow edges with a larger dihedral angle; None for none.
         smooth: rounds of smoothing on the surface, see `smooth_quads`; 0 for none.
-        options: of `coneflat.flatten`; by default cones have three, five or six quads.
+        options: those of `coneflat.flatten`; by default cones have three, five or six quads.
+
+    Returns:
+        The quad mesh, with the position of its vertices on the surface.
 
     Raises:
-        GridError: no grid of this size was found that flips no triangle, or it is too coarse for quads.
-        OptionError: an option makes no sense.
-        MeshError, CurvatureError, SeamError, MetricError: as `coneflat.flatten`.
+        GridError: no grid of this size without flipped triangles was found, or it is too coarse for quads.
+        OptionError: an option is unknown or invalid.
+        MeshError, CurvatureError, SeamError, MetricError: as for `coneflat.flatten`.
 
     Examples:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
@@ -54,9 +57,9 @@ def quads(
     """
     progress = options.get("progress")
     if isinstance(mesh, IntegerGrid):
-        said = (faces, quads, size, sharp_angle)
-        if any(one is not None for one in said) or options.keys() - {"progress"}:
-            raise OptionError("a grid has its faces, size and options: none can be given beside it")
+        given = (faces, quads, size, sharp_angle)
+        if any(one is not None for one in given) or options.keys() - {"progress"}:
+            raise OptionError("a grid already has faces, size and options: no others can be given")
         grid = mesh
     else:
         grid = integer_grid(
@@ -74,18 +77,18 @@ def quads(
 
 
 def _notes(found: QuadMesh) -> Iterator[str]:
-    """Yield what falls short."""
+    """Yield a note for each problem of a quad mesh."""
     if found.left_out:
         share = 100 * found.area_left_out / (found.area_left_out + len(found.quads))
         yield (
-            f"Left out {plural(found.left_out, 'square')} that the boundary cuts, and with them {share:.1f} % of the "
-            "surface as the grid has it."
+            f"Left out {plural(found.left_out, 'square')} that the boundary cuts, {share:.1f} % of the area of the "
+            "grid."
         )
     if found.euler_characteristic != found.surface_euler:
         yield (
             f"The Euler characteristic of the quads is {found.euler_characteristic}, that of the "
-            f"surface {found.surface_euler}: what was left out has opened or parted it."
+            f"surface {found.surface_euler}: leaving out squares has opened or split the mesh."
         )
     turned = int((least_jacobians(found.vertices, found.quads) <= 0).sum())
     if turned:
-        yield f"{plural(turned, 'quad')} with an angle of 180 degrees or more: more quads would help."
+        yield f"{plural(turned, 'quad')} with an angle of 180 degrees or more: use more quads."

@@ -1,4 +1,4 @@
-"""How good a quad mesh is."""
+"""Measures of quad meshes."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ class QuadMeasures:
     """Measures of a quad mesh.
 
     Attributes:
-        vertices, quads: how many.
-        irregular: inner vertices whose valence is not 4.
-        irregular_valences: how many of each valence.
+        vertices, quads: numbers of vertices and quads.
+        irregular: number of inner vertices with a valence other than 4.
+        irregular_valences: number of irregular vertices for each valence.
         euler_characteristic: vertices minus edges plus quads.
-        surface_euler: that of the surface, which it is unless squares were left out.
-        boundary_edges: edges with one quad.
-        angle_mean, angle_p95, angle_max: of all corner angles, degrees off 90.
-        edge_mean, edge_cv: of edge lengths, the mean, and the standard deviation over it.
-        jacobian_mean, jacobian_min: of the least scaled Jacobian of each quad, 1 for rectangles; below 0 a quad is
-            flipped at a corner.
-        to_surface, from_surface: the largest distance from the quads to the surface and back, model units; see
-            `surface_gaps`.
+        surface_euler: Euler characteristic of the surface, which is the same unless squares were left out.
+        boundary_edges: number of edges with one quad.
+        angle_mean, angle_p95, angle_max: deviation of all corner angles from 90 degrees, in degrees.
+        edge_mean, edge_cv: mean edge length, and the standard deviation of edge lengths divided by the mean.
+        jacobian_mean, jacobian_min: mean and minimum of the least scaled Jacobian of each quad, 1 for rectangles,
+            negative if a quad is flipped at a corner.
+        to_surface, from_surface: largest distance from the quads to the surface, and from the surface to the quads,
+            model units; see `surface_gaps`.
         hausdorff: the larger of both.
         left_out, area_left_out: see `QuadMesh`.
     """
@@ -58,43 +58,43 @@ class QuadMeasures:
     area_left_out: float
 
     def report(self) -> dict[str, Any]:
-        """Return the measures by name, as JSON takes them."""
+        """Return the measures by name, ready for JSON."""
         return asdict(self)
 
     def rows(self) -> Iterator[tuple[str, str, str]]:
-        """Yield what people are told: measure, value, meaning."""
+        """Yield table rows (measure, value, meaning)."""
         valences = ", ".join(f"{count:,} of {valence}" for valence, count in self.irregular_valences.items())
-        apart = self.hausdorff / self.edge_mean
+        distance_in_edges = self.hausdorff / self.edge_mean
         holds = self.euler_characteristic == self.surface_euler
-        euler = "as the surface" if holds else f"not {self.surface_euler} as the surface"
+        euler = "same as the surface" if holds else f"the surface has {self.surface_euler}"
         yield "quads", f"{self.quads:,}", f"Euler characteristic {self.euler_characteristic}, {euler}"
-        irregular = f"inner vertices of other valence than 4: {valences or 'none'}"
+        irregular = f"inner vertices with a valence other than 4: {valences or 'none'}"
         yield "irregular", f"{self.irregular:,}", irregular
         off = f"mean; 95% below {self.angle_p95:.1f}, worst {self.angle_max:.1f}"
         yield "off 90 deg", f"{self.angle_mean:.2f}", off
-        spread = f"standard deviation of edge lengths over their mean, {self.edge_mean:.4g}"
+        spread = f"standard deviation of edge lengths divided by their mean, {self.edge_mean:.4g}"
         yield "edge cv", f"{self.edge_cv:.3f}", spread
-        least = f"scaled, mean of each quad's least; least {self.jacobian_min:.3f}"
+        least = f"scaled, mean of each quad's minimum; minimum {self.jacobian_min:.3f}"
         yield "Jacobian", f"{self.jacobian_mean:.3f}", least
-        distance = f"from the surface and back, the largest of samples; {apart:.2f} edges"
+        distance = f"largest between quads and surface, at samples; {distance_in_edges:.2f} edges"
         yield "distance", f"{self.hausdorff:.3g}", distance
 
 
 def measure_quads(quads: QuadMesh) -> QuadMeasures:
     """Return the measures of a quad mesh on a surface.
 
-    Angles are in degrees, lengths and distances in model units; Jacobians and `edge_cv` are ratios. Distances to the
-    surface and back are the largest of samples, see `surface_gaps`.
+    Angles are in degrees, lengths and distances in model units; Jacobians and `edge_cv` are ratios. Distances to and
+    from the surface are the largest at samples, see `surface_gaps`.
 
     Args:
         quads: p quads, at least one, with q vertices on their surface, as `coneflat.quads` returns them or
-            `QuadMesh.load` reads them. Nothing of it is changed.
+            `QuadMesh.load` reads them; not modified.
 
     Returns:
-        Numbers of Python, not arrays: see `QuadMeasures`.
+        The measures as Python numbers, see `QuadMeasures`.
 
     Raises:
-        ArrayShapeError: it is no `QuadMesh`.
+        ArrayShapeError: `quads` is not a `QuadMesh`.
 
     Examples:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
@@ -136,7 +136,7 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
 
 
 def corner_angles_of(quads: QuadMesh) -> FloatArray:
-    """Return (p, 4) the angles between the sides of quads, degrees."""
+    """Return (p, 4) the corner angles of quads, degrees."""
     corners = quads.vertices[quads.quads]
     one, two = np.roll(corners, 1, axis=1) - corners, np.roll(corners, -1, axis=1) - corners
     scale = np.maximum(np.sqrt(dots(one, one) * dots(two, two)), np.finfo(float).tiny)
@@ -144,17 +144,17 @@ def corner_angles_of(quads: QuadMesh) -> FloatArray:
 
 
 def surface_gaps(quads: QuadMesh) -> tuple[float, float]:
-    """Return the largest distances found from the quads to the surface, and from the surface to the quads.
+    """Return the largest sampled distances from the quads to the surface, and from the surface to the quads.
 
     Distances are exact, but measured at samples: at 5 x 5 points of the bilinear patch of each quad, and at points of
-    each triangle whose distances are half the mean edge of the quads at most. Distances to quads are those to their two
-    triangles on either side of the diagonal that is shorter.
+    each triangle with a spacing of at most half the mean edge of the quads. Distances to quads are those to their two
+    triangles on both sides of the shorter diagonal.
     """
     mesh, corners = quads.surface, quads.vertices[quads.quads]
     t = np.linspace(0.0, 1.0, 5)
     u, v = (x.ravel() for x in np.meshgrid(t, t, indexing="ij"))
     patch = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
-    # Corners are the same for several quads.
+    # Corners are shared by several quads, so they are sampled once.
     inner = np.einsum("si,pix->psx", patch[patch.max(axis=1) < 1], corners).reshape(-1, 3)
     there = surface_distances(mesh.vertices, mesh.faces, np.concatenate([quads.vertices, inner]))
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
@@ -162,14 +162,14 @@ def surface_gaps(quads: QuadMesh) -> tuple[float, float]:
     return float(there.max()), float(back.max())
 
 
-def _samples(mesh: TriangleMesh, apart: float) -> FloatArray:
-    """Return (s, 3) points of triangles, those of each in rows so far apart, 64 at most, and their vertices."""
+def _samples(mesh: TriangleMesh, spacing: float) -> FloatArray:
+    """Return (s, 3) sample points of triangles: their vertices, and rows with a given spacing, at most 64 rows each."""
     parts = [mesh.vertices[np.unique(mesh.faces)]]
     longest = edge_lengths(mesh.vertices, mesh.faces).max(axis=1)
-    rows = np.minimum(np.ceil(longest / apart), 64).astype(np.int64)
+    rows = np.minimum(np.ceil(longest / spacing), 64).astype(np.int64)
     for count in np.unique(rows):
         i, j = (x.ravel() for x in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
-        # Middles of the small triangles that stand upright.
+        # Centroids of the small triangles with the orientation of the large one.
         u, v = ((x[i + j < count] + 1 / 3) / count for x in (i, j))
         corners = mesh.vertices[mesh.faces[rows == count]]
         parts.append(np.einsum("si,fix->fsx", np.stack([1 - u - v, u, v], axis=1), corners).reshape(-1, 3))

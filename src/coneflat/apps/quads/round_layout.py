@@ -1,4 +1,4 @@
-"""The integer grid of a smooth layout: seams and cones are rounded to the lattice, and the rest is relaxed."""
+"""The integer grid near a smooth layout: seams and cones are rounded to the lattice, and the rest is relaxed."""
 
 from __future__ import annotations
 
@@ -12,20 +12,23 @@ from ...errors import ConvergenceError, GridError, OptionError
 from ...geometry import as_complex, as_pairs, double_areas, map_factors, sides_between, signed_double_areas
 from ...layout import Lines, PointConstraints, Relaxed, StretchEnergy, relax, rest_sides
 from .integer_map import IntegerGrid, find_motions
-from .layout import Layout, between_whole, quarters_around, split_edges
+from .layout import Layout, between_nodes, quarters_around, split_edges
 from .rounding import Rounding, find_rounding
 from .transitions import Transitions, find_transitions
 
-# Part of the squares wanted by which there may be more or fewer without a note.
+# Relative deviation from the requested number of squares above which a note is added.
 NOTED_SHARE = 0.1
 
 
 def grid_of(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
-    """Return the grid of a smooth layout, or say which count of quads has one.
+    """Return the grid of a smooth layout.
 
-    Where rounding makes many more or fewer squares than the layout has, the size is corrected.
+    If rounding changes the number of squares much, the size is corrected.
+
+    Raises:
+        GridError: no grid was found; the message names a number of quads with a grid, if there is one.
     """
-    is_split = between_whole(layout)
+    is_split = between_nodes(layout)
     split = int(is_split.sum())
     if split:
         layout = split_edges(layout, is_split)
@@ -33,18 +36,18 @@ def grid_of(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
     wanted = layout.area
     if found is None:
         most = 4
-        advice = f"none with up to {2**most} times as many was found, either"
+        advice = f"none was found with up to {2**most} times as many"
         for k in range(1, most + 1):
             finer = layout.scaled(2**k)
             if grid_near(finer, energy)[0] is not None:
-                advice = f"{finer.area:,.0f} would do"
+                advice = f"{finer.area:,.0f} quads are possible"
                 break
         raise GridError(f"no grid of about {wanted:,.0f} quads was found: {why}; {advice}")
     factor, last = 1.0, _squares(found)
     for _ in range(4):
         if abs(_squares(found) - wanted) <= NOTED_SHARE * wanted:
             break
-        # Half of the way after the first: squares come and go by whole rows.
+        # Later corrections are halved, because the number of squares changes by entire rows.
         factor *= (wanted / last) if factor == 1.0 else math.sqrt(wanted / last)
         other, _ = grid_near(layout.scaled(factor), energy)
         if other is None:
@@ -54,17 +57,17 @@ def grid_of(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
             found = replace(other, size=layout.size)
     squares = _squares(found)
     if abs(squares - wanted) > NOTED_SHARE * wanted:
-        found = noted(found, f"The grid has an area of {squares:,.0f} squares, not {wanted:,.0f}.")
+        found = with_note(found, f"The grid has an area of {squares:,.0f} squares, not {wanted:,.0f}.")
     if split:
-        found = noted(
+        found = with_note(
             found,
-            f"Split {plural(split, 'edge')} between cones, which triangles cannot follow apart from each other.",
+            f"Split {plural(split, 'edge')} between cones, so that no triangle has grid points at all corners.",
         )
     return found
 
 
-def noted(found: IntegerGrid, note: str) -> IntegerGrid:
-    """Return a grid with a note more."""
+def with_note(found: IntegerGrid, note: str) -> IntegerGrid:
+    """Return a grid with one more note."""
     return replace(found, notes=(*found.notes, note))
 
 
@@ -73,7 +76,7 @@ def _squares(grid: IntegerGrid) -> float:
 
 
 def grid_near(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None, str]:
-    """Return a grid, if one of the nearest lattice points has one, or else why the last has none."""
+    """Return a grid for one of the nearest lattice points, or None and the reason why the last one failed."""
     transitions = find_transitions(layout)
     try:
         rounding = find_rounding(layout, transitions)
@@ -81,7 +84,7 @@ def grid_near(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None
     except GridError as error:
         return None, str(error)
     smooth = transitions.places(layout.points, rounding.smooth)
-    tries, why = 0, "all lattice points near it put cones on each other"
+    tries, why = 0, "all lattice points nearby merge cones"
     for values in candidates[:3]:
         start = _displaced(layout, smooth, rounding, transitions, values)
         try:
@@ -91,17 +94,17 @@ def grid_near(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None
             continue
         points = _snapped(found, transitions, values)
         if (replace(layout, points=points).double_areas() > 0).all():
-            return _described(layout, smooth, points, found, tries), ""
-        tries, why = tries + 1, "a triangle so small was left that rounding turned it over"
+            return _make_grid(layout, smooth, points, found, tries), ""
+        tries, why = tries + 1, "rounding flipped a very small triangle"
     return None, why
 
 
 def _displaced(
     layout: Layout, smooth: ComplexArray, rounding: Rounding, transitions: Transitions, values: IntArray
 ) -> ComplexArray:
-    """Return the layout with seams and cones where they are to be, moved by the shift of least energy.
+    """Return the layout with seams and cones at their rounded values, moved by the displacement of least energy.
 
-    Where that makes a triangle too small the smooth layout itself: relaxation may find a way.
+    If this makes a triangle too small, return the smooth layout itself, from which relaxing may still succeed.
     """
     shift = rounding.stiffness.displacement((values - rounding.smooth)[:, None])[:, 0]
     moved = transitions.places(smooth + shift[0::2] + 1j * shift[1::2], values.astype(np.float64))
@@ -112,16 +115,16 @@ def _displaced(
 def _relaxed(
     layout: Layout, smooth: ComplexArray, transitions: Transitions, values: IntArray, energy: StretchEnergy
 ) -> Relaxed:
-    """Return the layout relaxed with whole translations of seams and cones on whole places.
+    """Return the relaxed layout with integer translations of seams and cones on grid points.
 
     Raises:
-        ConvergenceError: they cannot be reached without flipping a triangle.
+        ConvergenceError: these constraints were not reached without flipping a triangle.
     """
     chains, count = transitions.chains, 2 * len(transitions.quarters)
     places = transitions.places(smooth, values.astype(np.float64))
-    pinned = np.flatnonzero(transitions.held.all(axis=1))
+    pinned = np.flatnonzero(transitions.fixed.all(axis=1))
     _, one_of = np.unique(chains.chain, return_index=True)
-    # To the left of upwards is where x falls.
+    # The signed offset of a line is measured to the left of its direction, so that of a vertical line is -x.
     sides, lines = layout.sides, None
     if len(sides.axis):
         loose = ~np.isin(sides.points, pinned)
@@ -134,9 +137,9 @@ def _relaxed(
         tied=chains.halfedges[one_of, 1],
         translations=values[:count].reshape(-1, 2),
     )
-    # A thousand times the energy of an isometry: cones fall together then. Of 60 cases of benchmarks/grids.py the
-    # slowest takes 1.7 times as long without this.
-    hopeless = (
+    # A thousand times the energy of an isometry occurs if cones merge. Of 60 cases of benchmarks/grids.py the slowest
+    # takes 1.7 times as long without this limit.
+    energy_limit = (
         1e3 * float(energy.values(np.ones(1), np.ones(1))[0]) * float(double_areas(layout.lengths).sum()) / 2
     )
     return relax(
@@ -147,14 +150,14 @@ def _relaxed(
         constraints,
         lengths=layout.lengths,
         steps=200,
-        progress=lambda _, total: total > hopeless,
+        progress=lambda _, total: total > energy_limit,
     )
 
 
 def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> ComplexArray:
-    """Return the points with seams that are whole motions of each other to the last bit, and cones on grid points.
+    """Return the points rounded so that motions across seams are exact, and cones are exactly on grid points.
 
-    Coordinates become multiples of a power of two so small that their sums with integers are exact.
+    Coordinates become multiples of a power of two for which sums with integers are exact.
     """
     largest = float(np.abs(found.points).max(initial=1.0)) + float(np.abs(values).max(initial=0))
     bits = min(40, 50 - int(np.ceil(np.log2(largest))))
@@ -162,7 +165,7 @@ def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> Comp
     return transitions.places(as_complex(rounded), values.astype(np.float64))
 
 
-def _described(
+def _make_grid(
     layout: Layout, smooth: ComplexArray, points: ComplexArray, found: Relaxed, tries: int
 ) -> IntegerGrid:
     mesh, corner_grid = layout.mesh, as_pairs(points)[layout.corners]
@@ -173,7 +176,7 @@ def _described(
     move_rms, move_max = _moves(layout, smooth, points)
     note = (
         f"The {plural(tries, 'nearest lattice point')} could not be reached without flipping triangles; the next "
-        "one could."
+        "one was used."
     )
     return IntegerGrid(
         vertices=mesh.vertices,
@@ -198,8 +201,8 @@ def _described(
 
 
 def _moves(layout: Layout, smooth: ComplexArray, points: ComplexArray) -> tuple[float, float]:
-    """Return the root mean square and the largest move of cones, in units, beside one that all points share."""
-    at = np.isin(layout.mesh.faces, layout.whole)
+    """Return the root mean square and the largest displacement of cones in grid units, relative to their mean."""
+    at = np.isin(layout.mesh.faces, layout.nodes)
     if not at.any():
         return 0.0, 0.0
     move = (points - smooth)[np.unique(layout.corners[at])]
@@ -208,7 +211,7 @@ def _moves(layout: Layout, smooth: ComplexArray, points: ComplexArray) -> tuple[
 
 
 def _distortion(layout: Layout, points: ComplexArray) -> tuple[float, float]:
-    """Return the mean quasi-conformal distortion by area, and the least area of a triangle over what it should be."""
+    """Return the mean quasi-conformal distortion weighted by area, and the least area of a triangle over its ideal."""
     areas = double_areas(layout.lengths) / 2
     real = areas > 0
     along, across = map_factors(rest_sides(layout.lengths[real] / layout.size))

@@ -1,4 +1,4 @@
-"""Whole translations of seams and whole places of cones near those of a smooth layout (quantisation)."""
+"""Rounding of seam translations and cone positions of a smooth layout to integers (quantisation)."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from ...base import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import GridError
 from ...geometry import cotangents
 from ...linalg import factorize
-from .lattice import Lattice, whole_solutions
+from .lattice import Lattice, integer_solutions
 from .layout import Layout
 from .transitions import TURNS, UNITS, Transitions
 
 
 class Stiffness:
-    """The least Dirichlet energy of a shift of a layout that changes its seams and cones by given amounts.
+    """The least Dirichlet energy of a displacement field that changes seams and cones by given amounts.
 
-    A shift is a field of plane vectors whose copies across seams are quarter turns of each other plus the change of the
-    translation. Its energy, the integral of its squared derivative, is that of the change of the map, and the same
-    wherever the seams run. It tells how near a change comes to flipping triangles, as a distance between
-    translations, in which some run around all of the model and some around a finger, does not.
+    A displacement field consists of plane vectors whose copies across seams differ by quarter turns and the change of
+    the translation. Its energy, the integral of its squared derivative, does not depend on the position of the seams.
+    It predicts better how close a change comes to flipping triangles than a distance between translations does, of
+    which some belong to loops around the entire model and some to loops around a finger.
     """
 
     def __init__(self, layout: Layout, transitions: Transitions) -> None:
@@ -39,22 +39,22 @@ class Stiffness:
         self._factor = factorize(ridged)
 
     def displacement(self, values: FloatArray) -> FloatArray:
-        """Return the shifts (2u, k) of least energy for changes (v, k) of the variables."""
+        """Return the displacements (2u, k) of least energy for changes (v, k) of the variables."""
         given = self._shifts @ values
         right = -(self._turned.T @ (self._energy @ given))
         shifts: FloatArray = given + self._turned @ self._factor.solve(np.ascontiguousarray(right))
         return shifts
 
     def gram(self, basis: IntArray) -> FloatArray:
-        """Return (d, d) the energies of changes that columns of a basis (v, d) span, as scalar products."""
+        """Return (d, d) the Gram matrix of the columns of a basis (v, d) in the energy."""
         count = basis.shape[1]
         gram = np.zeros((count, count))
-        # Few points are on seams: as a sparse matrix this stays small.
+        # Few points are on seams, so the sparse matrix is small.
         pulls = self._energy @ (self._shifts @ csr_matrix(basis))
         for start in range(0, count, 16):
             block = slice(start, start + 16)
             gram[:, block] = pulls.T @ self.displacement(basis[:, block].astype(np.float64))
-        # What cones do not hold costs nothing; as a distance it has to cost something.
+        # Changes without energy need a positive value too, so that the energy is a metric.
         return (gram + gram.T) / 2 + 1e-10 * max(float(np.trace(gram)), 1.0) * np.eye(count)
 
 
@@ -69,7 +69,7 @@ def _laplacian(layout: Layout) -> csr_matrix:
 
 
 def _turned_copies(transitions: Transitions) -> csr_matrix:
-    """Return (2u, b) how the shifts of points follow those of the ones that they are given by, if loose."""
+    """Return (2u, b) the matrix from the free coordinates of base points to the displacements of all points."""
     count = len(transitions.base)
     turns, axes = TURNS[transitions.turn], np.arange(2)
     rows = np.broadcast_to(2 * np.arange(count)[:, None, None] + axes[:, None], turns.shape)
@@ -77,34 +77,34 @@ def _turned_copies(transitions: Transitions) -> csr_matrix:
     every = coo_matrix((turns.ravel(), (rows.ravel(), columns.ravel())), shape=(2 * count, 2 * count)).tocsc()
     every.eliminate_zeros()
     is_base = transitions.base == np.arange(count)
-    return every[:, np.flatnonzero((is_base[:, None] & ~transitions.held).ravel())].tocsr()
+    return every[:, np.flatnonzero((is_base[:, None] & ~transitions.fixed).ravel())].tocsr()
 
 
-# Units: cones that are farther from each other along the surface are not rounded onto each other.
+# Grid units: only cones within this distance along the surface are checked for merging.
 NEAR_CONE_DISTANCE = 3.0
-# Radians by which the vector between such cones may turn, and pairs that are kept apart at once, None for all, as long
-# as cones can be kept apart so; if not, the next of these.
+# Attempts to separate cones, in this order until one succeeds: largest rotation of the vector between near cones in
+# radians, and number of pairs that are separated at once, None for all.
 SEPARATIONS = ((np.pi / 3, None), (np.pi / 2, None), (np.pi / 3, 1), (np.pi / 2, 1))
-# Places of the search tree visited for the nearest one alone, of which only that cones fall together is asked.
+# Visited nodes of the search tree for the nearest point alone, which is only used to detect merged cones.
 QUICK_VISITS = 2_000
 
 
 @dataclass(frozen=True, eq=False)
 class ConePairs:
-    """Vectors between cones that are near each other, along the surface.
+    """Vectors along the surface between cones that are near each other.
 
     Attributes:
-        rows: (p, 2, d) the vector from the one to the other, by coordinates of the lattice.
-        before: (p, 2) as it is in the smooth layout.
-        ends: (p, 2) the two cones, by their numbers.
+        rows: (p, 2, d) coefficients of the vector from one cone to the other in the coordinates of the lattice.
+        before: (p, 2) the vector in the smooth layout.
+        ends: (p, 2) the indices of the two cones.
     """
 
     rows: IntArray
     before: FloatArray
     ends: IntArray
 
-    def apart(self, pairs: IntArray) -> IntArray:
-        """Return those of some pairs that have no cone in common with one before."""
+    def disjoint(self, pairs: IntArray) -> IntArray:
+        """Return the pairs that have no cone in common with previously selected pairs."""
         seen: set[int] = set()
         kept = []
         for pair in pairs.tolist():
@@ -114,12 +114,12 @@ class ConePairs:
                 seen |= ends
         return np.array(kept, dtype=np.int64)
 
-    def collapsed(self, coordinates: IntArray, turned: float) -> IntArray:
-        """Return the pairs that a lattice point puts on one place, or turns by so much, the nearest ones first."""
+    def collapsed(self, coordinates: IntArray, angle: float) -> IntArray:
+        """Return the pairs that a lattice point merges or rotates by at least `angle`, the nearest pairs first."""
         after = self.rows @ coordinates
         along = (after * self.before).sum(axis=1)
         sizes = np.linalg.norm(after, axis=1) * np.linalg.norm(self.before, axis=1)
-        is_bad = along <= np.cos(turned) * sizes + np.finfo(float).eps
+        is_bad = along <= np.cos(angle) * sizes + np.finfo(float).eps
         order = np.argsort((self.before**2).sum(axis=1), kind="stable")
         bad: IntArray = order[is_bad[order]]
         return bad
@@ -127,15 +127,15 @@ class ConePairs:
 
 @dataclass(frozen=True, eq=False)
 class Rounding:
-    """The lattice of whole solutions, and where in it the smooth layout is.
+    """The lattice of integer solutions, and the position of the smooth layout in it.
 
     Attributes:
-        basis: (v, d) of the lattice.
+        basis: (v, d) basis of the lattice.
         start: (d,) coordinates of the smooth layout.
-        metric: scalar products (d, d) of the basis.
-        pairs: of cones that must not fall together.
-        stiffness: what that is from.
-        layout: the smooth one.
+        metric: (d, d) Gram matrix of the basis.
+        pairs: pairs of cones that must not merge.
+        stiffness: the energy that gives the metric.
+        layout: the smooth layout.
     """
 
     basis: IntArray
@@ -147,56 +147,56 @@ class Rounding:
 
     @property
     def smooth(self) -> FloatArray:
-        """(v,) the variables of the smooth layout, made to satisfy the equations."""
+        """(v,) the variables of the smooth layout, projected to the solutions of the equations."""
         values: FloatArray = self.basis @ self.start
         return values
 
     def candidates(self) -> list[IntArray]:
-        """Return whole values (v,) of the variables near the smooth ones that put no two cones on one place.
+        """Return integer values (v,) of the variables near the smooth ones that merge no two cones.
 
-        First those that flip no triangle as far as the second order tells, each kind the nearest first.
+        They are sorted by the area of triangles that the displacements of least energy flip, then by distance.
 
         Raises:
-            GridError: cones cannot be kept apart.
+            GridError: cones cannot be separated.
         """
         size = len(self.start)
-        whole = Lattice(np.zeros(size, dtype=np.int64), np.eye(size, dtype=np.int64), self.metric)
-        lattice = whole.reduced()
-        apart: list[IntArray] = []
-        for turned, at_once in SEPARATIONS:
+        every = Lattice(np.zeros(size, dtype=np.int64), np.eye(size, dtype=np.int64), self.metric)
+        lattice = every.reduced()
+        found: list[IntArray] = []
+        for angle, at_once in SEPARATIONS:
             try:
-                apart = self._apart(lattice, turned, at_once)
+                found = self._separated(lattice, angle, at_once)
                 break
             except GridError:
-                if (turned, at_once) == SEPARATIONS[-1]:
+                if (angle, at_once) == SEPARATIONS[-1]:
                     raise
-        values = [np.asarray(self.basis @ each) for each in apart]
-        areas = self._turned_over(np.stack(values, axis=1) - self.smooth[:, None])
+        values = [np.asarray(self.basis @ each) for each in found]
+        areas = self._flipped_areas(np.stack(values, axis=1) - self.smooth[:, None])
         return [values[i] for i in np.argsort(areas, kind="stable")]
 
-    def _apart(self, lattice: Lattice, turned: float, at_once: int | None) -> list[IntArray]:
-        """Return near vectors of a lattice that keep all cones apart, and turn those near each other by less."""
-        while True:  # each time the lattice loses a dimension at least
-            bad = self.pairs.collapsed(lattice.nearest(self.start, 1, QUICK_VISITS)[0], turned)
+    def _separated(self, lattice: Lattice, angle: float, at_once: int | None) -> list[IntArray]:
+        """Return near vectors of a lattice that separate all cones, and rotate near pairs by less than `angle`."""
+        while True:  # each round reduces the dimension of the lattice
+            bad = self.pairs.collapsed(lattice.nearest(self.start, 1, QUICK_VISITS)[0], angle)
             if not len(bad):
                 break
-            for pair in self.pairs.apart(bad)[:at_once].tolist():
-                part = self._kept_apart(pair, lattice)
+            for pair in self.pairs.disjoint(bad)[:at_once].tolist():
+                part = self._separate(pair, lattice)
                 if part is None and pair == bad[0]:
                     distance = float(np.hypot(*self.pairs.before[pair]))
                     raise GridError(
-                        f"two cones {distance:.2g} units from each other cannot be kept apart: ask for more quads"
+                        f"two cones {distance:.2g} units from each other cannot be separated: use more quads"
                     )
                 lattice = lattice if part is None else part
             lattice = lattice.reduced()
-        # The nearest of all may be another than that of the quick search.
+        # The nearest vector may differ from that of the quick search.
         found = np.concatenate(
             [lattice.nearest(self.start, 64), lattice.nearest(self.start, 1, QUICK_VISITS)]
         )
-        return [each for each in found if not len(self.pairs.collapsed(each, turned))][:16]
+        return [each for each in found if not len(self.pairs.collapsed(each, angle))][:16]
 
-    def _turned_over(self, changes: FloatArray) -> FloatArray:
-        """Return (k,) the area of triangles that the shifts of least energy turn over, for changes (v, k)."""
+    def _flipped_areas(self, changes: FloatArray) -> FloatArray:
+        """Return (k,) twice the area of triangles that the displacements of least energy flip, for changes (v, k)."""
         shifts = self.stiffness.displacement(changes)
         moved = self.layout.points[:, None] + shifts[0::2] + 1j * shifts[1::2]
         a, b, c = (moved[self.layout.corners[:, i]] for i in range(3))
@@ -204,10 +204,11 @@ class Rounding:
         areas: FloatArray = -np.minimum(doubled, 0.0).sum(axis=0)
         return areas
 
-    def _kept_apart(self, pair: int, lattice: Lattice) -> Lattice | None:
-        """Return the part of a lattice where two cones are as far apart along an axis as they were, a unit at least.
+    def _separate(self, pair: int, lattice: Lattice) -> Lattice | None:
+        """Return the part of a lattice where two cones keep their distance along an axis, at least a unit.
 
-        Where they are already, their vector gets the direction that it had, as nearly as may be. None if it is given.
+        If this coordinate is fixed already, the other one is chosen to preserve the direction of their vector as well
+        as possible. None if both are fixed.
         """
         before, rows = self.pairs.before[pair], self.pairs.rows[pair]
         main = int(np.argmax(np.abs(before)))
@@ -224,9 +225,9 @@ class Rounding:
 
 
 def find_rounding(layout: Layout, transitions: Transitions) -> Rounding:
-    """Return the lattice that a layout's translations and cones are to be rounded to."""
+    """Return the lattice to which the translations and cones of a layout must be rounded."""
     zeros = np.zeros(len(transitions.equations), dtype=np.int64)
-    solutions = whole_solutions(transitions.equations, zeros)
+    solutions = integer_solutions(transitions.equations, zeros)
     assert solutions is not None
     basis = solutions.basis
     fitted = np.linalg.lstsq(basis.astype(np.float64), transitions.values, rcond=None)[0]
@@ -237,8 +238,8 @@ def find_rounding(layout: Layout, transitions: Transitions) -> Rounding:
 
 
 def _near_pairs(layout: Layout, transitions: Transitions, basis: IntArray, start: FloatArray) -> ConePairs:
-    """Return the vectors between cones along the shortest paths over edges, where these are short."""
-    mesh, points, cones, (starts, ends) = layout.mesh, layout.points, layout.whole, layout.ends
+    """Return the vectors between near cones along the shortest edge paths."""
+    mesh, points, cones, (starts, ends) = layout.mesh, layout.points, layout.nodes, layout.ends
     tails, heads = mesh.tails, mesh.heads
     graph = csr_matrix(
         (np.abs(points[ends] - points[starts]), (tails, heads)), shape=(len(mesh.vertices),) * 2
@@ -265,20 +266,20 @@ def _near_pairs(layout: Layout, transitions: Transitions, basis: IntArray, start
             continue
         rows.append(joining(path).rows)
         ends_of.append((i, j))
-    cones_apart = np.array(rows, dtype=np.int64).reshape(len(rows), 2, len(basis))
+    cone_rows = np.array(rows, dtype=np.int64).reshape(len(rows), 2, len(basis))
     paths = _paths_to_sides(layout)
-    sides_apart, length = _distances_to_sides([joining(path) for path in paths], transitions)
-    sides_apart = sides_apart @ basis
-    # Those that face each other: nearly half of the way leads straight to the other; and that are not on one line.
-    facing = np.abs(sides_apart[:, 0] @ start) > np.maximum(0.45 * length, 1e-6)
-    joined = np.concatenate([cones_apart @ basis, sides_apart[facing]])
-    # Those with sides have no cone in common, as far as is told here.
+    side_rows, length = _distances_to_sides([joining(path) for path in paths], transitions)
+    side_rows = side_rows @ basis
+    # Keep pairs that face each other and are not collinear: the distance is at least 45% of the length of the vector.
+    facing = np.abs(side_rows[:, 0] @ start) > np.maximum(0.45 * length, 1e-6)
+    joined = np.concatenate([cone_rows @ basis, side_rows[facing]])
+    # Pairs with sides get unique indices, so that they count as having no cone in common.
     ends_of += [(len(cones) + k, len(cones) + k) for k in range(int(facing.sum()))]
     return ConePairs(joined, joined @ start, np.array(ends_of, dtype=np.int64).reshape(-1, 2))
 
 
 def _side(forth: int, back: int, starts: IntArray, ends: IntArray) -> tuple[int, int]:
-    """Return the points at the ends of an edge, in a triangle beside it; half-edges from 1, 0 for none."""
+    """Return the points at the ends of an edge in a triangle at it; half-edges are numbered from 1, 0 for none."""
     if forth:
         return int(starts[forth - 1]), int(ends[forth - 1])
     return int(ends[back - 1]), int(starts[back - 1])
@@ -287,8 +288,8 @@ def _side(forth: int, back: int, starts: IntArray, ends: IntArray) -> tuple[int,
 def _vector(sides: list[tuple[int, int]], transitions: Transitions, points: ComplexArray) -> PathVector:
     """Return the vector along a path, given by the points at the ends of its edges.
 
-    The places of vertices on the way cancel: of two copies of one, i^turn base + shift each, the difference is left
-    between their shifts, seen from one frame.
+    The positions of vertices on the path cancel: two copies of a vertex, i^turn base + shift each, leave the difference
+    of their shifts in a common frame.
     """
 
     def shift(point: int) -> IntArray:
@@ -304,27 +305,27 @@ def _vector(sides: list[tuple[int, int]], transitions: Transitions, points: Comp
             turn = (turn + across) % 4
         place += UNITS[turn] * (points[end] - points[there])
     last = total + TURNS[turn] @ shift(sides[-1][1])
-    # Along one edge there is nothing between, however far off the straight way its end may be.
+    # A single edge has no other triangles between its ends, so its vector always counts as facing.
     length = float(abs(place)) if len(sides) > 1 else 0.0
     return PathVector(last, length, sides[0][0], sides[-1][1], turn)
 
 
 def _paths_to_sides(layout: Layout) -> list[list[int]]:
-    """Return short paths of vertices between sides, or a side and a cone, that pass no other side or cone.
+    """Return short vertex paths between two sides, or a side and a cone, that pass no other side or cone.
 
-    Of all that join the same two, the shortest one; cones are joined by others.
+    Only the shortest path between the same two is returned. Paths between cones are found elsewhere.
     """
-    mesh, sides, cones, (starts, ends) = layout.mesh, layout.sides, layout.whole, layout.ends
+    mesh, sides, cones, (starts, ends) = layout.mesh, layout.sides, layout.nodes, layout.ends
     side_count = len(sides.axis)
     if not side_count:
         return []
-    # What lies on sides has the number of one, cones have their own.
+    # Vertices on sides have the number of a side as label; each cone has its own label.
     label = np.full(len(mesh.vertices), -1)
     label[cones] = side_count + np.arange(len(cones))
     on_side = layout.vertex[sides.points]
     inner = ~np.isin(on_side, cones)
     label[on_side[inner]] = sides.side[inner]
-    # Edges along sides join nothing.
+    # Edges along sides are not part of paths.
     both = label[mesh.edges]
     at_end = np.isin(mesh.edges, np.intersect1d(cones, on_side)).any(axis=1)
     along = (both >= 0).all(axis=1) & (at_end | (both[:, 0] == both[:, 1]))
@@ -361,10 +362,10 @@ class PathVector(NamedTuple):
     """The vector between the ends of a path, in the frame of its first edge.
 
     Attributes:
-        rows: (2, v) of it, by the variables, as far as these tell where the ends are.
-        length: of it, in the layout; 0 along a single edge.
+        rows: (2, v) coefficients of the vector in the variables, as far as these determine its ends.
+        length: its length in the layout; 0 for a path of a single edge.
         first, last: the points at the ends.
-        turn: by how many quarter turns the frame of the last edge is turned.
+        turn: the rotation of the frame of the last edge, in quarter turns.
     """
 
     rows: IntArray
@@ -390,6 +391,6 @@ def _distances_to_sides(vectors: list[PathVector], transitions: Transitions) -> 
 
 
 def _known_axes(transitions: Transitions, point: int) -> BoolArray:
-    """Return (2,) whether the variables tell a coordinate of a point."""
-    held: BoolArray = transitions.held[transitions.base[point]]
-    return np.roll(held, int(transitions.turn[point]) % 2)
+    """Return (2,) whether the variables determine each coordinate of a point."""
+    fixed: BoolArray = transitions.fixed[transitions.base[point]]
+    return np.roll(fixed, int(transitions.turn[point]) % 2)

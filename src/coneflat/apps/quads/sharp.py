@@ -1,6 +1,6 @@
-"""Layouts in which sharp edges lie along the axes: all of them, or as many as can.
+"""Layouts with sharp edges along the axes: all of them, or as many as possible.
 
-Edges that no layout can follow are left out, and the rest is tried again.
+Edges that prevent a layout are left out, and the remaining ones are tried again.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from . import features
 from .layout import Layout
 from .patch_layout import CoarseError, PatchError, sharp_layout
 
-# What may be asked of the cones inside patches, and of the input; the rest is as grids of whole surfaces want it.
+# Options of the cones inside patches and of the input that the user can set; all others have fixed values.
 ACCEPTED_OPTIONS = (
     "sharp_angle", "boundary", "min_cone_angle", "max_cone_angle", "distortion", "repair", "strict", "threads",
 )  # fmt: skip
-# Times that sharp edges are left out.
+# Largest number of attempts with fewer sharp edges each.
 MAX_TRIES = 6
 
 
@@ -37,30 +37,30 @@ def sharp_layouts(
     quads: float,
     size: float | None,
     given: Mapping[str, Any],
-    usual: Mapping[str, Any],
+    defaults: Mapping[str, Any],
     progress: Progress | None,
 ) -> Iterator[tuple[Layout, IntArray, tuple[str, ...]]]:
-    """Yield layouts of a surface, each with fewer sharp edges along the axes than those before.
+    """Yield layouts of a surface, each with fewer sharp edges along the axes than the previous one.
 
-    And of each (k, 2) these sharp edges, as vertices of its mesh, and notes on which were left out.
+    With each layout come (k, 2) these sharp edges, as vertices of its mesh, and notes on edges that were left out.
 
     Args:
-        mesh, faces: as `coneflat.flatten` takes them.
-        quads: unit squares that cover the surface.
-        size: of a square in model units, instead.
-        given: options; without `sharp_angle` the boundary alone comes to lie along the axes.
-        usual: what they are where nothing is said of them, if that is not what `coneflat.flatten` has.
+        mesh, faces: as for `coneflat.flatten`.
+        quads: number of unit squares that cover the surface.
+        size: edge length of a square in model units; replaces `quads`.
+        given: options; without `sharp_angle` only the boundary is put along the axes.
+        defaults: defaults of options that differ from those of `coneflat.flatten`.
         progress: called before each patch is flattened.
 
     Raises:
-        OptionError: an option makes no sense, or has no effect beside `sharp_angle`.
-        MeshError: as `coneflat.flatten`.
+        OptionError: an option is invalid, or has no effect together with `sharp_angle`.
+        MeshError: as for `coneflat.flatten`.
     """
-    options: Options = read_options({**usual, **given})
-    if others := not_taken(given, usual):
+    options: Options = read_options({**defaults, **given})
+    if others := unsupported(given, defaults):
         raise OptionError(
             f"with sharp edges on grid lines, cones are found for each patch between them: {list_some(others)} cannot "
-            "be given beside sharp_angle"
+            "be given together with sharp_angle"
         )
     if options.boundary_kind not in ("free", "straight"):
         raise OptionError(f"sharp edges on grid lines need a straight boundary, not {options.boundary!r}")
@@ -79,16 +79,16 @@ def sharp_layouts(
             yield in_units, search.mesh.edges[search.edges], (*prepared.notes, *search.notes())
 
 
-def not_taken(given: Mapping[str, Any], usual: Mapping[str, Any]) -> list[str]:
-    """Return the names of options that have no effect here, and differ from the usual ones."""
-    options: Options = read_options({**usual, **given})
-    before: Options = read_options(usual)
+def unsupported(given: Mapping[str, Any], defaults: Mapping[str, Any]) -> list[str]:
+    """Return the names of given options that have no effect here and differ from the defaults."""
+    options: Options = read_options({**defaults, **given})
+    before: Options = read_options(defaults)
     pairs = (
         (name, getattr(options, name), getattr(before, name))
         for name in given
         if name not in ACCEPTED_OPTIONS
     )
-    # Some may be arrays.
+    # Values can be arrays.
     return sorted(
         name
         for name, one, two in pairs
@@ -97,7 +97,7 @@ def not_taken(given: Mapping[str, Any], usual: Mapping[str, Any]) -> list[str]:
 
 
 class _Search:
-    """Sharp edges that lie on grid lines, fewer each time that there is no grid with them."""
+    """The search for sharp edges that can lie on grid lines; each failure reduces their number."""
 
     def __init__(
         self,
@@ -120,7 +120,7 @@ class _Search:
             self._drop(int(np.argmin(self._areas())))
 
     def notes(self) -> tuple[str, ...]:
-        """Return what was left out."""
+        """Return a note on the sharp edges that were left out, if any."""
         left = np.ones(len(self.lengths), dtype=bool)
         left[self.origin] = False
         if not left.any():
@@ -128,12 +128,12 @@ class _Search:
         share = 100 * self.lengths[left].sum() / self.lengths.sum()
         why = f": {self.why}" if self.why else ", too short for quads of this size"
         return (
-            f"{plural(int(left.sum()), 'sharp edge')} of {len(left):,}, {share:.1f} % of their length, on no grid "
-            f"line{why}.",
+            f"{plural(int(left.sum()), 'sharp edge')} of {len(left):,}, {share:.1f} % of their length, not on grid "
+            f"lines{why}.",
         )
 
     def layouts(self) -> Iterator[Layout]:
-        """Yield layouts; their features are `edges` of `mesh` until the next."""
+        """Yield layouts; until the next one, the features of a layout are `edges` of `mesh`."""
         with_edges = True
         for attempt in range(MAX_TRIES):
             if not len(self.edges) and not (with_edges and self.mesh.is_boundary_edge.any()):
@@ -181,7 +181,7 @@ class _Search:
         return found
 
     def _drop_some(self, attempt: int) -> None:
-        """Leave out what dangles, or else what parts the smallest patches, more of them each time."""
+        """Leave out dangling edges, or else the borders of the smallest patches, more of them in later attempts."""
         loose = features.dangling(self.mesh, self.edges)
         if len(loose):
             self._leave_out(loose)
@@ -191,7 +191,7 @@ class _Search:
                 self._drop(int(np.argmin(self._areas())))
 
     def _drop(self, patch: int) -> None:
-        """Leave out what parts a patch from another one."""
+        """Leave out the longest border between a patch and another one."""
         border = features.border_of(self.mesh, self.edges, patch)
         self._leave_out(border if len(border) else np.arange(len(self.edges)))
 

@@ -1,4 +1,4 @@
-"""Quads made squarer by moving their vertices on the surface; the worst made better one vertex at a time."""
+"""Smoothing of quad meshes by moving vertices on the surface, and improvement of the worst quads vertex by vertex."""
 
 from __future__ import annotations
 
@@ -15,33 +15,36 @@ from .nearest import Stars, slide_near
 from .options import ROUNDS
 from .quad_mesh import QuadMesh, least_jacobians
 
-# Scaled Jacobian below which no quad goes that was above, nor any deeper that was below.
+# Least scaled Jacobian: no quad falls below it, and quads that are below it do not get worse.
 MIN_JACOBIAN = 0.5
-# Radians: edges of the surface that bend more are sharp, and quad vertices on them stay.
+# Radians: edges of the surface with a larger dihedral angle are sharp, and quad vertices on them do not move.
 SHARP_ANGLE = np.deg2rad(40.0)
 
 
 def smooth_quads(quads: QuadMesh, rounds: int = ROUNDS, features: ArrayLike = ()) -> QuadMesh:
-    """Return a quad mesh with squarer quads, whose vertices have moved on the surface.
+    """Return a smoothed quad mesh: quads are closer to squares, and vertices remain on the surface.
 
-    Each quad asks its corners to go to the nearest square (S. Bouaziz, M. Deuss, Y. Schwartzburg, T. Weise, M. Pauly,
-    "Shape-Up: shaping discrete geometry with projections", 2012, Section 4). Each vertex goes to the mean of what its
-    quads ask for, and from there to the nearest point of the surface nearby. A quad whose scaled Jacobian would fall
-    too low keeps its corners where they were. Quads that are bad in the end are made better by moving single vertices.
-    Vertices of the boundary stay, and those on edges of the surface that bend by 40 degrees and more.
+    Each quad is projected to the nearest square. Each vertex moves to the mean of its projected positions, and from
+    there to the nearest point of the surface nearby. The corners of a quad do not move if its scaled Jacobian would
+    become too low. Finally, bad quads are improved by moving single vertices. Vertices on the boundary and on edges of
+    the surface with a dihedral angle above 40 degrees do not move.
 
     Args:
         quads: the quad mesh.
-        rounds: how many times.
-        features: (f, 2) vertices of further edges of the surface on which vertices stay.
+        rounds: number of rounds.
+        features: (f, 2) vertices of further edges of the surface on which vertices do not move.
 
     Raises:
         OptionError: the number of rounds is negative.
+
+    References:
+        S. Bouaziz, M. Deuss, Y. Schwartzburg, T. Weise, M. Pauly, "Shape-Up: shaping discrete geometry with
+        projections", 2012, Section 4.
     """
     if rounds < 0:
-        raise OptionError(f"smoothing takes 0 rounds or more, not {rounds}")
+        raise OptionError(f"rounds of smoothing must be 0 or more, not {rounds}")
     movable = ~(
-        quads.is_boundary_vertex | _is_held(quads, np.asarray(features, dtype=np.int64).reshape(-1, 2))
+        quads.is_boundary_vertex | _is_on_feature(quads, np.asarray(features, dtype=np.int64).reshape(-1, 2))
     )
     surface = Stars.of(quads.surface.vertices, quads.surface.faces)
     points, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
@@ -51,20 +54,20 @@ def smooth_quads(quads: QuadMesh, rounds: int = ROUNDS, features: ArrayLike = ()
         slide_near(surface, wanted, new_faces, new_barycentric)
         new = points.copy()
         new[movable] = surface.at(new_faces, new_barycentric)
-        stays = _held_back(points, new, quads.quads)
+        stays = _blocked(points, new, quads.quads)
         gone = movable & ~stays
         faces[gone], barycentric[gone] = new_faces[gone[movable]], new_barycentric[gone[movable]]
         points[gone] = new[gone]
     if rounds:
-        lift_worst(points, quads.quads, faces, barycentric, movable, surface)
+        improve_worst(points, quads.quads, faces, barycentric, movable, surface)
     return replace(quads, vertices=points, faces=faces, barycentric=barycentric)
 
 
 def _squared(points: FloatArray, quads: IntArray) -> FloatArray:
-    """Return (q, 3) the mean of where quads ask each vertex to go: to the corner of the nearest square.
+    """Return (q, 3) the mean position of each vertex in the squares nearest to its quads.
 
-    Of the square with centre c, corner k is at c + J^k z, J being the quarter turn in the plane of the quad; the mean
-    of J^-k (p_k - c) is the z that is nearest.
+    Corner k of a square with centre c is c + J^k z, where J is the quarter turn in the plane of the quad. The nearest
+    square has the mean of J^-k (p_k - c) as z.
     """
     corners = points[quads]
     centre = corners.mean(axis=1)
@@ -73,14 +76,14 @@ def _squared(points: FloatArray, quads: IntArray) -> FloatArray:
     normal /= np.maximum(np.sqrt(dots(normal, normal)), np.finfo(float).tiny)[:, None]
     z = (u - np.cross(normal, w)) / 4
     turned = np.cross(normal, z)
-    asked = centre[:, None] + np.stack([z, turned, -z, -turned], axis=1)
+    targets = centre[:, None] + np.stack([z, turned, -z, -turned], axis=1)
     count = np.maximum(np.bincount(quads.ravel(), minlength=len(points)), 1)
-    sums = [np.bincount(quads.ravel(), asked[..., x].ravel(), len(points)) for x in range(3)]
+    sums = [np.bincount(quads.ravel(), targets[..., x].ravel(), len(points)) for x in range(3)]
     return np.stack(sums, axis=1) / count[:, None]
 
 
-def _held_back(old: FloatArray, new: FloatArray, quads: IntArray) -> BoolArray:
-    """Return (q,) the vertices that must stay, lest a quad be worse than MIN_JACOBIAN and than it was."""
+def _blocked(old: FloatArray, new: FloatArray, quads: IntArray) -> BoolArray:
+    """Return (q,) whether each vertex must not move, so that no quad gets worse than MIN_JACOBIAN and than before."""
     stays = np.zeros(len(old), dtype=bool)
     bound = np.minimum(least_jacobians(old, quads), MIN_JACOBIAN)
     while True:
@@ -92,8 +95,8 @@ def _held_back(old: FloatArray, new: FloatArray, quads: IntArray) -> BoolArray:
         stays[quads[bad]] = True
 
 
-def _is_held(quads: QuadMesh, features: IntArray) -> BoolArray:
-    """Return (q,) the vertices on sharp edges of the surface, and on features (f, 2)."""
+def _is_on_feature(quads: QuadMesh, features: IntArray) -> BoolArray:
+    """Return (q,) whether each vertex is on a sharp edge of the surface or on a feature (f, 2)."""
     mesh = quads.surface
     sharp = np.zeros(len(mesh.edges), dtype=bool)
     sharp[sharp_edges(mesh, SHARP_ANGLE)] = True
@@ -101,16 +104,16 @@ def _is_held(quads: QuadMesh, features: IntArray) -> BoolArray:
     has_sharp = np.zeros(len(mesh.vertices), dtype=bool)
     has_sharp[mesh.edges[sharp]] = True
     within = quads.barycentric > 0
-    held = np.zeros(len(quads.faces), dtype=bool)
+    on_feature = np.zeros(len(quads.faces), dtype=bool)
     edges = mesh.halfedge_edges.reshape(-1, 3)[quads.faces]
     for i in range(3):
         a, b = NEXT[i], NEXT[NEXT[i]]
-        held |= ~within[:, i] & within[:, a] & within[:, b] & sharp[edges[:, i]]
-        held |= within[:, i] & ~within[:, a] & ~within[:, b] & has_sharp[mesh.faces[quads.faces, i]]
-    return held
+        on_feature |= ~within[:, i] & within[:, a] & within[:, b] & sharp[edges[:, i]]
+        on_feature |= within[:, i] & ~within[:, a] & ~within[:, b] & has_sharp[mesh.faces[quads.faces, i]]
+    return on_feature
 
 
-def lift_worst(
+def improve_worst(
     points: FloatArray,
     quads: IntArray,
     faces: IntArray,
@@ -119,17 +122,17 @@ def lift_worst(
     surface: Stars,
     below: float = 0.2,
 ) -> None:
-    """Move vertices of bad quads to where the worst quad around each is best, on the surface.
+    """Move vertices of bad quads on the surface to maximize the least scaled Jacobian of the quads around each.
 
-    No quad around a vertex becomes worse than the worst of them was, and none that was positively oriented is flipped.
+    The least scaled Jacobian around a vertex never decreases, and no positively oriented quad is flipped.
 
     Args:
-        points: (q, 3) the vertices, changed.
+        points: (q, 3) the vertices, updated in place.
         quads: (p, 4) vertex indices.
-        faces, barycentric: (q,), (q, 3) where in which triangle the vertices lie, changed.
-        movable: (q,) which may move.
-        surface: that they lie on.
-        below: scaled Jacobian of quads that count as bad.
+        faces, barycentric: (q,), (q, 3) triangle and barycentric coordinates of the vertices, updated in place.
+        movable: (q,) whether each vertex may move.
+        surface: the surface that contains them.
+        below: bound of the scaled Jacobian, below which a quad is bad.
     """
     order = np.argsort(quads.ravel(), kind="stable") // 4
     start = np.concatenate([[0], np.cumsum(np.bincount(quads.ravel(), minlength=len(points)))])
@@ -140,14 +143,14 @@ def lift_worst(
         _, first = np.unique(worst_first, return_index=True)
         tried = worst_first[np.sort(first)]
         gained = [
-            _lift(int(v), order[start[v] : start[v + 1]], points, quads, faces, barycentric, surface)
+            _improve(int(v), order[start[v] : start[v + 1]], points, quads, faces, barycentric, surface)
             for v in tried[movable[tried]].tolist()
         ]
         if not any(gained):
             return
 
 
-def _lift(
+def _improve(
     vertex: int,
     star: IntArray,
     points: FloatArray,
@@ -156,7 +159,7 @@ def _lift(
     barycentric: FloatArray,
     surface: Stars,
 ) -> bool:
-    """Move a vertex to the best place tried, and return whether there is a better one than where it is."""
+    """Move a vertex to the best of several trial positions, and return whether one is better than the current one."""
     around = quads[star]
     sides = points[np.roll(around, -1, axis=1)] - points[around]
     length = float(np.sqrt(dots(sides, sides)).mean())
@@ -167,7 +170,7 @@ def _lift(
     on, weights = np.full(len(offsets), faces[vertex]), np.tile(barycentric[vertex], (len(offsets), 1))
     slide_near(surface, points[vertex] + offsets, on, weights)
     places = surface.at(on, weights)
-    # The star with the vertex at each of the places, one after the other; the last one is as it is.
+    # The quads around the vertex for each trial position; the last is the current one.
     trials = np.concatenate([places, points[vertex][None]])
     corners = np.tile(points[around], (len(trials), 1, 1, 1))
     corners[:, around == vertex] = trials[:, None]
@@ -183,11 +186,10 @@ def _lift(
 
 
 def untangled(quads: QuadMesh) -> QuadMesh:
-    """Return a quad mesh with fewer quads flipped, none if that is found.
+    """Return a quad mesh with fewer flipped quads, if possible none.
 
-    Vertices around them move one at a time, on the surface, those on sharp edges among them, which smoothing leaves
-    where they are: an edge that is followed less closely is less bad than a quad that is flipped. Those on the
-    boundary stay.
+    Vertices around flipped quads move one at a time on the surface. Unlike in smoothing, vertices on sharp edges move
+    too, because a flipped quad is worse than an inexact edge. Vertices on the boundary do not move.
     """
     points, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
     surface = None
@@ -202,5 +204,5 @@ def untangled(quads: QuadMesh) -> QuadMesh:
             movable[quads.quads[movable[quads.quads].any(axis=1)]] = True
         movable &= ~quads.is_boundary_vertex
         below = float(np.interp(rings, [0, 5], [0.2, 0.8]))
-        lift_worst(points, quads.quads, faces, barycentric, movable, surface, below)
+        improve_worst(points, quads.quads, faces, barycentric, movable, surface, below)
     return quads if surface is None else replace(quads, vertices=points, faces=faces, barycentric=barycentric)

@@ -1,9 +1,8 @@
-"""Seams whose two sides are quarter turns of each other, as equations between integers.
+"""Integer equations for seams whose two sides are related by quarter turns.
 
-Copies of a vertex in the plane are moved onto each other by the motions of seams, z_right = i^q z_left + t. All that
-may vary are the translations t of the chains of seam edges, and the places of cones; around each vertex within the
-surface the motions must compose to one that keeps its place, which is an equation between these with the coefficients
-0, 1 and -1.
+The motion of a seam maps a copy of a vertex in the plane to another copy, z_right = i^q z_left + t. The variables are
+the translations t of the chains of seam edges and the positions of cones. Around each inner vertex, the composition of
+the motions must have the vertex as a fixed point, which is a linear equation of these with coefficients 0, 1 and -1.
 """
 
 from __future__ import annotations
@@ -20,27 +19,27 @@ from ...layout import SeamChains
 from .layout import GRID_TOLERANCE, Layout, charts_of, first_points, joining_chains
 
 UNITS = np.array([1, 1j, -1, -1j])
-# The same, quarter turns to the left, as matrices of integers.
+# The same rotations, counterclockwise quarter turns, as integer matrices.
 TURNS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]])
 
 
 @dataclass(frozen=True, eq=False)
 class Transitions:
-    """The motions of a layout's seams, and what may vary of them.
+    """The motions of a layout's seams, as functions of integer variables.
 
-    The variables are x and y of the translation of each chain, x and y of the place of one copy of each cone, and the
-    one coordinate that points of a side have in common, on the boundary or on the left of a chain.
+    The variables are x and y of the translation of each chain, x and y of one copy of each cone, and the common
+    coordinate of the points of each side, on the boundary or on the left of a chain.
 
     Attributes:
         chains: the seams.
         quarters: (c,) quarter turns of each chain.
-        base: (u,) the copy that each point is given by: i^turn times that plus its shift. Itself where it is the only
-            one, or of a cone.
+        base: (u,) the base point of each point, which is i^turn times the base plus its shift. A point is its own base
+            if it is the only copy, or belongs to a cone.
         turn: (u,) from 0 to 3.
-        shifts: (2u, v) x and y of the shift of each point, by the variables.
-        held: (u, 2) coordinates that are their shifts alone: both of cones, one on sides of the boundary.
-        equations: (r, v) that make 0 of the variables.
-        values: (v,) the variables of the layout as it is, up to rounding.
+        shifts: (2u, v) matrix from the variables to x and y of the shift of each point.
+        fixed: (u, 2) coordinates that are given by the shift alone: both for cones, one on sides of the boundary.
+        equations: (r, v) coefficients of the equations, whose right-hand side is 0.
+        values: (v,) the variables of the given layout, up to rounding.
     """
 
     chains: SeamChains
@@ -48,14 +47,14 @@ class Transitions:
     base: IntArray
     turn: IntArray
     shifts: csr_matrix
-    held: BoolArray
+    fixed: BoolArray
     equations: IntArray
     values: FloatArray
 
     def places(self, points: ComplexArray, values: FloatArray) -> ComplexArray:
-        """Return (u,) points with seams and cones as variables say; copies follow the ones that they are given by."""
+        """Return (u,) the points for given values of the variables; copies follow from their base points."""
         shift = self.shifts @ values
-        loose = np.where(self.held[:, 0], 0, points.real) + 1j * np.where(self.held[:, 1], 0, points.imag)
+        loose = np.where(self.fixed[:, 0], 0, points.real) + 1j * np.where(self.fixed[:, 1], 0, points.imag)
         moved: ComplexArray = UNITS[self.turn] * loose[self.base] + (shift[0::2] + 1j * shift[1::2])
         return moved
 
@@ -64,8 +63,8 @@ def find_transitions(layout: Layout) -> Transitions:
     """Return the transitions of a layout.
 
     Raises:
-        SeamError: the sides of a seam are not rigid copies of each other.
-        GridError: they are not quarter turns of each other.
+        SeamError: the sides of a seam are not congruent.
+        GridError: the sides of a seam are not related by quarter turns.
     """
     chains = layout.chains()
     angle = np.angle(chains.rotation) / (np.pi / 2)
@@ -73,8 +72,8 @@ def find_transitions(layout: Layout) -> Transitions:
     off = float(np.abs(angle - quarters).max(initial=0.0)) * np.pi / 2
     if off > GRID_TOLERANCE:
         raise GridError(
-            f"seams turn by up to {off:.2g} rad beside quarter turns: flatten with quantise=pi/2 and correct_handles, "
-            "and a mesh with several boundaries with boundary='straight'"
+            f"rotations of seams are up to {off:.2g} rad from quarter turns: flatten with quantise=pi/2 and "
+            "correct_handles, and a mesh with several boundaries with boundary='straight'"
         )
     return _Builder(layout, chains, quarters % 4).transitions()
 
@@ -84,12 +83,12 @@ class _Builder:
         count = len(layout.points)
         self.layout, self.points, self.sides = layout, layout.points, layout.sides
         self.chains, self.quarters, self.chain_count = chains, quarters, len(quarters)
-        self.cones, self.vertex = layout.whole, layout.vertex
+        self.cones, self.vertex = layout.nodes, layout.vertex
         self.cone_points = first_points(self.vertex)[self.cones]
         self.first_side = 2 * (self.chain_count + len(self.cones))
         self.size = self.first_side + len(self.sides.axis)
         self.base, self.turn = np.arange(count), np.zeros(count, dtype=np.int64)
-        self.held = np.isin(self.vertex, self.cones)[:, None].repeat(2, axis=1)
+        self.fixed = np.isin(self.vertex, self.cones)[:, None].repeat(2, axis=1)
         self.sides_at: dict[int, list[int]] = defaultdict(list)
         self.entries: list[tuple[IntArray, IntArray, IntArray]] = []
         self.equations: list[IntArray] = []
@@ -109,10 +108,10 @@ class _Builder:
         both = np.concatenate([translation, points[self.cone_points]])
         values = np.concatenate([np.stack([both.real, both.imag], axis=1).ravel(), self._side_values()])
         equations = np.array(self.equations, dtype=np.int64).reshape(len(self.equations), self.size)
-        return Transitions(chains, self.quarters, self.base, self.turn, shifts, self.held, equations, values)
+        return Transitions(chains, self.quarters, self.base, self.turn, shifts, self.fixed, equations, values)
 
     def _side_values(self) -> FloatArray:
-        """Return (l,) the mean of the coordinate that points of each side have in common."""
+        """Return (l,) the mean of the common coordinate of the points of each side."""
         at, side, count = self.points[self.sides.points], self.sides.side, len(self.sides.axis)
         common = np.where(self.sides.axis[side] == 0, at.real, at.imag)
         mean: FloatArray = np.bincount(side, common, count) / np.maximum(
@@ -121,7 +120,7 @@ class _Builder:
         return mean
 
     def _add_regular(self, on_side: IntArray) -> None:
-        """Give the right points within chains by the left ones, of which some are (u,) on a side, else -1."""
+        """Express the right points inside chains by the left ones; `on_side` (u,) is the side of a point or -1."""
         chains = self.chains
         inside = ~chains.is_node[chains.vertices]
         right, at = np.unique(chains.right[inside], return_index=True)
@@ -131,14 +130,14 @@ class _Builder:
         self.turn[right] = self.quarters[chain]
         for axis in range(2):
             self.entries.append((2 * right + axis, 2 * chain + axis, np.ones(len(right), dtype=np.int64)))
-        held = on_side[left] >= 0
-        right, side = right[held], on_side[left[held]]
-        factors = TURNS[self.quarters[chain[held]], :, self.sides.axis[side]]
+        fixed = on_side[left] >= 0
+        right, side = right[fixed], on_side[left[fixed]]
+        factors = TURNS[self.quarters[chain[fixed]], :, self.sides.axis[side]]
         for axis in range(2):
             self.entries.append((2 * right + axis, self.first_side + side, factors[:, axis]))
 
     def _add_sides(self) -> IntArray:
-        """Give a coordinate of points on sides by that of the side, and remember where seams end.
+        """Express a coordinate of points on sides by the variable of the side; points at ends of seams follow later.
 
         Return (u,) the side of each such point, else -1.
         """
@@ -147,19 +146,19 @@ class _Builder:
         for ends in (chains.left, chains.right):
             is_end[ends[chains.is_node[chains.vertices]]] = True
         points, side = self.sides.points, self.sides.side
-        special = is_end[points] | self.held[points, 0]
+        special = is_end[points] | self.fixed[points, 0]
         for point, one in zip(points[special].tolist(), side[special].tolist(), strict=True):
             self.sides_at[point].append(one)
         points, side = points[~special], side[~special]
         axis = self.sides.axis[side]
-        self.held[points, axis] = True
+        self.fixed[points, axis] = True
         self.entries.append((2 * points + axis, self.first_side + side, np.ones(len(points), dtype=np.int64)))
         on_side = np.full(len(self.points), -1)
         on_side[points] = side
         return on_side
 
     def _add_nodes(self) -> None:
-        """Give the copies of each node by one of them, and close the circle around it."""
+        """Express the copies of each node by one of them, and add the equations of the loop around it."""
         chains = self.chains
         relations: dict[int, set[tuple[int, int, int]]] = defaultdict(set)
         for k, end in np.argwhere(chains.is_node[chains.vertices]).tolist():
@@ -182,7 +181,7 @@ class _Builder:
             side = self.sides_at[start][0]
             axis = int(self.sides.axis[side])
             shift[axis, self.first_side + side] = 1
-            self.held[start, axis] = True
+            self.fixed[start, axis] = True
         known = {start: (0, shift)}
         left_over = list(relations)
         while left_over:
@@ -198,7 +197,7 @@ class _Builder:
                         continue
                     if cone is None and known[right][0] != turn:
                         raise GridError(
-                            f"vertex {v} has an angle of {4 + known[right][0] - turn} quarter turns, but is no cone"
+                            f"vertex {v} has an angle of {4 + known[right][0] - turn} quarter turns but is not a cone"
                         )
                     self.equations.extend(row for row in shift - known[right][1] if row.any())
                 elif right in known:
@@ -212,7 +211,7 @@ class _Builder:
         for point, (turn, shift) in known.items():
             if cone is None:
                 self.base[point], self.turn[point] = start, turn
-            for side in self.sides_at.get(point, ()):  # it lies on these
+            for side in self.sides_at.get(point, ()):  # the sides that contain the point
                 equation = shift[self.sides.axis[side]].copy()
                 equation[self.first_side + side] -= 1
                 self.equations.extend([equation] if equation.any() else [])
@@ -220,7 +219,7 @@ class _Builder:
             self.entries.append((2 * point + row, column, shift[row, column]))
 
     def _fix_charts(self) -> None:
-        """Let charts not move by themselves: some seams between them stay, and a cone or side of each component."""
+        """Fix the free motions of charts: some seams between them, and a cone or side of each component."""
         chart, component = charts_of(self.layout, self.chains)
         coned, firsts = np.unique(component[self.cone_points], return_index=True)
         fixed = np.concatenate([joining_chains(self.chains, chart), self.chain_count + firsts])
