@@ -263,9 +263,7 @@ class _Check:
         exchanged = np.where(corner == 0, 0, 3 - corner)
         self.pairs = np.where(flip[self.pairs // 3], self.pairs - corner + exchanged, self.pairs)
         if flip.any():
-            self.notes.append(
-                f"Flipped {plural(int(flip.sum()), 'face')} to make the orientation consistent."
-            )
+            self.notes.append(f"Flipped {plural(int(flip.sum()), 'face')} for a consistent orientation.")
 
     def split_fans(self) -> None:
         """Split vertices with more than one fan of faces if the mesh is repaired; leave out isolated vertices.

@@ -108,7 +108,7 @@ def prescribed_boundary(
         values[corners] += (needed - found) / len(corners)
         worst = corners[np.argmax(values[corners])]
         if values[worst] >= np.pi:
-            advice = "give more corners" if np.isnan(curvatures).all() else "ask for less"
+            advice = "give more corners" if np.isnan(curvatures).all() else "choose smaller curvatures"
             raise CurvatureError(
                 f"corner {names[worst]} would have a curvature of {values[worst] / np.pi:.4g} pi, but a corner of "
                 f"a flat surface has less than pi; {advice}"
