@@ -96,7 +96,8 @@ def _open_streams() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
-    if sys.stdout is sys.__stdout__ and not (os.name == "nt" and sys.stdout.isatty()):
+    is_replaced = sys.stdout is not sys.__stdout__  # By a test.
+    if not is_replaced and not (os.name == "nt" and sys.stdout.isatty()):
         own = os.dup(1)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         sys.stdout = open(own, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)  # noqa: SIM115
