@@ -192,7 +192,7 @@ class TestPrescribed:
             held = border & is_upright(result)
             np.testing.assert_allclose((np.pi - sums - wanted)[held], 0, atol=1e-9)
         off = np.abs(result.curvature_residual[border & is_upright(result)]).max()
-        assert off < 1e-9 or any("the angles do not sum" in note for note in result.notes)
+        assert off < 1e-9 or any("the angle sum differs" in note for note in result.notes)
 
     @pytest.mark.parametrize("noise", [0.3, 0.5])
     def test_lengths_of_the_boundary_are_kept(self, noise):

@@ -86,7 +86,7 @@ def test_a_point_out_of_place_is_named():
     notes = " ".join(broken_promises(spoiled(result, uv)))
     assert "flipped triangle" in notes
     assert "overlap in the atlas" in notes
-    assert "angles do not sum" in notes
+    assert "angle sum differs" in notes
 
 
 def test_a_triangle_without_area_is_named_and_where():

@@ -41,8 +41,8 @@ from .kinds import (
     VerticesOrEdges,
     Weights,
     WordOrVertices,
+    integer,
     strength,
-    whole,
 )  # fmt: skip
 
 if TYPE_CHECKING:
@@ -264,9 +264,9 @@ class AtlasOptions:
     """
 
     charts: str = option("atlas", Choice(CHARTS))
-    resolution: int = option(RESOLUTION, whole(2**16))
+    resolution: int = option(RESOLUTION, integer(2**16))
     padding: float = option(PADDING, Number())
-    tiles: int = option(1, whole(1000))
+    tiles: int = option(1, integer(1000))
     up: tuple[float, float, float] | None = option(None, Direction())
 
 
@@ -301,7 +301,7 @@ class RunOptions(InputOptions):
             machine.
     """
 
-    threads: int = option(THREADS, whole(256))
+    threads: int = option(THREADS, integer(256))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -317,4 +317,4 @@ class CurveOptions(ConeBounds, InputOptions):
         most: Largest number of cones.
     """
 
-    most: int = option(MOST_CONES, whole())
+    most: int = option(MOST_CONES, integer())

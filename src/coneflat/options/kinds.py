@@ -111,7 +111,7 @@ def strength(most: float) -> Number:
     return Number(0, most, is_strength=True)
 
 
-def whole(most: float = math.inf) -> Number:
+def integer(most: float = math.inf) -> Number:
     """Return the kind of an integer from 1 to `most`."""
     return Number(1, most, is_whole=True)
 

@@ -145,7 +145,7 @@ class TestWhatIsNone:
         with pytest.raises(GridError, match="flipped or without area"):
             grid_of_corners(known.vertices, known.faces, places[..., ::-1])
         places[5] += 0.25
-        with pytest.raises(GridError, match="miss each other by 0.[23]"):
+        with pytest.raises(GridError, match="differ by 0.[23]"):
             grid_of_corners(known.vertices, known.faces, places)
 
     def test_endings(self, known, tmp_path):

@@ -225,7 +225,7 @@ FIGURES = {
     "figure4.png": "Figure 4: layouts by each method, with the same cones and cut",
     "figure5.png": "Figure 5: checkerboard and distortion by the paper's method",
 }
-#: All files that are as_cell.
+#: All files that are written.
 FILES = (*TEXTS, *FIGURES)
 
 

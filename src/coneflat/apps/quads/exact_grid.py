@@ -67,8 +67,8 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
     step = np.ldexp(1.0, int(np.frexp(most)[1]) - 51)
     start = np.zeros((len(mesh.vertices), 2))
     start[mesh.faces.ravel()[fans[0]]] = step * np.round(given.reshape(-1, 2)[fans[0]] / step)
-    whole = np.round(start)
-    snapped = np.where(np.abs(start - whole) <= SNAP_DISTANCE, whole, start)
+    rounded = np.round(start)
+    snapped = np.where(np.abs(start - rounded) <= SNAP_DISTANCE, rounded, start)
     exact = ExactGrid(mesh, given, twin, turns, shifts, fans)
     corners, is_off = _transport(exact, snapped)
     bad = mesh.faces[_signs(corners) <= 0]
@@ -87,7 +87,7 @@ def _crossings(grid: IntegerGrid, twin: IntArray) -> tuple[IntArray, FloatArray]
     turns, shifts = np.zeros(len(twin), dtype=np.int64), np.zeros((len(twin), 2))
     turns[inner] = np.asarray(grid.turns)[twin[inner]]
     shifts[inner] = np.asarray(grid.shifts)[twin[inner]]
-    back = turned(turns[inner] % 4, shifts[twin[inner]])
+    back = rotated(turns[inner] % 4, shifts[twin[inner]])
     wrong = (turns[inner] + turns[twin[inner]]) % 4 != 0
     wrong |= (back + shifts[inner] != 0).any(axis=1) | (turns[inner] < 0) | (turns[inner] > 3)
     if wrong.any():
@@ -99,7 +99,7 @@ def _crossings(grid: IntegerGrid, twin: IntArray) -> tuple[IntArray, FloatArray]
     return turns, shifts
 
 
-def turned(turns: IntArray, points: FloatArray) -> FloatArray:
+def rotated(turns: IntArray, points: FloatArray) -> FloatArray:
     """Return (k, 2) points rotated by quarter turns (k,), without rounding."""
     cosine, sine = np.array([1.0, 0.0, -1.0, 0.0])[turns], np.array([0.0, 1.0, 0.0, -1.0])[turns]
     x, y = points[:, 0], points[:, 1]
@@ -136,7 +136,7 @@ def _transport(exact: ExactGrid, start: FloatArray) -> tuple[FloatArray, BoolArr
         out = corner - corner % 3 + (corner + 1) % 3
         goes_on = exact.twin[out] >= 0
         vertex, out = flat[corner[goes_on]], out[goes_on]
-        here[vertex] = turned(exact.turns[out], here[vertex]) + exact.shifts[out]
+        here[vertex] = rotated(exact.turns[out], here[vertex]) + exact.shifts[out]
         total[vertex] += exact.turns[out]
     is_off = (here != start).any(axis=1)
     is_off |= (total % 4 != 0) & (start != np.round(start)).any(axis=1)

@@ -64,10 +64,10 @@ def border_of(mesh: TriangleMesh, edges: IntArray, number: int) -> IntArray:
     """
     _, patch = patches_of(mesh, edges)
     one, two = patch[mesh.edge_faces[edges]].T
-    beside = (one == number) | (two == number)
-    border = np.flatnonzero(beside & (one != two))
+    adjacent = (one == number) | (two == number)
+    border = np.flatnonzero(adjacent & (one != two))
     if not len(border):
-        return np.flatnonzero(beside)
+        return np.flatnonzero(adjacent)
     chain, _ = feature_chains(mesh, edges)
     lengths = lengths_along(mesh, edges)
     longest = int(np.argmax(np.bincount(chain[border], lengths[border])))
@@ -250,14 +250,14 @@ def _split(
     turn = (first[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(mesh.faces, turn, axis=1).T
     bc, ca, ab = middle[np.take_along_axis(sides, turn, axis=1)].T
-    whole, on_ab, on_ca = bc < 0, ab >= 0, ca >= 0
-    halved = ~whole
+    unsplit, on_ab, on_ca = bc < 0, ab >= 0, ca >= 0
+    halved = ~unsplit
 
     def triangles(chosen: BoolArray, *corners: IntArray) -> IntArray:
         return np.stack([corner[chosen] for corner in corners], axis=1)
 
     parts = [
-        triangles(whole, a, b, c),
+        triangles(unsplit, a, b, c),
         triangles(halved & ~on_ab, a, b, bc),
         triangles(halved & on_ab, a, ab, bc),
         triangles(halved & on_ab, ab, b, bc),

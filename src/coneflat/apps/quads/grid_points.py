@@ -16,7 +16,7 @@ import numpy as np
 
 from ...base import BoolArray, FloatArray, IntArray, compiled, dots
 from ...geometry import fill_orientations, orientation
-from .exact_grid import ExactGrid, turn, turned
+from .exact_grid import ExactGrid, rotated, turn
 
 #: Values for a port without a mate: its line ends at the boundary, or the map is invalid.
 BOUNDARY, LOST = -1, -2
@@ -135,7 +135,7 @@ def _same_point(exact: ExactGrid, faces: IntArray, places: FloatArray, sides: In
     there, place = half.copy(), places[on_edge]
     seen = np.flatnonzero((exact.twin[half] >= 0) & (exact.twin[half] < half))
     there[seen] = exact.twin[half[seen]]
-    place[seen] = turned(exact.turns[half[seen]], place[seen]) + exact.shifts[half[seen]]
+    place[seen] = rotated(exact.turns[half[seen]], place[seen]) + exact.shifts[half[seen]]
     keys = np.concatenate([there[:, None], place.astype(np.int64)], axis=1)
     _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     label[on_edge] = label[on_edge][first][which.ravel()]
@@ -173,7 +173,7 @@ def find_ports(exact: ExactGrid, found: GridPoints) -> Ports:
         side = corners[faces, (i + 2) % 3] - corners[faces, (i + 1) % 3]
         closed = exact.twin[half] < 0
         parts.append((on_edge, faces, places, _directions(side, -side, closed), closed))
-        places = (turned(exact.turns[half], places) + exact.shifts[half])[~closed]
+        places = (rotated(exact.turns[half], places) + exact.shifts[half])[~closed]
         on_edge, half = on_edge[~closed], exact.twin[half[~closed]]
     at_vertex = np.flatnonzero((found.sides >= 3) & (found.sides < 6))
     point = np.full(len(exact.mesh.vertices), -1)
@@ -257,7 +257,7 @@ def _ports_back(
 
     port = port_at(np.arange(len(entry)))
     lost = np.flatnonzero(port == LOST)
-    beside = np.full(len(lost), -1)
+    crossed = np.full(len(lost), -1)
     along, places = AXES[direction[lost]], found.places[entry[lost]]
     for i in range(3):
         a, b = exact.corners[face[lost], (i + 1) % 3], exact.corners[face[lost], (i + 2) % 3]
@@ -265,11 +265,11 @@ def _ports_back(
         signs = np.empty(len(lost), dtype=np.int64)
         fill_orientations(np.concatenate([a, b, places], axis=1), np.empty(12), signs)
         is_along = (side[:, 0] * along[:, 1] == side[:, 1] * along[:, 0]) & (dots(side, along) < 0)
-        is_along &= (signs == 0) & (exact.twin[half] >= 0) & (beside < 0)
-        beside[is_along] = half[is_along]
-    lost, beside = lost[beside >= 0], beside[beside >= 0]
-    direction[lost] = (direction[lost] + exact.turns[beside]) % 4
-    face[lost] = exact.twin[beside] // 3
+        is_along &= (signs == 0) & (exact.twin[half] >= 0) & (crossed < 0)
+        crossed[is_along] = half[is_along]
+    lost, crossed = lost[crossed >= 0], crossed[crossed >= 0]
+    direction[lost] = (direction[lost] + exact.turns[crossed]) % 4
+    face[lost] = exact.twin[crossed] // 3
     port[lost] = port_at(lost)
     return port
 
@@ -327,8 +327,8 @@ def _follow(
             # The line leaves through the side from a corner on its right to one on its left; or, if it is along a
             # side and displaced outwards, through that side.
             upwards = (left >> b) & 1 and not (left >> a) & 1
-            beside = (on >> a) & (on >> b) & 1 and ((left >> i) & 1) != on_left
-            if upwards or beside:
+            is_along = (on >> a) & (on >> b) & 1 and ((left >> i) & 1) != on_left
+            if upwards or is_along:
                 out = i
         h = 3 * f + out
         if out < 0 or twin[h] < 0:

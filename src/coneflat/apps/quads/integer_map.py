@@ -128,9 +128,9 @@ def find_motions(mesh: TriangleMesh, corner_grid: FloatArray) -> tuple[IntArray,
         turns[h] = np.rint(np.angle(turn) / (np.pi / 2)).astype(np.int64) % 4
         motion = UNITS[turns[h]]
         shift = starts[h] - motion * ends[t]
-        whole = np.rint(shift)
-        shifts[h] = np.stack([whole.real, whole.imag], axis=1).astype(np.int64)
-        missed = (starts[h] - motion * ends[t] - whole, ends[h] - motion * starts[t] - whole)
+        rounded = np.rint(shift)
+        shifts[h] = np.stack([rounded.real, rounded.imag], axis=1).astype(np.int64)
+        missed = (starts[h] - motion * ends[t] - rounded, ends[h] - motion * starts[t] - rounded)
         off = max(off, *(float(np.abs(each).max(initial=0.0)) for each in missed))
     return turns, shifts, off
 
@@ -154,11 +154,11 @@ def grid_of_corners(
     """
     mesh = TriangleMesh(vertices, faces)
     flat = signed_double_areas(corner_grid)
-    turned = np.flatnonzero(~(flat > 0))
-    if len(turned):
+    flipped = np.flatnonzero(~(flat > 0))
+    if len(flipped):
         raise GridError(
-            f"{plural(len(turned), 'triangle')} of {len(faces):,} with UVs flipped or without area "
-            f"({list_some(turned)}): this is not an integer-grid map"
+            f"{plural(len(flipped), 'triangle')} of {len(faces):,} with UVs flipped or without area "
+            f"({list_some(flipped)}): this is not an integer-grid map"
         )
     turns, shifts, off = find_motions(mesh, corner_grid)
     if not off <= GRID_TOLERANCE:

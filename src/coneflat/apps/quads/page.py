@@ -84,9 +84,9 @@ def _trace(seeds: IntArray, starts: IntArray, twin: IntArray, is_cut: BoolArray,
         fronts = fronts[np.sort(first)]
         fronts = fronts[~reached[starts[_next(fronts)]]]
         reached[starts[_next(fronts)]] = True
-        beside = twin[_next(fronts)]
-        on = _next(beside)
-        fronts = on[(beside >= 0) & ~is_cut[on]]
+        opposite = twin[_next(fronts)]
+        on = _next(opposite)
+        fronts = on[(opposite >= 0) & ~is_cut[on]]
 
 
 def _next(side: IntArray) -> IntArray:

@@ -70,7 +70,7 @@ def _flat_patches(
         PatchError: a patch has no flat metric with angles of quarter turns.
     """
     corners = np.empty_like(opened.mesh.faces)
-    points, cones, turned, count = [], [], [], 0
+    points, cones, flipped, count = [], [], [], 0
     parts = opened.cut.mesh.split_components()
     areas = double_areas(lengths)
     for number, (part, vertices, faces) in enumerate(parts):
@@ -84,12 +84,12 @@ def _flat_patches(
             )
         except (CurvatureError, MetricError, SeamError) as error:
             raise PatchError(faces, str(error)) from error
-        turned.append(faces[signed_double_areas(plane[at]) <= 0])
+        flipped.append(faces[signed_double_areas(plane[at]) <= 0])
         corners[faces] = at + count
         points.append(_along_axes(part, at, as_complex(plane)))
         cones.append(opened.cut.origin[vertices[inside]])
         count += len(plane)
-    coarse = np.concatenate(turned)
+    coarse = np.concatenate(flipped)
     if len(coarse):
         raise CoarseError(
             coarse, f"{len(coarse)} of {len(corners):,} triangles are flipped on straight sides"

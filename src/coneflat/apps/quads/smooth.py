@@ -75,8 +75,8 @@ def _squared(points: FloatArray, quads: IntArray) -> FloatArray:
     normal = np.cross(u, w)
     normal /= np.maximum(np.sqrt(dots(normal, normal)), np.finfo(float).tiny)[:, None]
     z = (u - np.cross(normal, w)) / 4
-    turned = np.cross(normal, z)
-    targets = centre[:, None] + np.stack([z, turned, -z, -turned], axis=1)
+    rotated = np.cross(normal, z)
+    targets = centre[:, None] + np.stack([z, rotated, -z, -rotated], axis=1)
     count = np.maximum(np.bincount(quads.ravel(), minlength=len(points)), 1)
     sums = [np.bincount(quads.ravel(), targets[..., x].ravel(), len(points)) for x in range(3)]
     return np.stack(sums, axis=1) / count[:, None]
