@@ -19,8 +19,10 @@ from .base.threads import concurrently, using_threads
 from .cones import close_search, find_cones
 from .errors import CurvatureError, MetricError, SeamError
 from .evaluate import evaluate
-from .geometry.operators import weighted_areas
+from .geometry import double_areas
+from .geometry.operators import area_distortion, weighted_areas
 from .geometry.overlap import NOT_LOOKED_FOR
+from .geometry.planar import signed_double_areas
 from .io.packages import as_input
 from .layout import free_seams, lay_out, relax_layouts
 from .mesh.connectivity import TriangleMesh
@@ -41,6 +43,9 @@ FindMetric: TypeAlias = Callable[[Surface, ConeSolution, MetricSpec], FlatMetric
 
 # Largest number of cone searches per part. A search is repeated if the triangles around a cone cannot hold its angle.
 MAX_SEARCHES = 4
+# A result may exceed the allowed area distortion by this factor. Where it exceeds it by more, the part is relaxed with this
+# stretch, then flattened with tighter bounds of the search: at most so often, and by at most this factor each time.
+TOLERATED_EXCESS, MAX_CORRECTIONS, MAX_TIGHTENING, CORRECTING_STRETCH = 1.02, 3, 2.0, 0.1
 # Curvature error of an infeasible cone, radians: ideally a full turn; rounding and untangled neighbours reduce it.
 INFEASIBLE_ERROR = 1.0
 # A log scale that varies by less is constant: the surface is a polyhedron with vertices as cones, cut along its edges.
@@ -138,10 +143,10 @@ def flatten_source(
         if on_preview is not None:
             preview = _with_copies(layouts, prepared.parts, copies)
             on_preview(evaluate(prepared, preview, replace(o, charts="one"), Stopwatch(), NOT_LOOKED_FOR))
-        finished = finish_parts(originals, layouts, method)
+        finished = finish_within_bound(originals, layouts, method)
         # Notes contain vertex indices, so copies of parts with notes are computed, too.
         noted = {i: prepared.parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
-        finished |= finish_parts(noted, lay_out_parts(noted, method), method)
+        finished |= finish_within_bound(noted, lay_out_parts(noted, method), method)
     return evaluate(prepared, _with_copies(finished, prepared.parts, copies), o, watch)
 
 
@@ -227,6 +232,43 @@ def finish_part(part: Part, layout: Layout, method: Method) -> Layout:
         with method.watch("atlas", 1.0):
             layout = separate_overlaps(layout, seam_costs(part.mesh, part.lengths, part.seams), part.seams)
     return layout
+
+
+def finish_within_bound(
+    parts: Mapping[int, Part], layouts: Mapping[int, Layout], method: Method
+) -> dict[int, Layout]:
+    """Return finished layouts whose area distortion is at most the one allowed, or that have a note.
+
+    The cone search bounds the distortion of the linear model. On coarse meshes, that of the triangles in the plane may
+    be larger. First all triangles of such a part are relaxed with some weight on areas, then more cones are searched.
+    """
+    finished = finish_parts(parts, layouts, method)
+    stretch = 0.0 if method.relax.is_off else max(method.relax.stretch, CORRECTING_STRETCH)
+    method = replace(method, relax=replace(method.relax, stretch=stretch))
+    left = {i: part for i, part in parts.items() if _excess(part, finished[i]) > 1}
+    for _ in range(MAX_CORRECTIONS):
+        for i, layout in finish_parts(left, layouts, method).items():
+            finished[i] = min(finished[i], layout, key=partial(_excess, parts[i]))
+        excess = {i: min(_excess(parts[i], finished[i]), MAX_TIGHTENING) for i in left}
+        left = {i: left[i].with_distortion(1 / excess[i]) for i in left if excess[i] > 1}
+        layouts = lay_out_parts(left, method)
+    for i in left:
+        bound = parts[i].cones.distortion
+        finished[i] = finished[i].with_notes(
+            f"The triangles of a component have an area distortion of {bound * _excess(parts[i], finished[i]):.3g}, "
+            f"above the {bound:g} allowed. Allow more cones, or refine the mesh."
+        )
+    return finished
+
+
+def _excess(part: Part, layout: Layout) -> float:
+    """Return the area distortion of the triangles of a layout, divided by the one allowed; 0 without a bound."""
+    if not (part.is_exact and part.cones.bounds_distortion):
+        return 0.0
+    areas, flat = double_areas(layout.lengths), signed_double_areas(layout.points[layout.corners])
+    chosen = (areas > 0) & (flat > 0)
+    log_scale = np.log(flat[chosen] / areas[chosen]) / 2
+    return area_distortion(log_scale, areas[chosen]) / (part.cones.distortion * TOLERATED_EXCESS)
 
 
 def infeasible_cones(layout: Layout) -> IntArray:

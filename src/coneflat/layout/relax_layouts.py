@@ -230,18 +230,22 @@ class LayoutGroup:
         curvature = np.where(changed, laid_out_curvature(mesh, corners, changed), old)
         # What counts as no area is so for each layout.
         unit = self._sums(self.areas)[self._of_face]
-        after = np.abs(signed_double_areas(corners)) / 2
+        before, after = (np.abs(signed_double_areas(p[self.corners])) / 2 for p in (self.points, points))
+        # The energy of angles does not depend on the scale: components keep their areas relative to each other.
+        factors = np.sqrt(self._sums(before) / self._sums(after))
         old = np.concatenate([one.log_scale for one in self.layouts])
         log_scale = np.where(was_free, vertex_log_scale(mesh, self.areas / unit, after / unit), old)
         found = []
         for i, one in enumerate(self.layouts):
             own = slice(self._vertices[i], self._vertices[i + 1])
+            factor = 1.0 if one.is_held.any() else factors[i]
+            log_scale[own] += np.log(factor)
             areas = vertex_areas(one.mesh.faces, one.lengths, len(one.mesh.vertices))
             reached = area_distortion(log_scale[own], weighted_areas(areas, self._given_weights[i]))
             found.append(
                 replace(
                     one,
-                    points=points[self._points[i] : self._points[i + 1]],
+                    points=factor * points[self._points[i] : self._points[i + 1]],
                     curvature=curvature[own],
                     # Where the curvature is not prescribed, the target is what comes out.
                     target=np.where(one.is_open, curvature[own], one.target),

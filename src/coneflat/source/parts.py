@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
@@ -52,6 +52,10 @@ class Part:
     def where(self) -> str:
         """A description of the part, for error messages."""
         return f"in the component of vertex {self.cones.names[0]} ({len(self.faces):,} triangles)"
+
+    def with_distortion(self, factor: float) -> Part:
+        """Return the part with another bound of the area distortion, multiplied by a factor."""
+        return replace(self, cones=replace(self.cones, distortion=factor * self.cones.distortion))
 
 
 @dataclass(frozen=True, eq=False)
