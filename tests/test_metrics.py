@@ -110,7 +110,7 @@ def test_annulus_with_prescribed_boundary_has_round_loops():
     ("options", "kind", "message"),
     [
         ({"boundary": "square"}, errors.OptionError, "unknown boundary 'square'"),
-        ({"boundary": []}, errors.OptionError, "no corners"),
+        ({"boundary": []}, errors.OptionError, "at least one corner"),
         ({"boundary": [0, 1, 40]}, errors.OptionError, "corner 40 does not lie on the boundary"),
         ({"boundary": [0, 1]}, errors.CurvatureError, "corner 0 would have a curvature of 1 pi"),
         ({"boundary": {0: 3.0, 1: 3.0}}, errors.CurvatureError, r"must sum to 2 pi, but sum to 1\.90986 pi"),

@@ -190,7 +190,7 @@ def whole_curve(mesh: Any, faces: ArrayLike | None, options: Options, most: int)
         The area distortion of the whole mesh against the number of cones.
 
     Raises:
-        The errors of `coneflat.flatten`.
+        ConeflatError: as for `coneflat.flatten`.
     """
     stages = Stopwatch(options.progress)
     with using_threads(options.threads):

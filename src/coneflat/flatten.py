@@ -129,7 +129,7 @@ def flatten_source(
             separated; its overlaps are not measured.
 
     Raises:
-        The errors of `flatten`.
+        ConeflatError: as for `flatten`.
     """
     watch = Stopwatch(o.progress)
     with watch("check"):

@@ -57,7 +57,7 @@ class Flattener:
             options: those of `coneflat.flatten`.
 
         Raises:
-            The errors of `coneflat.flatten`.
+            ConeflatError: as for `coneflat.flatten`.
         """
         return self.flatten_as(read_options(options), on_preview)
 

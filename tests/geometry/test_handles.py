@@ -100,11 +100,11 @@ def test_measured_rotations_of_a_cut_square():
         ({"quantise": 0}, errors.OptionError, "quantise must be from 0.0001 radians"),
         ({"quantise": 1.0}, errors.CurvatureError, "not a multiple"),
         ({"quantise": QUARTER, "cones": "greedy"}, errors.OptionError, "sparse"),
-        ({"correct_handles": True}, errors.OptionError, "give quantise"),
+        ({"correct_handles": True}, errors.OptionError, "set quantise"),
         (
             {"quantise": QUARTER, "correct_handles": True, "method": "linear"},
             errors.OptionError,
-            "method 'exact' only",
+            "correct_handles needs method 'exact'",
         ),
     ],
 )

@@ -188,7 +188,7 @@ def test_options_that_make_no_sense(options, message):
 
 def test_cones_that_are_no_quarter_turns_are_refused():
     free = flatten(*shapes.sphere(3), charts="one")
-    with pytest.raises(errors.GridError, match="beside quarter turns"):
+    with pytest.raises(errors.GridError, match="from quarter turns"):
         integer_grid(free)
     with pytest.raises(errors.OptionError, match="faces and options"):
         integer_grid(free, charts="one")

@@ -47,7 +47,7 @@ def find_domains(mesh: QuadMesh) -> Domains:
     is_cut = twin < 0
     reached = np.zeros(len(mesh.vertices), dtype=bool)
     reached[starts[is_cut]] = True
-    # Four half-edges leave a regular inner vertex; two leave one on the boundary, as the third edge's is missing.
+    # Four half-edges leave a regular inner vertex. Two leave a regular boundary vertex: its third edge has none there.
     leaving = np.bincount(starts, minlength=len(mesh.vertices))
     odd = np.where(mesh.is_boundary_vertex, leaving > 2, leaving != 4)
     seeds = np.flatnonzero(odd)
