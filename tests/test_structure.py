@@ -34,6 +34,7 @@ CEILINGS = {
     "apps.ahead": 38,
     "apps.batch": 400,
     "apps.cli": 1499,
+    "apps.measure_uv": 161,
     "apps.peers": 1406,
     "apps.quads": 3199,
     "apps.studio": 1701,
@@ -45,23 +46,22 @@ CEILINGS = {
     "evaluate": 194,
     "flatten": 206,
     "flattener": 35,
-    "geometry": 1594,
+    "geometry": 1598,
     "io": 2806,
     "layout": 2250,
     "linalg": 468,
-    "measure": 835,
-    "measure_uv": 167,
-    "mesh": 711,
+    "measure": 843,
+    "mesh": 715,
     "metric": 998,
     "options": 549,
     "result": 96,
     "sample": 5,
     "seams": 178,
-    "source": 525,
+    "source": 526,
     "stages": 226,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 16_032, 233, 25_892
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_882, 233, 25_903
 CONSTANTS, KERNELS, NAMES, LEVELS = 299, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

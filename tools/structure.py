@@ -42,7 +42,7 @@ HOLDS = {
     "evaluate": "from layouts to one result",
     "flattener": "one mesh again and again",
     "cone_curve": "distortion by number of cones",
-    "measure_uv": "measures of any mesh's UVs",
+    "apps.measure_uv": "measures of any mesh's UVs",
     "from_uv": "a file's own UVs as a flattening",
     "sample": "the model that ships",
     "ahead": "kernels compiled at the build",

@@ -52,8 +52,8 @@ _HOMES = {
     "check_mesh": "mesh.check",
     "TriangleMesh": "mesh.connectivity",
     "measure": "measure.distortion",
-    "measure_uv": "measure_uv",
-    "UVMeasures": "measure_uv",
+    "measure_uv": "apps.measure_uv",
+    "UVMeasures": "apps.measure_uv",
     "quads": "apps.quads.quads",
     "QuadMesh": "apps.quads.quad_mesh",
     "measure_quads": "apps.quads.quality",
@@ -117,6 +117,7 @@ __all__ = [
 if TYPE_CHECKING:
     from . import atlas, cones, errors, geometry, io, layout, linalg, mesh, metric, options, seams, stages  # noqa: F401
     from .apps import peers
+    from .apps.measure_uv import UVMeasures, measure_uv
     from .apps.quads.integer_grid import integer_grid
     from .apps.quads.integer_map import IntegerGrid
     from .apps.quads.quad_mesh import QuadMesh
@@ -132,7 +133,6 @@ if TYPE_CHECKING:
     from .io.mesh_file import MeshFile
     from .measure.distortion import Distortion, measure
     from .measure.seam_data import SeamData
-    from .measure_uv import UVMeasures, measure_uv
     from .mesh.check import check_mesh
     from .mesh.connectivity import TriangleMesh
     from .options import PAPER

@@ -43,8 +43,8 @@ FindMetric: TypeAlias = Callable[[Surface, ConeSolution, MetricSpec], FlatMetric
 
 # Largest number of cone searches per part. A search is repeated if the triangles around a cone cannot hold its angle.
 MAX_SEARCHES = 4
-# A result may exceed the allowed area distortion by this factor. Where it exceeds it by more, the part is relaxed with this
-# stretch, then flattened with tighter bounds of the search: at most so often, and by at most this factor each time.
+# A result may exceed the allowed area distortion by this factor. Beyond that, the part is relaxed with this stretch,
+# then flattened with tighter bounds of the search: at most so often, and by at most this factor each time.
 TOLERATED_EXCESS, MAX_CORRECTIONS, MAX_TIGHTENING, CORRECTING_STRETCH = 1.02, 3, 2.0, 0.1
 # Curvature error of an infeasible cone, radians: ideally a full turn; rounding and untangled neighbours reduce it.
 INFEASIBLE_ERROR = 1.0

@@ -1,8 +1,10 @@
 """Geometry: lengths, angles, areas, Laplacian, intrinsic triangulations, exact predicates, overlaps, visibility."""
 
+from .coverage import layers_of_raster
 from .delaunay import euclidean_diagonal, intrinsic_delaunay, make_delaunay, relink
 from .handles import handle_loops
 from .intrinsic import IntrinsicTriangulation, halfedge_twins, intrinsic_triangulation
+from .layers import MAX_CELLS
 from .operators import angle_defect, cotangent_laplacian, vertex_areas
 from .orientation import fill_orientations, orientation
 from .overlap import Overlaps, find_overlaps
@@ -29,6 +31,7 @@ __all__ = [
     "CREASE_COSINE",
     "FlatTriangles",
     "IntrinsicTriangulation",
+    "MAX_CELLS",
     "Overlaps",
     "angle_defect",
     "as_complex",
@@ -51,6 +54,7 @@ __all__ = [
     "intrinsic_delaunay",
     "intrinsic_triangulation",
     "is_broken",
+    "layers_of_raster",
     "make_delaunay",
     "map_factors",
     "mollify",

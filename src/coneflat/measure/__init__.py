@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Any
 from .requirements import REPORTED, Requirement, breaches, parse_requirements
 
 if TYPE_CHECKING:
-    from .distortion import Distortion, angle_sum_errors, measure, quantile
+    from .distortion import Distortion, angle_sum_errors, measure, measure_map, quantile, sum_angles
     from .guarantees import broken_promises
-    from .report import Row, as_rows, map_rows, number_text, packing_row
+    from .report import MAP_MEASURES, Row, as_rows, map_rows, number_text, packing_row, path_text
 
 __all__ = [
     "as_rows",
     "angle_sum_errors",
     "Distortion",
+    "MAP_MEASURES",
     "REPORTED",
     "Requirement",
     "Row",
@@ -26,23 +27,30 @@ __all__ = [
     "broken_promises",
     "map_rows",
     "measure",
+    "measure_map",
     "number_text",
     "packing_row",
     "parse_requirements",
+    "path_text",
     "quantile",
+    "sum_angles",
 ]
 
 _HOMES = {
     "as_rows": "report",
     "angle_sum_errors": "distortion",
     "Distortion": "distortion",
+    "MAP_MEASURES": "report",
     "Row": "report",
     "broken_promises": "guarantees",
     "map_rows": "report",
     "measure": "distortion",
+    "measure_map": "distortion",
     "number_text": "report",
     "packing_row": "report",
+    "path_text": "report",
     "quantile": "distortion",
+    "sum_angles": "distortion",
 }
 
 

@@ -1,8 +1,8 @@
 """Triangle meshes: connectivity, checks and repair, cutting open, charts and seams of UVs."""
 
-from .charts import point_seams, point_vertices, uv_seams
-from .check import REPAIR_ADVICE, CheckedMesh
-from .connectivity import NEXT, PREVIOUS, end_corners, label_components, label_faces, sort_pairs
+from .charts import joined_edges, label_charts, point_seams, point_vertices, uv_seams
+from .check import REPAIR_ADVICE, CheckedMesh, left_out
+from .connectivity import NEXT, PREVIOUS, corner_fans, end_corners, label_components, label_faces, sort_pairs
 from .open_mesh import CutMesh, cut_open, open_along
 from .ties import tie_key
 
@@ -12,10 +12,14 @@ __all__ = [
     "NEXT",
     "PREVIOUS",
     "REPAIR_ADVICE",
+    "corner_fans",
     "cut_open",
     "end_corners",
+    "joined_edges",
+    "label_charts",
     "label_components",
     "label_faces",
+    "left_out",
     "open_along",
     "point_seams",
     "point_vertices",

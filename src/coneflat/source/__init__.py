@@ -1,5 +1,6 @@
 """Preparation of the input: connected parts, each with the specification of its cones, metric and seams."""
 
+from .input_mesh import at_unit_size
 from .parts import Part, Source
 
-__all__ = ["Part", "Source"]
+__all__ = ["Part", "Source", "at_unit_size"]

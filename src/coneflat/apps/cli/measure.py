@@ -41,7 +41,7 @@ def measure(
     """
     from ...io import as_mapped, check_target
     from ...measure import parse_requirements
-    from ...measure_uv import MEASURED, measure_mapped
+    from ..measure_uv import MEASURED, measure_mapped
     from .run import Console, require_distinct, write_report
 
     requirements = parse_requirements(required, MEASURED)

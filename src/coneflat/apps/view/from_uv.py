@@ -9,10 +9,10 @@ from ...errors import MeshFileError, MissingUVError
 from ...geometry import double_areas, edge_lengths
 from ...io import Joined, Mapped, cell_side, of_file
 from ...measure import angle_sum_errors, as_rows
-from ...measure_uv import measure_mapped, uv_points
 from ...mesh import uv_seams
 from ...result import Flattening
 from ...stages import SolveStatistics
+from ..measure_uv import measure_mapped, uv_points
 
 #: The `method` in the settings of what was not made but found in the file.
 OWN = "the file's own UVs"

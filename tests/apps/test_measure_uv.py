@@ -14,7 +14,7 @@ from click.testing import CliRunner
 import coneflat
 from coneflat import MeshFile, errors, measure_uv
 from coneflat.apps.cli.main import cli
-from coneflat.measure_uv import MEASURED
+from coneflat.apps.measure_uv import MEASURED
 from coneflat.mesh.polygons import fan_corners
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"

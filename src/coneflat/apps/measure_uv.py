@@ -10,20 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .base.arrays import FloatArray, IntArray, unit_exponent
-from .base.text import plural
-from .errors import MissingUVError
-from .geometry.coverage import layers_of_raster
-from .geometry.layers import MAX_CELLS
-from .geometry.overlap import find_overlaps
-from .geometry.planar import signed_double_areas
-from .io.mapped import Mapped, as_mapped
-from .measure.distortion import Distortion, measure_map
-from .measure.report import MAP_MEASURES, path_text
-from .mesh.charts import joined_edges, label_charts
-from .mesh.check import CheckedMesh, check_mesh, left_out
-from .mesh.connectivity import TriangleMesh, corner_fans, end_corners
-from .source.input_mesh import at_unit_size
+from .. import Distortion, TriangleMesh, check_mesh
+from ..base import FloatArray, IntArray, plural, unit_exponent
+from ..errors import MissingUVError
+from ..geometry import MAX_CELLS, find_overlaps, layers_of_raster, signed_double_areas
+from ..io import Mapped, as_mapped
+from ..measure import MAP_MEASURES, measure_map, path_text
+from ..mesh import CheckedMesh, corner_fans, end_corners, joined_edges, label_charts, left_out
+from ..source import at_unit_size
 
 #: Limit of overlapping pairs, per triangle and at least. With more pairs, areas are counted in pixels, because the
 #: number of pairs can be quadratic.
@@ -216,7 +210,7 @@ def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
 
     It is large at flipped triangles, and where triangles wind around a point twice.
     """
-    from .measure.distortion import sum_angles
+    from ..measure import sum_angles
 
     points, fan = uv_points(mesh, corner_uv)
     joined = np.zeros(mesh.faces.size, dtype=bool)
