@@ -1,6 +1,6 @@
 """Three discrete conformal metrics of one smooth surface: `python benchmarks/convergence.py` prints a Markdown table.
 
-Circle patterns (CP), Ricci flow by circle packings (RF) and conformal factors (CF, the exact method) discretise the
+Circle patterns (CP), Ricci flow by circle packings (RF) and conformal factors (the exact method) discretise the
 same smooth problem, and know nothing of each other. On finer and finer meshes, with the same cones of the same
 curvature at the same vertices, their flat edge lengths, each at the same total area, must come to agree. Differences
 are those of the logs of lengths: the mean over the surface, and the largest farther than --away from all cones (next
@@ -38,7 +38,7 @@ from coneflat.metric import ExactChoices, exact_flat_metric
 # Vertices of the icosahedron that the sphere is split from, and curvatures that sum to 4 pi.
 CONES = np.array([0, 2, 3, 5, 7, 8, 10])
 CURVATURES = np.array([1.0, 0.75, 0.5, 0.75, 0.5, 1.0, -0.5]) * np.pi
-METHODS = ("CP", "RF", "CF")
+METHODS = ("CP", "RF", "exact")
 PAIRS = tuple(combinations(range(3), 2))
 COLORS = "#0072b2", "#d55e00", "#009e73"  # told apart without red or green
 

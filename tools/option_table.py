@@ -46,7 +46,7 @@ def _flag_table(group: type, command: str = "flatten") -> str:
     rows = [
         (_flags(each.name, command), _values(each.kind), _flag_default(each), each.doc)
         for each in declarations(group).values()
-        if each.flag
+        if each.flag and not _is_shared(each, group)
     ]
     return _table(
         group, "option", rows, lambda name: f"`{flag_of(name)}`" if declarations(group)[name].flag else ""
@@ -57,6 +57,7 @@ def _keyword_table(group: type) -> str:
     rows = [
         (f"`{each.name}`", _python_values(each.kind), _python_default(each), each.doc)
         for each in declarations(group).values()
+        if not _is_shared(each, group)
     ]
     return _table(group, "keyword", rows, "`{}`".format)
 
@@ -68,10 +69,21 @@ def _table(group: type, noun: str, rows: list[tuple[str, ...]], spelled: Callabl
     for row in rows:
         assert not any("|" in cell for cell in row), row
         lines.append(f"| {' | '.join(row)} |".replace("  ", " "))
+    shared = [name for name, each in declarations(group).items() if _is_shared(each, group)]
+    if shared:
+        lines += ["", f"As for `flatten`: {', '.join(filter(None, map(spelled, shared)))}."]
     names = [name for name, each in declarations(group).items() if each.only == "sparse"]
     if names and group in GROUPS:
         lines += ["", f"Only `sparse` cones take {', '.join(filter(None, map(spelled, names)))}."]
     return "\n".join(lines)
+
+
+def _is_shared(declaration: Declaration, group: type) -> bool:
+    """Return whether another group, of `flatten`, describes the option in the same words and with the same default."""
+    others = [declarations(other).get(declaration.name) for other in GROUPS if other is not group]
+    return group not in GROUPS and any(
+        other and (other.doc, other.default) == (declaration.doc, declaration.default) for other in others
+    )
 
 
 def _flags(name: str, command: str) -> str:
