@@ -321,3 +321,30 @@ def test_vertices_of_no_triangle_stay_where_they_are(first):
     assert np.array_equal(result.vertices, np.vstack(blocks))
     assert np.array_equal(result.cones, plain.cones + shift)
     assert np.array_equal(result.distortion.qc, plain.distortion.qc)
+
+
+@pytest.mark.parametrize("allowed", [0.1, 0.2])
+def test_the_area_distortion_of_the_result_is_at_most_the_allowed_one_or_noted(allowed):
+    """Also of coarse meshes and several components, whose relaxed triangles may exceed that of the model."""
+    rng = np.random.default_rng(0)
+    exceeded = 0
+    for _ in range(8):
+        parts = [shapes.sphere(level) for level in (1, 2)]
+        vertices = np.concatenate(
+            [v * rng.uniform(0.5, 1.5, v.shape) + 4 * i for i, (v, _) in enumerate(parts)]
+        )
+        faces = np.concatenate([parts[0][1], parts[1][1] + len(parts[0][0])])
+        result = coneflat.flatten(vertices, faces, distortion=allowed)
+        if result.distortion.area_std > allowed * 1.03:
+            exceeded += 1
+            assert any("area distortion" in note for note in result.notes)
+    assert exceeded <= 4
+
+
+def test_components_have_the_same_texel_density():
+    rng = np.random.default_rng(1)
+    vertices, faces = shapes.sphere(1)
+    vertices = np.concatenate([vertices * rng.uniform(0.5, 1.5, vertices.shape), vertices[:3] + 3])
+    faces = np.concatenate([faces, [[len(vertices) - 3, len(vertices) - 2, len(vertices) - 1]]])
+    scale = coneflat.flatten(vertices, faces).distortion.log_area_scale
+    assert abs(scale[:-1].mean() - scale[-1]) < 0.1

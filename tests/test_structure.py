@@ -44,7 +44,7 @@ CEILINGS = {
     "cone_curve": 108,
     "cones": 2102,
     "evaluate": 194,
-    "flatten": 206,
+    "flatten": 208,
     "flattener": 35,
     "geometry": 1598,
     "io": 2806,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 226,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_882, 233, 25_903
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_884, 233, 25_905
 CONSTANTS, KERNELS, NAMES, LEVELS = 299, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -248,7 +248,7 @@ def finish_within_bound(
     left = {i: part for i, part in parts.items() if _excess(part, finished[i]) > 1}
     for _ in range(MAX_CORRECTIONS):
         for i, layout in finish_parts(left, layouts, method).items():
-            finished[i] = min(finished[i], layout, key=partial(_excess, parts[i]))
+            finished[i] = min(finished[i], layout, key=partial(_rank, parts[i]))
         excess = {i: min(_excess(parts[i], finished[i]), MAX_TIGHTENING) for i in left}
         left = {i: left[i].with_distortion(1 / excess[i]) for i in left if excess[i] > 1}
         layouts = lay_out_parts(left, method)
@@ -259,6 +259,11 @@ def finish_within_bound(
             f"above the {bound:g} allowed. Allow more cones, or refine the mesh."
         )
     return finished
+
+
+def _rank(part: Part, layout: Layout) -> tuple[int, float]:
+    """Return what decides between layouts of a part: the smaller is the better."""
+    return len(layout.notes), _excess(part, layout)
 
 
 def _excess(part: Part, layout: Layout) -> float:
