@@ -32,6 +32,7 @@ SENTENCES = {
     "lengths": r"Lengths along the boundary are not preserved",
     "round": r"The boundary is not quite round",
     "rotations": r"Seam rotations are .* rad off multiples of [\d.e+-]+ rad",
+    "area": r"The (triangles of a component have an )?area distortion",
     "cone count": r"[\d,]+ cones? instead of the [\d,]+ asked for",
 }
 
@@ -77,6 +78,7 @@ def check(outcome: Outcome, result: Any, options: dict[str, Any], vertices: Any,
     _check_boundary(trial)
     _check_rotations(trial)
     _check_cones(trial)
+    _check_area(trial)
     _check_report(trial)
 
 
@@ -353,6 +355,30 @@ def _check_cones(trial: Trial) -> None:
     quantum = options.get("quantise")
     if quantum is not None and len(cones) and plane.off_multiple(curvatures, quantum).max() > ANGLE:
         trial.breach("cones: no multiples", plane.off_multiple(curvatures, quantum).max())
+
+
+def _check_area(trial: Trial) -> None:
+    """The area distortion of the triangles is at most the one allowed, where cones are searched for it."""
+    options, result = trial.options, trial.result
+    unbounded = ("cone_count", "weights", "quantise", "lengths", "relax")
+    if trial.method != "exact" or options.get("cones", "auto") not in ("auto", "sparse"):
+        return
+    if trial.boundary not in ("free", "lengths") or any(options.get(name) is not None for name in unbounded):
+        return
+    if "area distortion" in " ".join(result.notes) or any("greedy" in note for note in result.notes):
+        trial.outcome.excuse("area distortion")
+        return
+    space = result.vertices[result.faces]
+    area = np.linalg.norm(np.cross(space[:, 1] - space[:, 0], space[:, 2] - space[:, 0]), axis=1)
+    flat = np.abs(plane.double_areas(trial.corners))
+    chosen = (area > 1e-12 * area.max()) & (flat > 0)
+    if not chosen.any():
+        return
+    scale = np.log(flat[chosen] / area[chosen]) / 2
+    mean = np.average(scale, weights=area[chosen])
+    std = np.sqrt(np.average((scale - mean) ** 2, weights=area[chosen]))
+    if std > 1.1 * options.get("distortion", 0.2):
+        trial.broken("area", "area distortion above the one allowed", f"{std:.3g}")
 
 
 def _check_report(trial: Trial) -> None:

@@ -16,7 +16,7 @@ from .base.arrays import FloatArray, IntArray
 from .base.progress import Stopwatch
 from .base.text import plural
 from .base.threads import concurrently, using_threads
-from .cones import close_search, find_cones
+from .cones import close_search, find_cones, uses_sparse_search
 from .errors import CurvatureError, MetricError, SeamError
 from .evaluate import evaluate
 from .geometry import double_areas
@@ -268,12 +268,14 @@ def _rank(part: Part, layout: Layout) -> tuple[int, float]:
 
 def _excess(part: Part, layout: Layout) -> float:
     """Return the area distortion of the triangles of a layout, divided by the one allowed; 0 without a bound."""
-    if not (part.is_exact and part.cones.bounds_distortion):
+    spec = part.cones
+    is_bounded = part.is_exact and spec.count is None and spec.weights is None and spec.quantum is None
+    if not (is_bounded and uses_sparse_search(part.mesh, spec)):
         return 0.0
     areas, flat = double_areas(layout.lengths), signed_double_areas(layout.points[layout.corners])
     chosen = (areas > 0) & (flat > 0)
     log_scale = np.log(flat[chosen] / areas[chosen]) / 2
-    return area_distortion(log_scale, areas[chosen]) / (part.cones.distortion * TOLERATED_EXCESS)
+    return area_distortion(log_scale, areas[chosen]) / (spec.distortion * TOLERATED_EXCESS)
 
 
 def infeasible_cones(layout: Layout) -> IntArray:

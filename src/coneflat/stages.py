@@ -92,11 +92,6 @@ class ConeSpec:
     scale_at_cones: bool
     names: IntArray
 
-    @property
-    def bounds_distortion(self) -> bool:
-        """Whether the result must not exceed `distortion`."""
-        return self.strategy in ("auto", "sparse") and self.count is None and self.weights is None
-
     def without(self, vertices: IntArray) -> ConeSpec:
         """Return a specification that forbids cones at further vertices."""
         is_allowed = self.is_allowed.copy()

@@ -1,6 +1,13 @@
 """Cone placement and target curvatures, one file per strategy."""
 
-from .find import CONE_ANGLE_PER_TRIANGLE, close_search, find_cones, only_choice, open_search
+from .find import (
+    CONE_ANGLE_PER_TRIANGLE,
+    close_search,
+    find_cones,
+    only_choice,
+    open_search,
+    uses_sparse_search,
+)
 from .given import cones_at, cones_with_curvature
 from .greedy import greedy_cones
 from .integer.search import quantise_cones
@@ -21,4 +28,5 @@ __all__ = [
     "only_choice",
     "open_search",
     "quantise_cones",
+    "uses_sparse_search",
 ]

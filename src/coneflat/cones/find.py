@@ -14,6 +14,7 @@ from ..base.progress import Stopwatch
 from ..base.text import plural
 from ..base.threads import MEMORY_BOUND_TRIANGLES
 from ..geometry.operators import weighted_areas
+from ..mesh.connectivity import TriangleMesh
 from ..mesh.ties import mesh_tie_key
 from ..stages import ConeSolution, ConeSpec, Surface
 from .given import cones_at, cones_with_curvature, fitted_cones
@@ -58,8 +59,8 @@ def find_cones(
         CurvatureError: no metric has the required curvatures.
     """
     mesh = surface.mesh
-    too_many_handles = has_many_handles(surface, spec)
-    if uses_sparse_search(surface, spec):
+    too_many_handles = has_many_handles(mesh, spec)
+    if uses_sparse_search(mesh, spec):
         corners = polyhedron_corners(surface, spec)
         return _search(surface, spec, watch, holonomy) if corners is None else corners
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
@@ -83,19 +84,18 @@ def find_cones(
     return solution
 
 
-def uses_sparse_search(surface: Surface, spec: ConeSpec) -> bool:
+def uses_sparse_search(mesh: TriangleMesh, spec: ConeSpec) -> bool:
     """Return whether the sparse search is used for the cones of a mesh."""
     return spec.strategy == "sparse" or (
         spec.strategy == "auto"
-        and (spec.needs_sparse_search or not (spec.prescribes_boundary or has_many_handles(surface, spec)))
+        and (spec.needs_sparse_search or not (spec.prescribes_boundary or has_many_handles(mesh, spec)))
     )
 
 
-def has_many_handles(surface: Surface, spec: ConeSpec) -> bool:
+def has_many_handles(mesh: TriangleMesh, spec: ConeSpec) -> bool:
     """Return whether a mesh has so many handles that the sparse search would take too long for the required cones."""
     from .sparse.limits import MAX_SEARCHED
 
-    mesh = surface.mesh
     if spec.strategy != "auto" or spec.needs_sparse_search or mesh.is_boundary_vertex.any():
         return False
     # Each handle except one needs two cones of angle 4 pi.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.arrays import unit_exponent
-from ..base.text import plural
+from ..base.text import list_some, plural
 from ..geometry.overlap import Overlaps
 from ..geometry.planar import sides_between
 from ..mesh.connectivity import TriangleMesh
@@ -30,6 +30,8 @@ WINDING_TOLERANCE = 1.0
 # Mean QC, and QC exceeded on 5% of the area, above which a layout is unsuitable for most uses even though all triangles
 # are positively oriented. Single triangles are worse on many models.
 EXTREME_QC, EXTREME_TAIL = 1.25, 2.0
+# QC distortion of a triangle that is named, whatever the others have.
+NEEDLE_QC = 1e3
 # Tolerance of the turning angle of a round boundary at a vertex: radians, as it is solved iteratively to a thousandth,
 # plus a fraction of the turning angle of a circle, which is not visible.
 NOT_ROUND, NOT_ROUND_SHARE = 1e-3, 0.02
@@ -240,4 +242,10 @@ def _distortion(result: Flattening) -> Iterator[str]:
         yield (
             f"Angle distortion is high: the mean QC distortion is {measures.qc_mean:.3g}, and above "
             f"{measures.qc_p95:.3g} on 5% of the area; {', '.join(cure[:-1])} or {cure[-1]} would lower it."
+        )
+    needles = np.flatnonzero(measures.qc > NEEDLE_QC)
+    if len(needles):
+        yield (
+            f"{plural(len(needles), 'triangle')} with a QC distortion above {NEEDLE_QC:g}: {list_some(needles)}; up to "
+            f"{measures.qc_max:.2g}. Remesh there, if they cover a visible area."
         )
