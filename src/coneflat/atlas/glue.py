@@ -38,10 +38,10 @@ def glue_charts(mesh: TriangleMesh, layout: ChartLayout, lengths: FloatArray) ->
     layout = layout.joined(seams.coinciding(layout.places, inner, CONGRUENCE_TOLERANCE))
     if len(inner) == len(seams.edges):  # one chart
         return layout
-    refused: set[tuple[int, ...]] = set()
+    rejected: set[tuple[int, ...]] = set()
     gluing = _Gluing(mesh, layout)
     # Gluing changes which seam edges form one stretch.
-    while gluing.glue_longest(lengths, refused):
+    while gluing.glue_longest(lengths, rejected):
         gluing = _Gluing(mesh, gluing.layout, gluing)
     return gluing.layout
 
@@ -70,12 +70,12 @@ class _Gluing:
         """The current layout."""
         return ChartLayout(_pairs(self.places), self.corners, self.chart, self.seams.edges)
 
-    def glue_longest(self, lengths: FloatArray, refused: set[tuple[int, ...]]) -> bool:
+    def glue_longest(self, lengths: FloatArray, rejected: set[tuple[int, ...]]) -> bool:
         """Glue charts along stretches of seam where they fit, the longest first; return True if any were glued.
 
         Args:
             lengths: (e,) edge lengths on the model.
-            refused: stretches, with the sizes of their charts, at which gluing failed; extended in place.
+            rejected: stretches, with the sizes of their charts, at which gluing failed; extended in place.
         """
         glued = False
         total = np.array([lengths[self.seams.edges[members]].sum() for members in self.stretches])
@@ -89,12 +89,12 @@ class _Gluing:
                 len(self.faces[one]),
                 len(self.faces[other]),
             )
-            if one == other or key in refused:
+            if one == other or key in rejected:
                 continue
             if self._glue_at(members):
                 glued = True
             else:
-                refused.add(key)
+                rejected.add(key)
         return glued
 
     def _glue_at(self, members: IntArray) -> bool:

@@ -107,6 +107,4 @@ def separate_overlaps(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layo
     )
     if not count:
         return separated
-    return separated.with_notes(
-        f"{plural(count, 'forbidden edge')} had to be cut to separate overlaps."
-    )
+    return separated.with_notes(f"{plural(count, 'forbidden edge')} had to be cut to separate overlaps.")

@@ -107,15 +107,15 @@ def pack_known(
     _check(resolution, padding, margin, rotate, tiles)
     density = np.ones(charts.count) if areas is None else _densities(charts, areas)
     outlines = charts.outlines()
-    alone = charts.count == 1
-    as_given = rotate == "none" or isinstance(rotate, int) or (alone and rotate == "any")
+    is_single = charts.count == 1
+    as_given = rotate == "none" or isinstance(rotate, int) or (is_single and rotate == "any")
     directions = [np.empty(0)] * charts.count if rotate == "none" else border_directions(outlines)
     straight = np.zeros(charts.count) if as_given else straight_angles(charts, outlines, directions)
     frame = density * np.exp(1j * straight)
     outlines = outlines.times(frame)
-    room = 1.0 - 2.0 * margin / resolution
-    if alone:
-        packing = _alone(outlines, directions[0], rotate)
+    inner = 1.0 - 2.0 * margin / resolution
+    if is_single:
+        packing = _pack_single(outlines, directions[0], rotate)
     else:
         area = float(np.abs(charts.sums(charts.areas) * density**2).sum())
         finest = QUARTER_TURNS * min(max(MAX_PLACEMENTS // (QUARTER_TURNS * charts.count), 1), 6)
@@ -126,10 +126,10 @@ def pack_known(
         )
         angles = np.tile(np.arange(turns) * (2 * np.pi / turns), (charts.count, 1))
         allowed = along_axes(directions, straight, angles)
-        gap = padding / resolution / room
+        gap = padding / resolution / inner
         packing = pack(outlines, area, angles, allowed, gap, min(tiles, charts.count))
 
-    scale = room / (packing.side or 1.0)
+    scale = inner / (packing.side or 1.0)
     factors = scale * frame * np.exp(1j * packing.angle)
     border = (1 + 1j) * margin / resolution
     uv = charts.moved(factors, packing.shift * scale + border)
@@ -170,7 +170,7 @@ def _densities(charts: Charts, areas: ArrayLike) -> FloatArray:
     return densities
 
 
-def _alone(outlines: Outlines, directions: FloatArray, rotate: str | int) -> Packing:
+def _pack_single(outlines: Outlines, directions: FloatArray, rotate: str | int) -> Packing:
     """Return the packing of a single chart, centred in its smallest enclosing square, with the least rotation."""
     angle = square_angle(outlines.points(0), directions) if rotate == "any" else 0.0
     angle -= HALF_PI * round(angle / HALF_PI)
@@ -230,18 +230,18 @@ def arrange_charts(
     def read(corner_uv: FloatArray) -> Charts:
         return replace(read_charts(corner_uv, chart), edge_halfedges=edge_halfedges)
 
-    flat = _upright(corner_uv, chart)
+    flat = _unmirrored(corner_uv, chart)
     rotate: str | int = "any" if up is None else "none"
     if quantum is not None and len(component) > 1:
-        turns = whole_turns(quantum)
-        flat = _turned_together(read(flat), component, turns, space, up)
+        turns = turns_of_quantum(quantum)
+        flat = _rotated_together(read(flat), component, turns, space, up)
         rotate = turns if up is None else "none"
     elif up is not None:
         flat = orient_charts(flat, chart, corners=space, up=up)
     return pack_known(read(flat), None, resolution, padding, padding, rotate, tiles)
 
 
-def whole_turns(quantum: float) -> int:
+def turns_of_quantum(quantum: float) -> int:
     """Return the largest number of equal turns, up to MAX_TURNS, whose angle is a multiple of the quantum (radians)."""
     parts = 2 * np.pi / quantum
     if abs(parts - round(parts)) > RELATIVE_TOLERANCE * parts:
@@ -249,7 +249,7 @@ def whole_turns(quantum: float) -> int:
     return max(turns for turns in range(1, MAX_TURNS + 1) if round(parts) % turns == 0)
 
 
-def _turned_together(
+def _rotated_together(
     charts: Charts,
     component: IntArray,
     turns: int,
@@ -287,7 +287,7 @@ def _best_turn(rise: NDArray[np.complex128], allowed: BoolArray) -> FloatArray:
     return angles
 
 
-def _upright(flat: FloatArray, chart: IntArray) -> FloatArray:
+def _unmirrored(flat: FloatArray, chart: IntArray) -> FloatArray:
     """Return (m, 3, 2) the charts; a chart with negative total area is mirrored."""
     is_mirrored = np.bincount(chart, weights=signed_double_areas(flat)) < 0
     if not is_mirrored.any():

@@ -10,7 +10,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from ..atlas.touch import snap_apart
+from ..atlas.touch import round_safely
 from ..base.arrays import FloatArray, IntArray
 from ..base.text import plural
 from ..errors import MeshFileError, OptionError, UnknownFormatError
@@ -164,7 +164,7 @@ def _in_single_precision(result: Flattening) -> Flattening:
     is_stored = np.array_equal(stored_in_glb(result.uv), result.uv)
     if is_stored and np.array_equal(vertices, result.vertices):
         return result
-    uv, overlaps = snap_apart(result.uv, result.uv_faces, stored_in_glb)
+    uv, overlaps = round_safely(result.uv, result.uv_faces, stored_in_glb)
     return remeasured(result, replace(result, vertices=vertices, uv=uv), SINGLE, overlaps=overlaps)
 
 

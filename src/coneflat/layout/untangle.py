@@ -109,7 +109,7 @@ class _Untangling:
     ) -> None:
         self.rest = rest
         self.flat, self.faces, self.angles, self.on_boundary = flat, faces, angles, on_boundary
-        self.sides, self.is_own = flat.sides.reshape(-1, 3), False
+        self.sides, self.is_copied = flat.sides.reshape(-1, 3), False
         self.moves = np.zeros(len(angles))
         self.is_bad = np.empty(len(faces), dtype=bool)
         find_low(flat.sides, DEGENERATE_HEIGHT, self.is_bad)
@@ -124,17 +124,17 @@ class _Untangling:
     def _accept(self, patches: Patches, shifts: ComplexArray) -> None:
         """Take over the patches that are positively oriented now and wind around no vertex."""
         result = patches.moved(shifts)
-        is_upright = heights(result) > DEGENERATE_HEIGHT
+        is_positive = heights(result) > DEGENERATE_HEIGHT
         failed = np.zeros(patches.count, dtype=bool)
-        failed[patches.face_patch[~is_upright]] = True
+        failed[patches.face_patch[~is_positive]] = True
         trial = np.where(failed[patches.face_patch, None], patches.sides, result)
         winding = self._winding(patches, trial)
         winds = np.zeros(len(self.angles), dtype=bool)
         winds[winding] = True
         failed[patches.face_patch[winds[self.faces[patches.faces]].any(axis=1)]] = True
         good = ~failed[patches.face_patch]
-        if not self.is_own:
-            self.sides, self.is_own = self.sides.copy(), True
+        if not self.is_copied:
+            self.sides, self.is_copied = self.sides.copy(), True
         self.sides[patches.faces[good]] = result[good]
         self.is_bad[patches.faces[good]] = False
         self.moves[patches.vertices] += np.where(failed[patches.patch], 0.0, np.abs(shifts))
