@@ -77,7 +77,7 @@ class Sheet:
         return found
 
     def _path(self, own: int, one: BoolArray, other: BoolArray, starts: IntArray, ends: IntArray) -> IntArray:
-        """Return the edges of the cheapest path inside a piece from starts to ends that avoids two sets of triangles."""
+        """Return the edges of the cheapest path in a piece from starts to ends that avoids two sets of triangles."""
         # The last entry is for the outside of the boundary, which is in no piece.
         kind = np.zeros(len(self.piece) + 1, dtype=np.uint8)
         kind[:-1] = np.where(one, 2, np.where(other, 3, self.piece == own))
@@ -93,7 +93,7 @@ class Sheet:
     def widened(
         self, own: int, one: BoolArray, other: BoolArray, areas: FloatArray, least: float
     ) -> tuple[BoolArray, BoolArray]:
-        """Return two sets of a piece's triangles, each extended by the triangles that are closer to it than to the other.
+        """Return two sets of a piece's triangles, each extended by triangles that are closer to it than to the other.
 
         Args:
             own: the piece.
@@ -117,9 +117,9 @@ class Sheet:
     def _both_to_the_border(
         self, own: int, border: IntArray, one: BoolArray, other: BoolArray
     ) -> tuple[BoolArray, BoolArray] | None:
-        """Return two sets, each extended by a path to the border; a set that encloses the other is reduced to a triangle.
+        """Return two sets, each extended by a path to the border, or None if this is impossible.
 
-        border: the triangles along the border.
+        A set that encloses the other is reduced to a single triangle. border: the triangles along the border.
         """
         for first, second in (
             (one, other),

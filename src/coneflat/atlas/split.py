@@ -161,14 +161,14 @@ def _label_ordered(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray]
 
 
 def _layers(pairs: IntArray, members: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the first and the second triangles of pairs numbered as in `_steps`; of one pair only if these intersect."""
+    """Return the first and second triangles of pairs numbered as in `_steps`; those of one pair if they intersect."""
     kept, moved = pairs.ravel()[members], pairs.ravel()[members ^ 1]
     one, other = np.unique(kept), np.unique(moved)
     return (kept[:1], moved[:1]) if len(np.intersect1d(one, other)) else (one, other)
 
 
 def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the adjacent pairs of an overlap: (s,) from and (s,) to pairs that differ by a step of the second triangle.
+    """Return (s,), (s,) the pairs of an overlap that are adjacent: the second triangle is replaced by a neighbour.
 
     Pair i has number 2i in its given order and 2i + 1 in the other order.
     """

@@ -15,7 +15,7 @@ HALF_PI = np.pi / 2
 MAX_STRAY = 0.01
 # Fraction of a run at each end that is ignored for the direction: there it may bend into a rounded corner.
 END_SHARE = 1 / 8
-# Directions that differ by less, in radians, are the same. Of a smooth border at most about a tenth is in one direction.
+# Directions that differ by less, in radians, are the same. At most about a tenth of a smooth border is in one of them.
 SAME_DIRECTION = np.radians(1.5)
 # Fraction of a border that must be in one direction, modulo quarter turns. It is a third for an equilateral triangle
 # and a hexagon, a sixth for a rim of 24 sides, up to 28 % and mostly 10 % for free forms.
@@ -92,7 +92,7 @@ def along_axes(directions: list[FloatArray], turned: FloatArray, angles: FloatAr
 
 
 def straight_runs(sides: ComplexArray) -> ComplexArray:
-    """Return (r,) the straight runs of a border, as complex vectors with their length and the direction of their middle.
+    """Return (r,) the straight runs of a border, as complex vectors with their length and their middle's direction.
 
     Each curve of the border is split recursively at its farthest point from the line between its ends, until all
     pieces are straight (Ramer 1972, Douglas and Peucker 1973).
