@@ -39,7 +39,7 @@ def relax_layouts(
     layouts: Sequence[Layout],
     weights: Sequence[FloatArray | None],
     spec: RelaxSpec,
-    progress: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> list[Layout]:
     """Return layouts with less distortion, the same cones and the same seams, relaxed as one mesh.
 
@@ -50,7 +50,7 @@ def relax_layouts(
         layouts: layouts of connected meshes.
         weights: for each layout the (n,) importance of its vertices, or None.
         spec: the options for relaxing.
-        progress: called after each step with a description of it.
+        report: called after each step with a description of it.
 
     Returns:
         The relaxed layouts, in the same order.
@@ -61,11 +61,11 @@ def relax_layouts(
     if spec.is_off or not layouts:
         return list(layouts)
     try:
-        return _relaxed(LayoutGroup(layouts, weights), spec, progress)
+        return _relaxed(LayoutGroup(layouts, weights), spec, report)
     except (SeamError, LengthError, MetricError) as error:  # a metric that did not converge
         if len(layouts) > 1:
             return [
-                relax_layouts([one], [own], spec, progress)[0]
+                relax_layouts([one], [own], spec, report)[0]
                 for one, own in zip(layouts, weights, strict=True)
             ]
         if isinstance(error, MetricError):
@@ -73,7 +73,7 @@ def relax_layouts(
         return [layouts[0].with_notes(f"Not relaxed: {error}.") if spec.is_whole else layouts[0]]
 
 
-def _relaxed(group: LayoutGroup, spec: RelaxSpec, progress: Callable[[str], None]) -> list[Layout]:
+def _relaxed(group: LayoutGroup, spec: RelaxSpec, report: Callable[[str], None]) -> list[Layout]:
     mesh, points = group.mesh, group.points
     before = group.ratios(points)
     is_free = group.is_free
@@ -92,7 +92,7 @@ def _relaxed(group: LayoutGroup, spec: RelaxSpec, progress: Callable[[str], None
             weights=group.weights,
             free=is_free,
             tolerance=TOLERANCE,
-            progress=lambda step, _: progress(f"step {step}"),
+            progress=lambda step, _: report(f"step {step}"),
         ).points
 
     if spec.stretch:
@@ -203,7 +203,7 @@ class LayoutGroup:
     def without_losses(
         self, points: FloatArray, moved: FloatArray, before: FloatArray, was_free: BoolArray
     ) -> tuple[FloatArray, BoolArray]:
-        """Return the moved points, with patches reset whose mean or worst distortion got worse, and their vertices (n,).
+        """Return the moved points, without patches whose mean or worst distortion got worse, and a mask of these (n,).
 
         before: (m,) the ratios of the layout to compare with.
         """
@@ -228,7 +228,7 @@ class LayoutGroup:
         return np.where(back[:, None], points, moved), is_lost
 
     def updated(self, points: FloatArray, was_free: BoolArray) -> list[Layout]:
-        """Return the layouts with moved points and with the curvature, target and log scale updated where they moved."""
+        """Return the layouts with moved points and with updated curvature, target and log scale."""
         mesh, corners = self.mesh, rows_of(points, self.corners)
         # Curvatures change only at vertices of moved triangles.
         changed = np.zeros(len(mesh.vertices), dtype=bool)

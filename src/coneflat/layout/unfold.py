@@ -23,10 +23,11 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
 
     Args:
         flat: the m triangles, in any unit: `ExactMetric.straight` has those of an exact metric, `flat_triangles` those
-            of other lengths. Vertices off the cut should have no curvature; otherwise gaps occur, which are distributed.
-        corners: (m, 3) the points at the triangles' corners, from 0, for example `cut_open(mesh, seams).mesh.faces`. The
-            mesh is cut along the sides whose ends have different points in the two triangles. Points without a triangle
-            are at 0.
+            of other lengths. Vertices off the cut should have no curvature; otherwise there are gaps, which are
+            distributed.
+        corners: (m, 3) the points at the triangles' corners, from 0, for example `cut_open(mesh, seams).mesh.faces`.
+            The mesh is cut along the sides whose ends have different points in the two triangles. Points without a
+            triangle are at 0.
 
     Raises:
         ArrayShapeError, FaceIndexError: `corners` does not fit the triangles.

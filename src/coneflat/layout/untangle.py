@@ -202,7 +202,7 @@ def _thickened(rest: ComplexArray) -> ComplexArray:
 
 @compiled
 def is_degenerate(sides: ComplexArray, base: int, least: float) -> bool:
-    """Return True if the triangle with a given first side is flipped or has at most a given height over longest side."""
+    """Return True if the triangle of a given first side is flipped or has at most a given height over longest side."""
     doubled = sides[base].real * sides[base + 1].imag - sides[base].imag * sides[base + 1].real
     longest = 0.0
     for h in range(base, base + 3):

@@ -22,8 +22,8 @@ class Lines:
         line: (q,) the line of each point, from 0.
         directions: (l, 2) directions of the lines, of any length.
         offsets: (l,) position of each line: the dot product of its points with its unit normal, which is the direction
-            rotated to the left by a quarter turn. NaN for a line that may move sideways. None: every line passes through
-            its first point.
+            rotated to the left by a quarter turn. NaN for a line that may move sideways. None: every line passes
+            through its first point.
     """
 
     points: ArrayLike

@@ -11,7 +11,7 @@ from ...base.arrays import ComplexArray, FloatArray
 from ...errors import MetricError
 from ...linalg import Factor, factorize
 from ...linalg.newton import ARMIJO, HALVINGS
-from .elements import SHORT_OF_FLAT, Elements
+from .elements import MAX_STEP_SHARE, Elements
 from .energies import Energy
 from .motions import Motions
 
@@ -112,7 +112,7 @@ def descend(
         length = np.full(parts, np.inf)
         np.minimum.at(length, part, maps.largest_steps(change))
         longest = min(1.0, stride / remaining) if remaining else 1.0
-        length = np.minimum(longest, SHORT_OF_FLAT * length)
+        length = np.minimum(longest, MAX_STEP_SHARE * length)
         taken += 1
         for _ in range(HALVINGS):
             trial = maps.plus(length[part], change)
