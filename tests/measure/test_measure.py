@@ -209,7 +209,7 @@ class TestFormats:
         ("text", "message"),
         [
             (SQUARE + "f 1 2 3\n", "has no UV coordinates"),
-            (SQUARE + "f 1/1 2/2 3/3\n", "numbers UV coordinates, but does not hold them"),
+            (SQUARE + "f 1/1 2/2 3/3\n", "refers to UV coordinates, but does not contain them"),
             (SQUARE + "vt nan 1\nf 1/1 2/1 3/1\n", "none of 1 triangle has UVs that are finite"),
         ],
     )

@@ -49,15 +49,15 @@ class Joined:
         notes = []
         if self.edges:
             notes.append(
-                f"Joined {plural(self.edges, 'edge')} that the file has twice, at the same positions "
+                f"Closed {plural(self.edges, 'edge')} that the file has twice, at the same positions "
                 f"({plural(self.merged, 'vertex', 'vertices')} merged); --no-weld leaves them open."
             )
         elif self.mesh.welded:
             notes.append(f"Merged {self.mesh.welded:,} vertices at the same positions.")
         if self.left:
             notes.append(
-                f"{plural(self.left, 'open edge')} at the same positions as others, left open; --weld merges all vertices "
-                "at the same positions."
+                f"{plural(self.left, 'open edge')} at the same positions as others, left open; --weld merges all "
+                "vertices at the same positions."
             )
         return tuple(notes)
 

@@ -211,8 +211,8 @@ class CheckedArrays:
         values = self.floats(name, shape)
         end = 2**53 if bound is None else bound
         if not np.all((values >= least) & (values < end) & (values == np.floor(values))):
-            there = "indices can be" if bound is None else f"the {bound} there are"
-            raise MeshFileError(f"{self.path}: {name!r} has indices beyond {there}")
+            there = "integers" if bound is None else f"{bound} elements"
+            raise MeshFileError(f"{self.path}: {name!r} has indices outside the range of {there}")
         return values.astype(np.int64)
 
     def notes(self, report: dict[str, Any]) -> tuple[str, ...]:

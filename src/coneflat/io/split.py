@@ -121,7 +121,7 @@ def source_normals(result: Flattening) -> CornerNormals | None:
 
 
 def _smoothing_groups(source: MeshFile) -> IntArray | None:
-    """Return (p,) the smoothing group of each polygon of an OBJ file, 0 for none; None if all are in one group or none."""
+    """Return (p,) the smoothing group of each polygon of an OBJ file, 0 for none; None if groups have no effect."""
     if source.obj is None:
         return None
     known: dict[bytes, int] = {}
@@ -139,7 +139,7 @@ def _smoothing_groups(source: MeshFile) -> IntArray | None:
 
 
 def _smoothed(result: Flattening, source: MeshFile, groups: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return normals, and (m, 3) their index at each corner: the mean over a vertex's group, or the polygon's normal."""
+    """Return normals, and (m, 3) their index at each corner: means over a vertex's group, or the polygon's normal."""
     assert result.face_corners is not None
     polygon = polygon_of(result.face_corners, source.offsets)
     group = groups[polygon][:, None]

@@ -1,4 +1,4 @@
-"""Writing of a flattened mesh to a file, and the result as the file stores it, with rounded numbers and new measures."""
+"""Writing of a flattened mesh to a file, and the result as the file stores it, measured on the stored numbers."""
 
 from __future__ import annotations
 
