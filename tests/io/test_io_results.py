@@ -37,7 +37,11 @@ class TestReadingResults:
             ("uv", None, "holds no UVs: 'uv' is missing"),
             ("seams", None, "holds no result of coneflat: 'seams' is missing"),
             ("uv", np.zeros((4, 3)), r"'uv' has the shape \(4, 3\)"),
-            ("uv_faces", np.full((960, 3), 10**6), "'uv_faces' has indices outside the range of 534 elements"),
+            (
+                "uv_faces",
+                np.full((960, 3), 10**6),
+                "'uv_faces' has indices outside the range of 534 elements",
+            ),
             ("uv_faces", np.full((960, 3), 0.5), "uv_faces"),
             ("faces", np.full((960, 3), 525), "'faces' has indices outside"),
             ("cones", np.array([525]), "cones"),

@@ -48,11 +48,9 @@ def parse_off(path: Path, content: bytes) -> MeshFile:
         corners.add(named)
         lines += len(rows)
     if lines < vertex_count:
-        raise MeshFileError(
-            f"{path} ends after {lines} of the {vertex_count} vertices that its header declares"
-        )
+        raise MeshFileError(f"{path} ends after {lines} of the {vertex_count} vertices in its header")
     if (found := lines - vertex_count) < face_count:
-        raise MeshFileError(f"{path} ends after {found} of the {face_count} faces that its header declares")
+        raise MeshFileError(f"{path} ends after {found} of the {face_count} faces in its header")
     mesh = MeshFile(path, vertices.done(), corners.done(), offsets_of(sizes.done()))
     if len(normals) < vertex_count or not vertex_count:
         return mesh

@@ -84,7 +84,7 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
             columns, start = _decode(content, start, _stored(element, form), wanted)
         except _EndOfFile as error:
             raise MeshFileError(
-                f"{path} ends before the {element.length} {element.name} elements that its header declares"
+                f"{path} ends before the {element.length} {element.name} elements in its header"
             ) from error
         if element.name == "vertex":
             names = [element.properties[i].name for i in wanted]

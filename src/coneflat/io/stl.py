@@ -38,7 +38,7 @@ def parse_stl(path: Path, content: bytes) -> MeshFile:
         points = _text_points(path, content)
     elif needed:
         found = (len(content) - _HEADER.itemsize) // _TRIANGLE.itemsize
-        raise MeshFileError(f"{path} ends after {found} of the {declared} triangles that its header declares")
+        raise MeshFileError(f"{path} ends after {found} of the {declared} triangles in its header")
     else:
         raise MeshFileError(f"{path} is not an STL file: it is shorter than an STL header")
     if not len(points):
@@ -63,7 +63,5 @@ def _text_points(path: Path, content: bytes) -> FloatArray:
         facets += len(block.beginning_with(b"facet"))
         vertices.add(block.words(block.beginning_with(b"vertex"), first=1).points()[:, :3])
     if len(vertices) != 3 * facets:
-        raise MeshFileError(
-            f"{path} has {facets} facets but {len(vertices)} vertices; expected three for each"
-        )
+        raise MeshFileError(f"{path} has {facets} facets but {len(vertices)} vertices, expected three each")
     return vertices.done()

@@ -65,8 +65,7 @@ def relax_layouts(
     except (SeamError, LengthError, MetricError) as error:  # a metric that did not converge
         if len(layouts) > 1:
             return [
-                relax_layouts([one], [own], spec, report)[0]
-                for one, own in zip(layouts, weights, strict=True)
+                relax_layouts([one], [w], spec, report)[0] for one, w in zip(layouts, weights, strict=True)
             ]
         if isinstance(error, MetricError):
             raise

@@ -300,9 +300,7 @@ def gap_forces(
         for x in range(3):
             start, end, w = corner[base + (x + 1) % 3], corner[base + (x + 2) % 3], weight[base + x]
             gap = frame[base // 3] * sides[base + x] - (points[end] - points[start])
-            gap = complex(
-                gap.real * w, gap.imag * w
-            )  # real times complex would be computed with twice the products
+            gap = complex(gap.real * w, gap.imag * w)  # w * gap would need twice the products
             force[end] += gap
             force[start] -= gap
 

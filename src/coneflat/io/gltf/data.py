@@ -74,9 +74,7 @@ class GltfData:
         except RecursionError as error:
             raise MeshFileError(f"{path}: its JSON is nested too deeply") from error
         except ValueError as error:
-            raise MeshFileError(
-                f"{path} is not a readable glTF file: its JSON is invalid: {error}"
-            ) from error
+            raise MeshFileError(f"{path} is not a readable glTF file: invalid JSON: {error}") from error
         if not isinstance(tree, dict):
             raise MeshFileError(f"{path} is not a glTF file: its JSON is not an object")
         self.tree: Item = tree

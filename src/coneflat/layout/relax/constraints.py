@@ -166,7 +166,5 @@ def _indices(value: ArrayLike, count: int, name: str) -> IntArray:
 def _floats(value: ArrayLike, name: str) -> FloatArray:
     given = np.asarray(value, dtype=np.float64)
     if not np.isfinite(given).all():
-        raise OptionError(
-            f"{name} must be finite: {plural(int((~np.isfinite(given)).sum()), 'number')} are not"
-        )
+        raise OptionError(f"{name} must be finite: {plural(int((~np.isfinite(given)).sum()), 'number')} not")
     return given

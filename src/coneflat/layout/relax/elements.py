@@ -136,9 +136,7 @@ class Elements:
             k, self._indices.astype(np.int64), np.arange(k).repeat(np.diff(self._indptr))
         )
         first = self._unknown[self._start[:-1]]
-        self.part = np.append(self.unknown_part, 0)[
-            first
-        ]  # any part for the offset: then all have one step length
+        self.part = np.append(self.unknown_part, 0)[first]  # any part for the offset: all share a step
 
     def maps(self, points: ComplexArray) -> Maps:
         """Return the maps at given positions (u,) of all points."""
