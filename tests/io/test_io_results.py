@@ -143,7 +143,7 @@ class TestTargets:
 def test_what_is_no_path_is_refused_by_name(name):
     result = coneflat.flatten(*shapes.hill(4, 4))
     for call in (coneflat.read_mesh, coneflat.read_flattening, result.save, read_picture):
-        with pytest.raises(MeshFileError, match=f"not by {type(name).__name__}"):
+        with pytest.raises(MeshFileError, match=f"got {type(name).__name__}"):
             call(name)
 
 

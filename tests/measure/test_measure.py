@@ -221,7 +221,7 @@ class TestFormats:
         vertices, faces = shapes.hill(3, 3)
         with pytest.raises(errors.MissingUVError, match="corner_uv"):
             measure_uv(vertices, faces)
-        with pytest.raises(errors.ArrayShapeError, match=r"\(18, 3, 2\), not \(18, 2\)"):
+        with pytest.raises(errors.ArrayShapeError, match=r"\(18, 3, 2\), got \(18, 2\)"):
             measure_uv(vertices, faces, np.zeros((18, 2)))
         with pytest.raises(errors.ArrayShapeError, match="cannot read UVs from int"):
             measure_uv(7)

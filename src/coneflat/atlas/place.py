@@ -171,7 +171,7 @@ class Plan(NamedTuple):
 
     order: IntArray
     allowed: BoolArray
-    aside: FloatArray
+    offset: FloatArray
 
 
 class _Placed(NamedTuple):

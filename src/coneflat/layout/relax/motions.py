@@ -125,9 +125,9 @@ class _Builder:
         on_seam = np.zeros(len(points), dtype=bool)
         on_seam[chains.left] = on_seam[chains.right] = True
         self.is_special = on_seam & chains.is_node[vertex]
-        held = np.concatenate([constraints.pinned, constraints.on_line])
-        if len(held):
-            twice, times = np.unique(held, return_counts=True)
+        fixed = np.concatenate([constraints.pinned, constraints.on_line])
+        if len(fixed):
+            twice, times = np.unique(fixed, return_counts=True)
             self.is_special[twice[times > 1]] = True
         self.is_special &= self.is_free
         # Real variables of the linear system: two for each special point and each translation, one for each line.
@@ -159,12 +159,12 @@ class _Builder:
         chains = self.chains
         stays = ~self.is_free[chains.left] & ~chains.is_node[chains.vertices]
         is_loose = np.bincount(chains.chain, stays.any(axis=1), len(chains.rotation)) == 0
-        held = np.sort(self.constraints.held_seams, axis=1)
-        if len(held):
+        fixed = np.sort(self.constraints.held_seams, axis=1)
+        if len(fixed):
             n = int(self.vertex.max()) + 1
             ends = np.sort(chains.vertices, axis=1)
-            is_held = np.isin(ends[:, 0] * n + ends[:, 1], held[:, 0] * n + held[:, 1])
-            is_loose[chains.chain[is_held]] = False
+            is_fixed = np.isin(ends[:, 0] * n + ends[:, 1], fixed[:, 0] * n + fixed[:, 1])
+            is_loose[chains.chain[is_fixed]] = False
         return np.flatnonzero(is_loose)
 
     def _translations(self) -> ComplexArray:
