@@ -39,7 +39,7 @@ def as_input(mesh: Any, faces: ArrayLike | None = None) -> InputMesh:
     if faces is not None:
         if isinstance(mesh, (str, PathLike)) or hasattr(mesh, "faces"):
             raise ArrayShapeError(
-                "a mesh or file already has faces: leave out the argument faces, or give vertices (n, 3)"
+                "a mesh or file already has faces: leave out faces, or give vertices (n, 3)"
             )
         return InputMesh(mesh, faces)
     if isinstance(mesh, (str, PathLike)):

@@ -120,7 +120,7 @@ class TestJoining:
         assert set(used[merged[[5, 40, 80]]].tolist()) <= set(found["cone_vertices"])
         one = int(merged[0])
         done = run("flatten", path, "--cones", f"{one},{int(used[one])},7")
-        assert "lie at the same place" in str(done.exception)
+        assert "have the same position" in str(done.exception)
 
 
 class TestRepair:
