@@ -276,7 +276,7 @@ def test_meshes_of_other_packages():
     flat_mesh = meshio.Mesh(flat[:, :2], [("quad", quads)])
     assert len(flatten(flat_mesh).faces) == 4
     for broken in ([-1, 0, 1], [3, 0, 1, 2, 4, 0, 1, 2], [0, 3, 0, 1, 2]):
-        with pytest.raises(errors.ArrayShapeError, match="flat array of faces is broken at"):
+        with pytest.raises(errors.ArrayShapeError, match="flat array of faces is invalid at"):
             flatten(type("PolyData", (), {"points": vertices, "faces": np.array(broken)})())
     with pytest.raises(errors.ArrayShapeError, match="cannot read a mesh from int"):
         flatten(3)

@@ -209,7 +209,7 @@ class TestFormats:
         ("text", "message"),
         [
             (SQUARE + "f 1 2 3\n", "has no UV coordinates"),
-            (SQUARE + "f 1/1 2/2 3/3\n", "numbers UV coordinates, but does not hold them"),
+            (SQUARE + "f 1/1 2/2 3/3\n", "refers to UV coordinates, but does not contain them"),
             (SQUARE + "vt nan 1\nf 1/1 2/1 3/1\n", "none of 1 triangle has finite UVs"),
         ],
     )
@@ -221,7 +221,7 @@ class TestFormats:
         vertices, faces = shapes.hill(3, 3)
         with pytest.raises(errors.MissingUVError, match="corner_uv"):
             measure_uv(vertices, faces)
-        with pytest.raises(errors.ArrayShapeError, match=r"\(18, 3, 2\), not \(18, 2\)"):
+        with pytest.raises(errors.ArrayShapeError, match=r"\(18, 3, 2\), got \(18, 2\)"):
             measure_uv(vertices, faces, np.zeros((18, 2)))
         with pytest.raises(errors.ArrayShapeError, match="cannot read UVs from int"):
             measure_uv(7)

@@ -267,7 +267,7 @@ class TestGlue:
         piece[torn.corners] = chart[:, None]
         places = torn.places * np.exp(1j * piece) + 3 * piece
         scattered = ChartLayout(np.stack([places.real, places.imag], axis=1), torn.corners, chart)
-        layout = glue_charts(disk, scattered, lengths_of(disk)).numbered_anew()
+        layout = glue_charts(disk, scattered, lengths_of(disk)).renumbered()
         assert layout.chart.max() == 0
         assert len(layout.points) == len(disk.vertices)
         assert overlapping(layout) == 0

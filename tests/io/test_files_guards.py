@@ -85,7 +85,7 @@ class TestGltf:
     def test_names_that_are_no_text(self):
         make = square()
         make.tree["nodes"] = [{"mesh": 0, "name": 1.5}]
-        refused(make.glb(), "a.glb", "the name of number 0 of its nodes is 1.5, no text")
+        refused(make.glb(), "a.glb", "the name of nodes 0 is 1.5, not a string")
 
     @pytest.mark.parametrize(
         ("place", "value", "match"),
@@ -96,30 +96,34 @@ class TestGltf:
             (("accessors", 0, "byteOffset"), 2**62, "of the 48 bytes"),
             (("accessors", 0, "componentType"), 5130, "unknown type"),
             (("accessors", 0, "type"), "VEC2", "not 3"),
-            (("accessors", 0, "bufferView"), 7, "7 is none of its 2 bufferViews"),
-            (("accessors", 1, "componentType"), 5126, "holds no indices"),
+            (("accessors", 0, "bufferView"), 7, "7 is not one of its 2 bufferViews"),
+            (("accessors", 1, "componentType"), 5126, "does not contain indices"),
             (("bufferViews", 0, "byteOffset"), 10**12, "ends at"),
             (("bufferViews", 0, "byteLength"), 10**12, "ends at"),
-            (("bufferViews", 0, "byteStride"), 0, "lie over each other"),
+            (("bufferViews", 0, "byteStride"), 0, "overlap"),
             (("bufferViews", 0, "byteStride"), 200, "ends at"),
-            (("bufferViews", 0, "buffer"), 1, "1 is none of its 1 buffers"),
+            (("bufferViews", 0, "buffer"), 1, "1 is not one of its 1 buffers"),
             (("bufferViews", 1), [], "is not an object"),
-            (("meshes", 0, "primitives", 0, "attributes", "POSITION"), "x", "x is none of its 2 accessors"),
+            (
+                ("meshes", 0, "primitives", 0, "attributes", "POSITION"),
+                "x",
+                "x is not one of its 2 accessors",
+            ),
             (("meshes", 0, "primitives", 0, "attributes", "NORMAL"), 1, "has NORMAL for|not 3"),
             (("meshes", 0, "primitives", 0, "attributes"), [], "'attributes' is not an object"),
             (("meshes", 0, "primitives", 0, "attributes"), None, "no faces"),
-            (("meshes", 0, "primitives", 0, "indices"), 0, "holds no indices"),
-            (("meshes", 0, "primitives", 0, "targets"), [{"POSITION": 3}], "3 is none of its 2 accessors"),
+            (("meshes", 0, "primitives", 0, "indices"), 0, "does not contain indices"),
+            (("meshes", 0, "primitives", 0, "targets"), [{"POSITION": 3}], "3 is not one of its 2 accessors"),
             (("meshes",), {}, "'meshes' is not a list"),
-            (("nodes", 0, "mesh"), True, "True is none of its 1 meshes"),
-            (("nodes", 0, "matrix"), [1, 2], "not 16 numbers"),
-            (("nodes", 0, "scale"), ["a", 1, 1], "not 3 numbers"),
+            (("nodes", 0, "mesh"), True, "True is not one of its 1 meshes"),
+            (("nodes", 0, "matrix"), [1, 2], "must be 16 finite numbers"),
+            (("nodes", 0, "scale"), ["a", 1, 1], "must be 3 finite numbers"),
             (("nodes", 0, "children"), [0], "reached twice"),
-            (("scene",), 4, "4 is none of its 1 scenes"),
+            (("scene",), 4, "4 is not one of its 1 scenes"),
             (("asset", "version"), "1.0", "convert it to version 2.0"),
-            (("animations",), [{"samplers": [{"input": 9}]}], "9 is none of its 2 accessors"),
+            (("animations",), [{"samplers": [{"input": 9}]}], "9 is not one of its 2 accessors"),
             (("skins",), [7], "is not an object"),
-            (("images",), [{"bufferView": 9}], "9 is none of its 2 bufferViews"),
+            (("images",), [{"bufferView": 9}], "9 is not one of its 2 bufferViews"),
         ],
     )
     def test_broken_references_are_named(self, place, value, match):
@@ -135,14 +139,14 @@ class TestGltf:
         [
             (None, "no data"),
             ("gone.bin", "gone.bin: there is no such file"),
-            ("data:application/octet-stream;base64,AAA", "data URI of buffer 0 is broken"),
-            ("data:nothing", "data URI of buffer 0 is broken"),
+            ("data:application/octet-stream;base64,AAA", "data URI of buffer 0 is invalid"),
+            ("data:nothing", "data URI of buffer 0 is invalid"),
             ("data:;base64,AAAA", "has 3 of the"),
-            ("https://example.org/a.bin", "nothing is loaded from anywhere"),
+            ("https://example.org/a.bin", "remote files are not loaded"),
             ("%00", "embedded null|cannot be read|no such file"),
             (".", "is a folder"),
             ("/dev/zero", "not a file but a device"),
-            (17, "is not text"),
+            (17, "is not a string"),
         ],
     )
     def test_buffers_that_are_not_to_be_had(self, uri, match, tmp_path, monkeypatch):
@@ -166,7 +170,7 @@ class TestGltf:
         refused(make.glb(), "a.glb", rf"compressed \({name}\); save it without compression")
 
     def test_deep_json(self):
-        refused(b'{"a":' * 100_000, "a.gltf", "nested too deeply|JSON is broken")
+        refused(b'{"a":' * 100_000, "a.gltf", "nested too deeply|invalid JSON")
 
     def test_sparse_positions_are_those_meant(self):
         make = square()

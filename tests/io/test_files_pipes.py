@@ -79,7 +79,9 @@ def test_what_comes_from_a_pipe_goes_to_one(contents):
     assert not ran.stderr
 
 
-@pytest.mark.parametrize(("content", "reason"), [(b"", "nothing came in"), (b"hello\n", "- has no vertices")])
+@pytest.mark.parametrize(
+    ("content", "reason"), [(b"", "standard input is empty"), (b"hello\n", "- has no vertices")]
+)
 def test_what_is_no_mesh_is_refused(content, reason):
     ran = piped(content, "-", "-o", "-")
     assert ran.exit_code != 0

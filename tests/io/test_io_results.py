@@ -37,9 +37,13 @@ class TestReadingResults:
             ("uv", None, "holds no UVs: 'uv' is missing"),
             ("seams", None, "holds no result of coneflat: 'seams' is missing"),
             ("uv", np.zeros((4, 3)), r"'uv' has the shape \(4, 3\)"),
-            ("uv_faces", np.full((960, 3), 10**6), "'uv_faces' has indices beyond the 534 there are"),
+            (
+                "uv_faces",
+                np.full((960, 3), 10**6),
+                "'uv_faces' has indices outside the range of 534 elements",
+            ),
             ("uv_faces", np.full((960, 3), 0.5), "uv_faces"),
-            ("faces", np.full((960, 3), 525), "'faces' has indices beyond"),
+            ("faces", np.full((960, 3), 525), "'faces' has indices outside"),
             ("cones", np.array([525]), "cones"),
             ("seams", np.array([[0, 525]]), "seams"),
             ("face_origin", np.full(960, -1), "face_origin"),
@@ -139,7 +143,7 @@ class TestTargets:
 def test_what_is_no_path_is_refused_by_name(name):
     result = coneflat.flatten(*shapes.hill(4, 4))
     for call in (coneflat.read_mesh, coneflat.read_flattening, result.save, read_picture):
-        with pytest.raises(MeshFileError, match=f"not by {type(name).__name__}"):
+        with pytest.raises(MeshFileError, match=f"got {type(name).__name__}"):
             call(name)
 
 

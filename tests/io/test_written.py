@@ -9,7 +9,7 @@ import pytest
 import shapes
 
 from coneflat import flatten
-from coneflat.atlas.touch import snap_apart
+from coneflat.atlas.touch import round_safely
 from coneflat.errors import MeshFileError
 from coneflat.geometry.overlap import find_overlaps
 from coneflat.geometry.planar import signed_double_areas
@@ -142,7 +142,7 @@ def test_charts_that_touch_are_apart_in_single_precision():
     points = (points - points.min(axis=0)) / 7.0
     corners = np.array([[4 * k + i for i in row] for k in range(5) for row in ((0, 1, 2), (0, 2, 3))])
     assert len(find_overlaps(stored_in_glb(points), corners).pairs)
-    apart, _ = snap_apart(points, corners, stored_in_glb)
+    apart, _ = round_safely(points, corners, stored_in_glb)
     assert len(find_overlaps(apart, corners).pairs) == 0
     assert np.abs(apart - points).max() < 1e-6
     assert np.array_equal(stored_in_glb(apart), apart)

@@ -10,7 +10,7 @@ import shapes
 
 from coneflat import flatten
 from coneflat.apps.peers import flatten_by
-from coneflat.atlas.pack import whole_turns
+from coneflat.atlas.pack import turns_of_quantum
 from coneflat.errors import ArrayShapeError, FaceIndexError
 from coneflat.geometry import edge_lengths
 from coneflat.measure.distortion import measure
@@ -58,7 +58,7 @@ def test_charts_turn_by_parts_of_a_turn_that_are_multiples_of_the_quantum():
         (np.pi / 180, 15),
         (1.0, 1),
     ):
-        assert whole_turns(quantum) == turns
+        assert turns_of_quantum(quantum) == turns
 
 
 def test_sound_results_break_no_promise():

@@ -205,13 +205,13 @@ class TestCosts:
     @pytest.mark.parametrize(
         ("constraints", "message"),
         [
-            ({"hiding": np.inf}, "hiding must be a number from 0 to 10, not inf"),
+            ({"hiding": np.inf}, "hiding must be a number from 0 to 10, got inf"),
             (
                 {"vertex_weights": np.ones(3)},
-                r"vertex weights of seams must be 162 numbers, not of shape \(3,\)",
+                r"vertex weights of seams must be 162 numbers, got shape \(3,\)",
             ),
-            ({"edge_weights": np.zeros(480)}, "not all 0; they are 0 to 0"),
-            ({"edge_weights": np.full(480, -1.0)}, "they are -1 to -1"),
+            ({"edge_weights": np.zeros(480)}, "not all 0, got 0 to 0"),
+            ({"edge_weights": np.full(480, -1.0)}, "got -1 to -1"),
             ({"vertex_weights": np.full(162, np.nan)}, "must be finite"),
         ],
     )

@@ -1,4 +1,4 @@
-"""Charts in the plane: how they are split and glued, how they lie, and their places in a texture."""
+"""Charts in the plane: splitting and gluing them, orienting them, and packing them into a texture."""
 
 from .injective import separate_overlaps
 from .orient import orient_charts

@@ -15,20 +15,20 @@ from ..geometry.layers import open_sides
 from ..mesh.charts import both_sides, point_seams
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, label_components
 
-# Of the area, relative to the square of the extent: less is a line, but for rounding.
+# Area relative to the square of the extent. A chart below this is a line, up to rounding.
 NO_AREA = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Charts:
-    """m triangles of k charts.
+    """The m triangles of k charts.
 
     Attributes:
-        corners: (m, 3) as complex numbers u + iv.
-        chart: (m,) chart of each triangle, from 0.
-        count: k; every chart has a triangle.
-        edge_halfedges: (e, 2) the half-edges of each edge, see `TriangleMesh`, if the triangles are known to hang
-            together.
+        corners: (m, 3) corner positions as complex numbers u + iv.
+        chart: (m,) chart index of each triangle, from 0.
+        count: number of charts k; every chart has at least one triangle.
+        edge_halfedges: (e, 2) the half-edges of each edge, see `TriangleMesh`; None if the connectivity of the
+            triangles is not known.
     """
 
     corners: NDArray[np.complex128]
@@ -38,18 +38,18 @@ class Charts:
 
     @cached_property
     def areas(self) -> FloatArray:
-        """(m,) signed areas of the triangles."""
+        """Return (m,) the signed areas of the triangles."""
         one, two = self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0]
         return (np.conj(one) * two).imag / 2
 
     def sums(self, values: FloatArray) -> FloatArray:
-        """Return (k,) the sum of values of triangles over each chart."""
+        """Return (k,) the sum over each chart of (m,) values per triangle."""
         sums: FloatArray = np.bincount(self.chart, weights=values, minlength=self.count).astype(np.float64)
         return sums
 
     @cached_property
     def has_area(self) -> NDArray[np.bool_]:
-        """(k,) False for charts that are lines or points."""
+        """Return (k,) flags, False for charts that are degenerate to lines or points."""
         extent = np.zeros((2, self.count))
         for part, of in zip(extent, (self.corners.real, self.corners.imag), strict=True):
             low, high = np.full(self.count, np.inf), np.full(self.count, -np.inf)
@@ -71,7 +71,7 @@ class Charts:
     def moved(
         self, factors: NDArray[np.complex128], shifts: NDArray[np.complex128] | None = None
     ) -> FloatArray:
-        """Return (m, 3, 2) corners times the complex factor of each chart, plus its shift."""
+        """Return (m, 3, 2) the corners, multiplied by the complex factor (k,) of their chart, plus its shift (k,)."""
         moved = self.corners * factors[self.chart][:, None]
         if shifts is not None:
             moved += shifts[self.chart][:, None]
@@ -79,14 +79,18 @@ class Charts:
 
 
 def read_charts(corner_uv: ArrayLike, chart_of_triangle: ArrayLike | None) -> Charts:
-    """Return checked charts.
+    """Return validated charts.
+
+    Args:
+        corner_uv: (m, 3, 2) positions of the triangle corners.
+        chart_of_triangle: (m,) chart index of each triangle; None for a single chart.
 
     Raises:
         ArrayShapeError, NonFiniteError, OptionError: as in `pack_charts`.
     """
     uv = as_floats("corner_uv", corner_uv)
     if uv.ndim != 3 or uv.shape[1:] != (3, 2) or not len(uv):
-        raise ArrayShapeError(f"corner_uv has shape {uv.shape}, not (triangles, 3, 2)")
+        raise ArrayShapeError(f"corner_uv must have shape (triangles, 3, 2), got {uv.shape}")
     if not np.isfinite(uv).all():
         bad = np.flatnonzero(~np.isfinite(uv).all(axis=(1, 2)))
         raise NonFiniteError(f"{len(bad):,} triangles have no finite UVs, the first is {bad[0]}")
@@ -97,13 +101,13 @@ def read_charts(corner_uv: ArrayLike, chart_of_triangle: ArrayLike | None) -> Ch
         chart = np.asarray(chart_of_triangle)
     if chart.shape != (len(uv),) or chart.dtype.kind not in "iu":
         raise ArrayShapeError(
-            f"chart_of_triangle has shape {chart.shape} and type {chart.dtype}, not one integer for each "
-            f"of {len(uv):,} triangles"
+            f"chart_of_triangle must have one integer for each of {len(uv):,} triangles, got shape "
+            f"{chart.shape} and type {chart.dtype}"
         )
     triangles = np.bincount(chart) if chart.min() >= 0 and chart.max() < len(chart) else np.zeros(1)
     if not triangles.all():
         raise OptionError(
-            f"chart_of_triangle must count charts from 0 without gaps: it has {len(np.unique(chart)):,} different "
+            f"chart_of_triangle must number charts from 0 without gaps, got {len(np.unique(chart)):,} different "
             f"numbers from {chart.min()} to {chart.max()}"
         )
     charts = Charts(uv.view(np.complex128)[..., 0], chart.astype(np.int64), len(triangles))
@@ -112,7 +116,7 @@ def read_charts(corner_uv: ArrayLike, chart_of_triangle: ArrayLike | None) -> Ch
     if len(mirrored):
         raise OptionError(
             f"{len(mirrored):,} of {charts.count:,} charts are mirrored, the first is {mirrored[0]} "
-            f"with area {total[mirrored[0]]:.3g}: turn them over before they are packed"
+            f"with area {total[mirrored[0]]:.3g}: mirror them before packing"
         )
     return charts
 
@@ -122,8 +126,8 @@ class Outlines:
     """The outlines of k charts.
 
     Attributes:
-        sides: (s, 2) start and end of each side as complex numbers, in the order of the charts.
-        start: (k + 1,) the first side of each chart.
+        sides: (s, 2) start and end point of each side as complex numbers, sorted by chart.
+        start: (k + 1,) the index of the first side of each chart.
     """
 
     sides: NDArray[np.complex128]
@@ -133,11 +137,11 @@ class Outlines:
         return len(self.start) - 1
 
     def times(self, factors: NDArray[np.complex128]) -> Outlines:
-        """Return the outlines turned and scaled, each by its complex factor."""
+        """Return the outlines rotated and scaled, each by its complex factor in (k,)."""
         return Outlines(self.sides * np.repeat(factors, np.diff(self.start))[:, None], self.start)
 
     def points(self, chart: int) -> NDArray[np.complex128]:
-        """Return the ends of the sides of a chart."""
+        """Return the end points of the sides of a chart."""
         return self.sides[self.start[chart] : self.start[chart + 1]].ravel()
 
 
@@ -148,18 +152,19 @@ def find_outlines(
     count: int,
     is_open: BoolArray | None = None,
 ) -> Outlines:
-    """Return the outlines of charts; how often one winds around a point is how many triangles cover it.
+    """Return the outlines of charts; the winding number of an outline at a point counts the triangles that cover it.
 
-    Sides that run there and back between the same points cancel; what is left of interior ones, where the two
-    copies of a point differ by rounding, does no harm. Flipped triangles are turned back, so that what they
-    cover counts, too.
+    Two sides with opposite directions between the same points cancel. Interior sides whose two copies of a
+    point differ by rounding may remain; this is harmless. Flipped triangles are reversed, so that the area that
+    they cover also counts.
 
     Args:
-        corners: (m, 3) of the triangles.
+        corners: (m, 3) corner positions of the triangles as complex numbers.
         flipped: (m,) True for flipped triangles.
-        chart: (m,) chart of each triangle, below `count`. Every chart has a triangle.
+        chart: (m,) chart of each triangle, below `count`. Every chart has at least one triangle.
         count: number of charts.
-        is_open: (m, 3) the sides, from each corner on, that are not known to cancel in pairs; None for all.
+        is_open: (m, 3) True for the sides, each starting at its corner, that are not known to cancel in pairs; None
+            for all.
     """
     if flipped.any():
         corners = np.where(flipped[:, None], corners[:, [0, 2, 1]], corners)
@@ -168,7 +173,7 @@ def find_outlines(
     sides = np.stack([corners[triangle, corner], corners[triangle, NEXT[corner]]], axis=1)
     same, balance = cancel_sides(sides, chart[triangle])
     kept[triangle, corner] = balance[same] != 0
-    # A chart all of whose sides cancel has no area: all its sides stand for it.
+    # If all sides of a chart cancel, it has no area: all its sides are used as the outline.
     kept |= (np.bincount(chart, weights=kept.any(axis=1), minlength=count) == 0)[chart][:, None]
     triangle, corner = np.nonzero(kept)
     order = np.argsort(chart[triangle], kind="stable")
@@ -179,13 +184,13 @@ def find_outlines(
 
 @dataclass(frozen=True, eq=False)
 class ChartLayout:
-    """A layout in charts, which have no points in common and may lie over each other.
+    """A layout split into charts, which share no points and may overlap each other.
 
     Attributes:
-        points: (u, 2) of the plane.
-        corners: (m, 3) index of a point for each triangle corner.
+        points: (u, 2) positions in the plane.
+        corners: (m, 3) point index of each triangle corner.
         chart: (m,) the chart of each triangle.
-        seams: edges of the mesh among which are all whose two sides have different points; None if that is not known.
+        seams: mesh edges that include every edge whose two sides have different points; None if unknown.
     """
 
     points: FloatArray
@@ -195,36 +200,36 @@ class ChartLayout:
 
     @property
     def places(self) -> NDArray[np.complex128]:
-        """(u,) the points as complex numbers."""
+        """Return (u,) the points as complex numbers."""
         return np.ascontiguousarray(self.points).view(np.complex128)[:, 0]
 
     def split(self, chart: IntArray) -> ChartLayout:
-        """Return the layout in other charts, parts of these, with points of their own."""
+        """Return the layout split into smaller charts, (m,) the chart of each triangle, with separate points."""
         keys = chart[:, None] * len(self.points) + self.corners
         used, corners = numbered(keys)
         return ChartLayout(self.points[used % len(self.points)], corners, chart)
 
     def joined(self, pairs: IntArray) -> ChartLayout:
-        """Return the layout with pairs of points (k, 2) made one, whichever has the smallest index."""
+        """Return the layout with pairs of points (k, 2) merged into the point with the smallest index."""
         return ChartLayout(
             self.points, same_points(len(self.points), pairs)[self.corners], self.chart, self.seams
         )
 
-    def numbered_anew(self) -> ChartLayout:
-        """Return the layout without unused points, charts counted from 0."""
+    def renumbered(self) -> ChartLayout:
+        """Return the layout without unused points and with charts numbered from 0."""
         used, corners = numbered(self.corners)
         chart = numbered(self.chart)[1]
         return ChartLayout(self.points[used], corners, chart, self.seams)
 
 
 def numbered(values: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the different values, upwards, and for each value its place among them."""
+    """Return the sorted distinct values, and the index of each value among them."""
     used, places = np.unique(values, return_inverse=True)
     return used, places.reshape(values.shape)
 
 
 def same_points(count: int, pairs: IntArray) -> IntArray:
-    """Return (count,) for each point the smallest of those that it is one with, by a chain of pairs (k, 2)."""
+    """Return (count,) for each point the smallest index among the points that pairs (k, 2) merge with it."""
     same = np.arange(count)
     used, index = np.unique(pairs, return_inverse=True)
     _, label = label_components(len(used), *index.reshape(-1, 2).T)
@@ -237,9 +242,9 @@ class Seams:
     """The inner edges whose two sides have different points.
 
     Attributes:
-        edges: (k,) of the mesh.
-        here, there: (k, 2) points at the ends of an edge, as the faces of its two half-edges have them.
-        charts: (k, 2) of these faces.
+        edges: (k,) edge indices in the mesh.
+        here, there: (k, 2) the points at the two ends of each edge, in the faces of its first and second half-edge.
+        charts: (k, 2) the charts of these two faces.
     """
 
     def __init__(self, mesh: TriangleMesh, layout: ChartLayout) -> None:
@@ -248,13 +253,16 @@ class Seams:
         self.charts = layout.chart[mesh.edge_halfedges[self.edges] // 3]
 
     def within(self, *charts: int) -> IntArray:
-        """Return which of the edges have both sides in given charts."""
+        """Return the indices of the seam edges whose two sides are both in the given charts."""
         return np.flatnonzero(np.isin(self.charts, charts).all(axis=1))
 
     def coinciding(self, places: NDArray[np.complex128], chosen: IntArray, tolerance: float) -> IntArray:
-        """Return pairs of points (k, 2) at the ends of chosen edges whose sides lie on each other.
+        """Return (k, 2) pairs of points at the ends of chosen edges whose two sides coincide.
 
-        places: of all points. tolerance: relative to the length of the edge.
+        Args:
+            places: (u,) positions of all points as complex numbers.
+            chosen: indices of seam edges.
+            tolerance: largest distance of coinciding points, relative to the length of the edge.
         """
         here, there = places[self.here[chosen]], places[self.there[chosen]]
         gap = np.abs(here - there).max(axis=1, initial=0.0)
@@ -262,7 +270,7 @@ class Seams:
         return np.stack([self.here[chosen][same].ravel(), self.there[chosen][same].ravel()], axis=1)
 
     def stretches(self, mesh: TriangleMesh) -> IntArray:
-        """Return (k,) the stretch that each edge is part of: a chain between the same two charts, without branches."""
+        """Return (k,) the stretch of each edge: a chain of seam edges between the same two charts, without branches."""
         at = mesh.edges[self.edges].ravel()
         low, high = self.charts.min(axis=1), self.charts.max(axis=1)
         order = np.argsort(at, kind="stable")

@@ -1,7 +1,7 @@
-"""Charts glued together again where they fit.
+"""Gluing of charts along congruent seams.
 
 In a flat metric the two sides of a seam are congruent: a chart can be moved so that it continues another one across
-any seam between them. So what was split off where it was in the way may have its place elsewhere.
+any seam between them. A chart that was split off because it overlapped may therefore fit at another seam.
 """
 
 from __future__ import annotations
@@ -19,17 +19,18 @@ from ..geometry.planar import bounds, fill_bounds, signed_double_areas
 from ..mesh.connectivity import TriangleMesh
 from .charts import ChartLayout, Seams, same_points
 
-# Relative to the length of a seam edge: how far its two sides may be apart, moved together, to be glued.
+# Largest distance of the two sides of a seam edge, after they are aligned, at which they are glued; relative to the
+# length of the edge.
 CONGRUENCE_TOLERANCE = 1e-7
 
 
 def glue_charts(mesh: TriangleMesh, layout: ChartLayout, lengths: FloatArray) -> ChartLayout:
-    """Return a layout with fewer charts and shorter seams, of which none overlaps itself if none did before.
+    """Return a layout with fewer charts and shorter seams, without new self-overlaps of charts.
 
     Args:
         mesh: the mesh, whose faces are laid out.
         layout: its charts.
-        lengths: (e,) of the edges on the model: the longest seams are glued first.
+        lengths: (e,) edge lengths on the model; the longest seams are glued first.
     """
     seams = Seams(mesh, layout)
     layout = replace(layout, seams=seams.edges)
@@ -37,19 +38,19 @@ def glue_charts(mesh: TriangleMesh, layout: ChartLayout, lengths: FloatArray) ->
     layout = layout.joined(seams.coinciding(layout.places, inner, CONGRUENCE_TOLERANCE))
     if len(inner) == len(seams.edges):  # one chart
         return layout
-    refused: set[tuple[int, ...]] = set()
+    rejected: set[tuple[int, ...]] = set()
     gluing = _Gluing(mesh, layout)
-    # What is glued changes which seams are stretches of one.
-    while gluing.glue_longest(lengths, refused):
+    # Gluing changes which seam edges form one stretch.
+    while gluing.glue_longest(lengths, rejected):
         gluing = _Gluing(mesh, gluing.layout, gluing)
     return gluing.layout
 
 
 class _Gluing:
-    """Charts of a layout that are glued one by one, at the expense of what is near only."""
+    """The state of gluing charts one by one; each step costs time only for the charts involved."""
 
     def __init__(self, mesh: TriangleMesh, layout: ChartLayout, before: _Gluing | None = None) -> None:
-        """Start from a layout; `before` has led to it, and is done with."""
+        """Start from a layout; `before` is the state that led to it, whose arrays are reused."""
         self.seams, self.places = Seams(mesh, layout), layout.places
         between = np.flatnonzero(self.seams.charts[:, 0] != self.seams.charts[:, 1])
         stretches = _members(self.seams.stretches(mesh)[between], between)
@@ -66,13 +67,15 @@ class _Gluing:
 
     @property
     def layout(self) -> ChartLayout:
-        """What they are now."""
+        """The current layout."""
         return ChartLayout(_pairs(self.places), self.corners, self.chart, self.seams.edges)
 
-    def glue_longest(self, lengths: FloatArray, refused: set[tuple[int, ...]]) -> bool:
-        """Glue charts at their stretches of seam, the longest first, where they fit; return whether any did.
+    def glue_longest(self, lengths: FloatArray, rejected: set[tuple[int, ...]]) -> bool:
+        """Glue charts along stretches of seam where they fit, the longest first; return True if any were glued.
 
-        refused: stretches, with the sizes of their charts, at which they do not; added to.
+        Args:
+            lengths: (e,) edge lengths on the model.
+            rejected: stretches, with the sizes of their charts, at which gluing failed; extended in place.
         """
         glued = False
         total = np.array([lengths[self.seams.edges[members]].sum() for members in self.stretches])
@@ -86,16 +89,16 @@ class _Gluing:
                 len(self.faces[one]),
                 len(self.faces[other]),
             )
-            if one == other or key in refused:
+            if one == other or key in rejected:
                 continue
             if self._glue_at(members):
                 glued = True
             else:
-                refused.add(key)
+                rejected.add(key)
         return glued
 
     def _glue_at(self, members: IntArray) -> bool:
-        """Move the smaller of two charts to continue the other, if it fits there; return whether it does."""
+        """Move the smaller of two charts to continue the other if it fits there; return True if it does."""
         seams = self.seams
         here, there = self.places[seams.here[members]], self.places[seams.there[members]]
         longest = np.argmax(np.abs(here[:, 1] - here[:, 0]))
@@ -110,7 +113,7 @@ class _Gluing:
         before, self.places = self.places, self.places.copy()
         self.places[points] = (before[points] - there.mean()) * (turn / abs(turn)) + here.mean()
         pairs = seams.coinciding(self.places, seams.within(kept, moved), CONGRUENCE_TOLERANCE)
-        # To the last digit: both of a pair are to be one point.
+        # The points of a pair become one point, so they must be equal bit for bit.
         pairs = np.where(np.isin(pairs[:, :1], points), pairs[:, ::-1], pairs)
         self.places[pairs[:, 1]] = self.places[pairs[:, 0]]
         joined = same_points(len(before), pairs)
@@ -133,7 +136,7 @@ class _Gluing:
         return _pairs(self.places[self.corners[faces]])
 
     def _fits(self, kept: int, moved: int) -> bool:
-        """Whether a chart's triangles are positively oriented in their new places, and overlap none of the other's."""
+        """Return True if the moved chart's triangles are positively oriented and do not overlap the other chart."""
         corners = self._corners(self.faces[moved])
         if not (signed_double_areas(corners) > 0).all():
             return False
@@ -149,19 +152,19 @@ class _Gluing:
 
 
 def _members(label: IntArray, numbers: IntArray) -> list[IntArray]:
-    """Return the numbers that have each label."""
+    """Return a list with, for each label, the numbers that have it."""
     return np.split(numbers[np.argsort(label, kind="stable")], np.cumsum(np.bincount(label))[:-1])
 
 
 def _pairs(places: NDArray[np.complex128]) -> FloatArray:
-    """Return complex numbers as pairs of their parts, along a last axis more."""
+    """Return complex numbers as pairs of real and imaginary part, along an additional last axis."""
     parts: FloatArray = np.ascontiguousarray(places).view(np.float64).reshape(*places.shape, 2)
     return parts
 
 
 @compiled
 def with_points(corners: IntArray, chosen: IntArray, is_wanted: BoolArray) -> IntArray:
-    """Return those of the chosen triangles, by their corners (m, 3), that have one of the wanted points (u,)."""
+    """Return the chosen triangles that have a wanted point; corners are (m, 3), is_wanted is (u,)."""
     found, count = np.empty(len(chosen), np.int64), 0
     for f in chosen:
         if is_wanted[corners[f, 0]] or is_wanted[corners[f, 1]] or is_wanted[corners[f, 2]]:
@@ -174,7 +177,7 @@ def with_points(corners: IntArray, chosen: IntArray, is_wanted: BoolArray) -> In
 def touches(
     low: FloatArray, high: FloatArray, chosen: IntArray, least: FloatArray, most: FloatArray
 ) -> BoolArray:
-    """Return which of the chosen boxes from `low` to `high` (m, 2) touch the one from `least` to `most`."""
+    """Return flags for the chosen boxes, from `low` to `high` (m, 2), that touch the box from `least` to `most`."""
     found = np.empty(len(chosen), np.bool_)
     for i in range(len(chosen)):
         f = chosen[i]

@@ -1,4 +1,4 @@
-"""Charts without overlaps, as few as there can be."""
+"""Splitting of a layout into few charts that do not overlap themselves."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .charts import ChartLayout, Seams
 from .glue import glue_charts
 from .split import as_disk, split_overlaps, unpinched
 
-# Parts of the area that charts should have at least. Where the cheapest cuts leave several charts, costlier ones that
-# leave larger pieces may leave fewer.
-LEAST_PARTS = (0.0, 0.002, 0.01)
-# On larger meshes, triangles, only where there are slivers.
+# Minimum areas of a chart to try, as fractions of the total area. Where the cheapest cuts leave several charts,
+# costlier cuts with larger pieces may leave fewer.
+MIN_CHART_AREAS = (0.0, 0.002, 0.01)
+# Number of triangles above which the larger minimum areas are tried only if there are slivers.
 LARGE_TRIANGLES = 50_000
-# Where so many charts are split off, larger pieces are tried first: most would only have to be glued on again.
-LARGEST_FIRST_CHARTS = 64
-# Below this part of the area a chart is a sliver.
+# Number of charts at which splitting stops and the next minimum area is tried: most charts would be glued on again.
+MAX_SMALL_CHARTS = 64
+# A chart below this fraction of the area is a sliver.
 SLIVER_AREA = 0.001
 
 
@@ -36,15 +36,15 @@ def injective_charts(
 ) -> ChartLayout:
     """Return a layout of a connected mesh in charts that do not overlap themselves.
 
-    What overlaps is split off by the cheapest cuts, and what was split off is glued on where it fits. Charts are
-    not moved apart.
+    Overlapping layers are separated by the cheapest cuts, and the pieces are glued to other charts where they fit.
+    Different charts may still overlap each other.
 
     Args:
         mesh: the mesh.
-        points: (u, 2) of the plane, at the mesh's scale.
-        corners: (m, 3) the point of each triangle corner; one disk.
-        lengths: (e,) of the edges, which cuts and seams cost.
-        disk: a mesh whose faces are the corners, with a vertex for each point, if there is one.
+        points: (u, 2) positions in the plane, at the mesh's scale.
+        corners: (m, 3) point index of each triangle corner; the triangles form one disk.
+        lengths: (e,) costs of cutting the edges.
+        disk: a mesh whose faces are the corners, with a vertex for each point; None to compute it.
     """
     whole = ChartLayout(points, corners, np.zeros(len(corners), dtype=np.int64))
     places = rows_of(points, corners)
@@ -53,18 +53,18 @@ def injective_charts(
     # An inverted triangle cannot be separated from its neighbours.
     pairs = pairs[(areas[pairs] > 0).all(axis=1)]
     if not len(pairs):
-        return glue_charts(mesh, whole, lengths).numbered_anew()
+        return glue_charts(mesh, whole, lengths).renumbered()
     disk = as_disk(points, corners) if disk is None else unpinched(disk.moved_to(points))
     found: list[tuple[tuple[int, int, float], int, ChartLayout]] = []
-    for part in LEAST_PARTS:
-        least = part * float(np.abs(areas).sum())
-        most = LARGEST_FIRST_CHARTS if part < LEAST_PARTS[-1] else np.inf
+    for share in MIN_CHART_AREAS:
+        least = share * float(np.abs(areas).sum())
+        most = MAX_SMALL_CHARTS if share < MIN_CHART_AREAS[-1] else np.inf
         chart = split_overlaps(
             points, corners, lengths[mesh.halfedge_edges], np.abs(areas), pairs, least, most, disk
         )
         if chart is None:
             continue
-        layout = glue_charts(mesh, whole.split(chart), lengths).numbered_anew()
+        layout = glue_charts(mesh, whole.split(chart), lengths).renumbered()
         rank = _rank(mesh, layout, np.abs(areas), lengths)
         found.append((rank, len(found), layout))
         if rank[1] == 1 or (not rank[0] and len(corners) > LARGE_TRIANGLES):
@@ -75,19 +75,22 @@ def injective_charts(
 def _rank(
     mesh: TriangleMesh, layout: ChartLayout, areas: FloatArray, lengths: FloatArray
 ) -> tuple[int, int, float]:
-    """Return the number of slivers, that of charts, and the length of seams."""
+    """Return the number of slivers, the number of charts, and the length of seams; smaller is better."""
     sizes = np.bincount(layout.chart, weights=areas)
     slivers = int((sizes < SLIVER_AREA * sizes.sum()).sum())
     return slivers, len(sizes), float(lengths[Seams(mesh, layout).edges].sum())
 
 
 def separate_overlaps(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout:
-    """Return the layout split, as little as can be, into charts that do not overlap themselves.
+    """Return the layout split into few charts that do not overlap themselves.
 
     Args:
-        layout: in one chart.
-        costs: (e,) of cutting edges.
-        spec: which edges to avoid.
+        layout: a layout in one chart.
+        costs: (e,) costs of cutting the edges.
+        spec: which edges to avoid and which are forbidden as cuts.
+
+    Returns:
+        The split layout, with a note if forbidden edges had to be cut.
     """
     mesh = layout.mesh
     costs = np.where(spec.is_avoided | spec.is_forbidden, costs + costs.sum(), costs)
@@ -104,6 +107,4 @@ def separate_overlaps(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layo
     )
     if not count:
         return separated
-    return separated.with_notes(
-        f"{plural(count, 'forbidden edge')} had to be cut, or charts would overlap themselves."
-    )
+    return separated.with_notes(f"{plural(count, 'forbidden edge')} had to be cut to separate overlaps.")

@@ -1,4 +1,4 @@
-"""How charts lie in the plane: the best angles to turn them to."""
+"""Orientation of charts in the plane: the angles by which they are rotated."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ def orient_charts(
     corners: ArrayLike | None = None,
     up: ArrayLike | None = None,
 ) -> FloatArray:
-    """Return (m, 3, 2) charts that lie straight, each turned about the origin and otherwise as it was.
+    """Return (m, 3, 2) charts aligned with the axes, each rotated about the origin without other changes.
 
-    Where much of a chart's border is straight, as of boxes, most of it is parallel to the axes; otherwise the
-    rectangle of least area around the chart is. Without an up direction its long side lies along u and the heavier
-    half of the chart below; with one, of the four quarter turns the chart stands in that in which the surface rises
-    the most along v.
+    Where much of a chart's border is straight, as for boxes, most of it becomes parallel to the axes; otherwise the
+    rectangle of least area around the chart does. Without an up direction its long side is along u and the half of
+    the chart with more area is below. With an up direction, the chart is rotated by the multiple of a quarter turn
+    for which the surface rises the most along v.
 
     Args:
-        corner_uv: (m, 3, 2) the plane's point of every triangle corner, of any number of meshes.
-        chart_of_triangle: (m,) a number from 0 for each triangle; None for one chart.
+        corner_uv: (m, 3, 2) positions of the triangle corners in the plane, of any number of meshes.
+        chart_of_triangle: (m,) chart index of each triangle, from 0; None for one chart.
         corners: (m, 3, 3) the triangle corners in space; needed for an up direction.
-        up: (3,) the direction in space that should be v.
+        up: (3,) the direction in space that should map to v.
 
     Raises:
-        ArrayShapeError, NonFiniteError: arrays do not fit, or are not finite.
+        ArrayShapeError, NonFiniteError: the shape of an array is wrong, or its values are not finite.
         OptionError: a chart is mirrored, or `up` is not a direction, or is given without `corners`.
     """
     charts = read_charts(corner_uv, chart_of_triangle)
@@ -52,16 +52,17 @@ def orient_charts(
 
 
 def border_directions(outlines: Outlines) -> list[FloatArray]:
-    """Return the directions in which most of each chart's border is straight, see `straight_directions`."""
+    """Return for each chart the directions of the straight parts of its border, see `straight_directions`."""
     return [straight_directions(outlines.sides[start:stop]) for start, stop in pairwise(outlines.start)]
 
 
 def straight_angles(charts: Charts, outlines: Outlines, directions: list[FloatArray]) -> FloatArray:
-    """Return (k,) the angle that lays each chart straight, its heavier half below.
+    """Return (k,) the angle, radians, that aligns each chart with the axes, the half with more area below.
 
     Args:
-        charts, outlines: k of them.
-        directions: those of their borders.
+        charts: the k charts.
+        outlines: their outlines.
+        directions: for each chart the directions of its border, see `border_directions`.
     """
     angles = np.array([straight_angle(outlines.points(c), directions[c]) for c in range(charts.count)])
     turned = outlines.times(np.exp(1j * angles)).sides.imag.ravel()
@@ -73,26 +74,26 @@ def straight_angles(charts: Charts, outlines: Outlines, directions: list[FloatAr
 
 
 def straight_angle(points: ComplexArray, directions: FloatArray) -> float:
-    """Return the angle that turns the rectangle of least area around points straight, its long side along u.
+    """Return the angle, radians, that aligns the rectangle of least area around points, its long side along u.
 
-    One side of it lies along one of the directions; if there are none, along a side of the convex hull, as that of
-    the least of all does (Freeman and Shapira 1975).
+    One side of the rectangle is along one of the directions. If there are none, it is along a side of the convex
+    hull, as for the rectangle of least area overall (Freeman and Shapira 1975).
     """
     hull = convex_hull(points)
     if not len(directions):
         directions = np.angle(np.roll(hull, -1) - hull)
     width, height = _extents(hull, directions)
     area, longer = width * height, np.maximum(width, height)
-    # Of rectangles of equal area, as around many quadrilaterals, the longest.
+    # Among rectangles of equal area, as around many quadrilaterals, the longest is chosen.
     best = int(np.where(area <= area.min() * (1 + RELATIVE_TOLERANCE), longer, 0.0).argmax())
     return float(-directions[best] + (HALF_PI if height[best] > width[best] else 0.0))
 
 
 def square_angle(points: ComplexArray, directions: FloatArray) -> float:
-    """Return the angle that turns the smallest square around points straight, a side along one of the directions.
+    """Return the angle, radians, that aligns the smallest square around points with a side along one of the directions.
 
-    If there are none, it is the smallest of all. Between two angles at which the points that touch its sides change,
-    width and height are cosines, whose larger is smallest at an end, or where they are equal.
+    If there are no directions, it is the smallest square overall. Between two angles at which the points that touch
+    its sides change, width and height are cosines; their maximum is smallest at an end, or where they are equal.
     """
     hull = convex_hull(points)
     if len(directions):
@@ -109,7 +110,7 @@ def square_angle(points: ComplexArray, directions: FloatArray) -> float:
 
 
 def convex_hull(points: ComplexArray) -> ComplexArray:
-    """Return the corners of the convex hull, counterclockwise; the two ends if the points lie on a line."""
+    """Return the corners of the convex hull, counterclockwise; the two end points if the points are on a line."""
     points = np.unique(points)
     if len(points) == 1:
         return points
@@ -118,10 +119,10 @@ def convex_hull(points: ComplexArray) -> ComplexArray:
 
 
 def _spans(hull: ComplexArray, angles: FloatArray) -> ComplexArray:
-    """Return the vector from the hull's last corner to its first in each direction."""
+    """Return for each direction the vector from the hull's nearest corner to its farthest along that direction."""
     sides = np.roll(hull, -1) - hull
     start = np.angle(sides[0])
-    # Corner i + 1 is the farthest in directions between those a quarter turn before side i and side i + 1.
+    # Corner i + 1 is the farthest in the directions between a quarter turn before side i and before side i + 1.
     directions = np.maximum.accumulate(np.mod(np.angle(sides) - start, 2 * np.pi))
     directions[0] = 0.0
 
@@ -133,7 +134,7 @@ def _spans(hull: ComplexArray, angles: FloatArray) -> ComplexArray:
 
 
 def _extents(hull: ComplexArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the hull's extents along directions and across them."""
+    """Return the hull's extents along the directions and perpendicular to them."""
     axis = np.exp(1j * angles)
     width = (np.conj(axis) * _spans(hull, angles)).real
     height = (np.conj(1j * axis) * _spans(hull, angles + HALF_PI)).real
@@ -141,18 +142,18 @@ def _extents(hull: ComplexArray, angles: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def mean_rise(charts: Charts, corners: ArrayLike | None, up: ArrayLike) -> ComplexArray:
-    """Return (k,) the mean gradient of the height over the plane of each chart, times its area.
+    """Return (k,) for each chart the integral of the height gradient over the plane, as complex numbers.
 
-    The gradient is constant on a triangle; times its area it is a sum over the sides without a division.
+    The gradient is constant on a triangle; multiplied by the area it is a sum over the sides without a division.
     """
     direction = np.asarray(up, dtype=np.float64)
     if direction.shape != (3,) or not np.isfinite(direction).all() or not direction.any():
-        raise OptionError(f"up must be a direction, three numbers that are not all 0, not {up!r}")
+        raise OptionError(f"up must be a direction, three numbers that are not all 0, got {up!r}")
     if corners is None:
         raise OptionError("an up direction needs the corners of the triangles in space")
     positions = np.asarray(corners, dtype=np.float64)
     if positions.shape != (*charts.corners.shape, 3):
-        raise OptionError(f"corners have shape {positions.shape}, not {(*charts.corners.shape, 3)}")
+        raise OptionError(f"corners must have shape {(*charts.corners.shape, 3)}, got {positions.shape}")
     height = positions @ (direction / np.abs(direction).max())
     opposite = charts.corners[:, [2, 0, 1]] - charts.corners[:, [1, 2, 0]]
     rise = 0.5j * (height * opposite).sum(axis=1)
@@ -162,11 +163,11 @@ def mean_rise(charts: Charts, corners: ArrayLike | None, up: ArrayLike) -> Compl
 
 @compiled
 def fill_hull(points: FloatArray, hull: IntArray) -> int:
-    """Find the corners of a convex hull by monotone chains (Andrew 1979) and return their number.
+    """Fill in the corners of a convex hull by monotone chains (Andrew 1979) and return their number.
 
     Args:
-        points: (n, 2) different points, n > 1, sorted by their first coordinate and then the second.
-        hull: (n + 1,) filled with the corners, counterclockwise; only the two ends of points on a line.
+        points: (n, 2) distinct points, n > 1, sorted by their first coordinate and then the second.
+        hull: (n + 1,) filled with the indices of the corners, counterclockwise; of collinear points only the two ends.
     """
     count, last = 0, len(points) - 1
     for chain in range(2):

@@ -1,4 +1,4 @@
-"""Charts packed into a texture."""
+"""Packing of charts into a texture."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from .place import Packing, pack
 from .straight import HALF_PI, RELATIVE_TOLERANCE, along_axes
 
 ROTATIONS = ("any", "quarter", "none")
-# Angles that charts are tried at, times their number; many fill each other's gaps in quarter turns. And into how many
-# equal parts a turn may be divided.
+# MAX_PLACEMENTS limits the number of charts times the number of angles tried for each; for many charts quarter turns
+# are enough. MAX_TURNS is the largest number of equal parts into which a full turn is divided.
 MAX_PLACEMENTS, QUARTER_TURNS, MAX_TURNS = 480, 4, 16
 TILES_IN_A_ROW = 10
 
 
 @dataclass(frozen=True, eq=False)
 class Packed:
-    """k charts in a texture.
+    """The k charts in a texture.
 
     Attributes:
-        corner_uv: (m, 3, 2) the point of every triangle corner, in [0, 1]^2; tile i of several is
+        corner_uv: (m, 3, 2) position of every triangle corner, in [0, 1]^2; tile i of several is
             [i % 10, i % 10 + 1] x [i // 10, i // 10 + 1], which is UDIM 1001 + i.
         scale: UV units per unit of length on the surface, the same for all charts; if no areas were given, per unit of
-            the charts as given.
-        efficiency: area of the charts over that of the tiles. What a chart covers twice counts twice.
-        tile_of_chart: (k,) from 0.
-        angle_of_chart: (k,) that each chart was turned by, radians.
+            length of the input charts.
+        efficiency: area of the charts divided by the area of the tiles. Area that a chart covers twice counts twice.
+        tile_of_chart: (k,) tile index of each chart, from 0.
+        angle_of_chart: (k,) angle by which each chart was rotated, radians.
     """
 
     corner_uv: FloatArray
@@ -57,34 +57,37 @@ def pack_charts(
     rotate: str | int = "any",
     tiles: int = 1,
 ) -> Packed:
-    """Pack charts into a square texture as large as they go, or into several of one scale (UDIM tiles).
+    """Pack charts into a square texture at the largest possible scale, or into several at a common scale (UDIM tiles).
 
-    Every chart is turned, moved and scaled, and nothing else. Charts keep their order; those of several meshes
-    may be packed together.
+    Every chart is only rotated, translated and scaled. Charts keep their order; charts of several meshes may be
+    packed together.
 
     Args:
-        corner_uv: (m, 3, 2) points of the triangle corners, each chart anywhere in the plane.
-        chart_of_triangle: (m,) a number from 0 for each triangle; None for one chart.
-        areas: (m,) of the triangles on the surface, so that every chart is scaled to the same area per area of
-            surface; None to keep the scales that charts have to each other.
+        corner_uv: (m, 3, 2) positions of the triangle corners, each chart anywhere in the plane.
+        chart_of_triangle: (m,) chart index of each triangle, from 0; None for one chart.
+        areas: (m,) areas of the triangles on the surface, used to scale all charts to the same ratio of UV area to
+            surface area; None to keep the relative scales of the charts.
         resolution: texels along a side of the texture.
-        padding: texels between charts, at least.
-        margin: texels between charts and the border of the texture, at least; None for as many as `padding`.
-        rotate: "any" turns charts so that they fill the texture best, but those straight whose border is, see
-            `orient_charts`; "quarter" so that each lies straight, its long side along u or v; "none" leaves them as
-            they are. A integer turns each by a multiple of that part of a full turn: 4 by quarter turns from how
-            it lies; those whose border is straight only so that it is along the axes, or as near to them as it can be.
-            One chart alone is turned by "any" by at most an eighth of a turn, and by a number not at all.
-        tiles: number of textures to distribute charts over. A chart is not cut, so the largest limits the scale.
+        padding: minimum number of texels between charts.
+        margin: minimum number of texels between charts and the border of the texture; None for the same as `padding`.
+        rotate: "any" rotates charts to fill the texture best; charts with a straight border are aligned with the
+            axes, see `orient_charts`. "quarter" aligns each chart, its long side along u or v. "none" does not rotate
+            charts. An integer rotates each chart by a multiple of that fraction of a full turn, for example 4 by
+            quarter turns; charts with a straight border only so that the border is as parallel to the axes as
+            possible. A single chart is rotated by "any" by at most an eighth of a turn, and by an integer not at all.
+        tiles: number of textures to distribute charts over. Charts are not cut, so the largest chart limits the scale.
+
+    Returns:
+        The packed charts.
 
     Raises:
-        ArrayShapeError, NonFiniteError: arrays do not fit, or are not finite.
-        OptionError: charts are not numbered from 0 without gaps, one is mirrored, an option makes no sense, or so
-            much padding leaves no room for charts.
+        ArrayShapeError, NonFiniteError: the shape of an array is wrong, or its values are not finite.
+        OptionError: charts are not numbered from 0 without gaps, a chart is mirrored, an option is invalid, or the
+            padding leaves no space for charts.
 
     Notes:
-        The shapes of charts, not boxes around them, are placed on a grid, each where its top is lowest; orders and
-        angles are changed at random, always the same way, and kept where that helps.
+        The shapes of charts, not their bounding boxes, are rasterized on a grid and placed one after the other, each
+        where its top is lowest. Orders and angles are changed at random, with a fixed seed, and improvements are kept.
     """
     charts = read_charts(corner_uv, chart_of_triangle)
     margin = padding if margin is None else margin
@@ -100,19 +103,19 @@ def pack_known(
     rotate: str | int,
     tiles: int,
 ) -> Packed:
-    """Pack charts that have been read; see `pack_charts`."""
+    """Pack validated charts; see `pack_charts`."""
     _check(resolution, padding, margin, rotate, tiles)
     density = np.ones(charts.count) if areas is None else _densities(charts, areas)
     outlines = charts.outlines()
-    alone = charts.count == 1
-    as_given = rotate == "none" or isinstance(rotate, int) or (alone and rotate == "any")
+    is_single = charts.count == 1
+    as_given = rotate == "none" or isinstance(rotate, int) or (is_single and rotate == "any")
     directions = [np.empty(0)] * charts.count if rotate == "none" else border_directions(outlines)
     straight = np.zeros(charts.count) if as_given else straight_angles(charts, outlines, directions)
     frame = density * np.exp(1j * straight)
     outlines = outlines.times(frame)
-    room = 1.0 - 2.0 * margin / resolution
-    if alone:
-        packing = _alone(outlines, directions[0], rotate)
+    inner = 1.0 - 2.0 * margin / resolution
+    if is_single:
+        packing = _pack_single(outlines, directions[0], rotate)
     else:
         area = float(np.abs(charts.sums(charts.areas) * density**2).sum())
         finest = QUARTER_TURNS * min(max(MAX_PLACEMENTS // (QUARTER_TURNS * charts.count), 1), 6)
@@ -123,10 +126,10 @@ def pack_known(
         )
         angles = np.tile(np.arange(turns) * (2 * np.pi / turns), (charts.count, 1))
         allowed = along_axes(directions, straight, angles)
-        gap = padding / resolution / room
+        gap = padding / resolution / inner
         packing = pack(outlines, area, angles, allowed, gap, min(tiles, charts.count))
 
-    scale = room / (packing.side or 1.0)
+    scale = inner / (packing.side or 1.0)
     factors = scale * frame * np.exp(1j * packing.angle)
     border = (1 + 1j) * margin / resolution
     uv = charts.moved(factors, packing.shift * scale + border)
@@ -143,14 +146,14 @@ def pack_known(
 
 
 def _densities(charts: Charts, areas: ArrayLike) -> FloatArray:
-    """Return (k,) what each chart is scaled by, so that its area is that of the surface.
+    """Return (k,) the factor that scales each chart to its area on the surface.
 
-    Lines and points, and charts of no area on the surface, are scaled as the others are together.
+    Degenerate charts, and charts without area on the surface, get the mean factor of the others.
     """
     surface = as_floats("areas", areas)
     if surface.shape != charts.chart.shape:
         raise ArrayShapeError(
-            f"areas have shape {surface.shape}, not {charts.chart.shape}: one for each triangle"
+            f"areas must have shape {charts.chart.shape}, one for each triangle, got {surface.shape}"
         )
     if not np.isfinite(surface).all() or (surface < 0).any():
         raise NonFiniteError(
@@ -167,8 +170,8 @@ def _densities(charts: Charts, areas: ArrayLike) -> FloatArray:
     return densities
 
 
-def _alone(outlines: Outlines, directions: FloatArray, rotate: str | int) -> Packing:
-    """Return one chart in the middle of the smallest square around it, turned no more than it must be for that."""
+def _pack_single(outlines: Outlines, directions: FloatArray, rotate: str | int) -> Packing:
+    """Return the packing of a single chart, centred in its smallest enclosing square, with the least rotation."""
     angle = square_angle(outlines.points(0), directions) if rotate == "any" else 0.0
     angle -= HALF_PI * round(angle / HALF_PI)
     points = outlines.points(0) * np.exp(1j * angle)
@@ -181,20 +184,20 @@ def _alone(outlines: Outlines, directions: FloatArray, rotate: str | int) -> Pac
 def _check(resolution: int, padding: float, margin: float, rotate: str | int, tiles: int) -> None:
     for name, count in (("resolution", resolution), ("tiles", tiles)):
         if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or count < 1:
-            raise OptionError(f"{name} must be an integer from 1, not {shown(count)}")
+            raise OptionError(f"{name} must be a positive integer, got {shown(count)}")
     for name, texels in (("padding", padding), ("margin", margin)):
         is_number = isinstance(texels, (int, float, np.number)) and not isinstance(texels, bool)
         if not is_number or not 0 <= texels < math.inf:
-            raise OptionError(f"{name} must be a number of texels, 0 or more, not {shown(texels)}")
+            raise OptionError(f"{name} must be a number of texels, 0 or more, got {shown(texels)}")
     if isinstance(rotate, int) and not isinstance(rotate, bool):
         if not 1 <= rotate <= MAX_TURNS:
-            raise OptionError(f"rotate must be from 1 to {MAX_TURNS} turns, not {rotate}")
+            raise OptionError(f"rotate must be from 1 to {MAX_TURNS} turns, got {rotate}")
     elif not isinstance(rotate, str) or rotate not in ROTATIONS:
         raise OptionError(
             f"unknown rotate {shown(rotate)}: choose from {', '.join(ROTATIONS)}, or a number of turns"
         )
     if 2 * margin >= resolution:
-        raise OptionError(f"margins of {margin:g} texels leave nothing of a texture of {resolution} texels")
+        raise OptionError(f"margins of {margin:g} texels leave no space in a texture of {resolution} texels")
 
 
 def arrange_charts(
@@ -210,53 +213,54 @@ def arrange_charts(
     quantum: float | None = None,
     edge_halfedges: IntArray,
 ) -> Packed:
-    """Return charts packed into a texture.
+    """Return the charts of a flattening packed into a texture.
 
     Args:
-        corner_uv: (m, 3, 2) points of the triangle corners; those of a component are in one frame.
+        corner_uv: (m, 3, 2) positions of the triangle corners; those of a component are in one frame.
         chart: (m,) the chart of each triangle, from 0.
-        component: (k,) the component of each chart.
-        space: (m, 3, 3) the triangles' corners on the model; needed for an up direction only.
+        component: (k,) the connected component of each chart.
+        space: (m, 3, 3) the triangles' corners on the model; needed only for an up direction.
         resolution, padding, tiles: see `pack_charts`.
-        up: direction in space that is to be v; None to fill the texture best.
-        quantum: the charts of a component are turned against each other by multiples of this angle only, so that the
-            rotations between the sides of seams stay such multiples; None for any angle.
-        edge_halfedges: (e, 2) of the triangles' mesh, see `TriangleMesh`.
+        up: direction in space that should map to v; None to fill the texture best.
+        quantum: angle in radians; charts of a component are rotated relative to each other only by its multiples, so
+            that the rotations between the sides of seams stay such multiples. None for any angle.
+        edge_halfedges: (e, 2) the half-edges of each edge of the triangles' mesh, see `TriangleMesh`.
     """
 
     def read(corner_uv: FloatArray) -> Charts:
         return replace(read_charts(corner_uv, chart), edge_halfedges=edge_halfedges)
 
-    flat = _upright(corner_uv, chart)
+    flat = _unmirrored(corner_uv, chart)
     rotate: str | int = "any" if up is None else "none"
     if quantum is not None and len(component) > 1:
-        turns = whole_turns(quantum)
-        flat = _turned_together(read(flat), component, turns, space, up)
+        turns = turns_of_quantum(quantum)
+        flat = _rotated_together(read(flat), component, turns, space, up)
         rotate = turns if up is None else "none"
     elif up is not None:
         flat = orient_charts(flat, chart, corners=space, up=up)
     return pack_known(read(flat), None, resolution, padding, padding, rotate, tiles)
 
 
-def whole_turns(quantum: float) -> int:
-    """Return into how many equal parts a full turn can be divided, few enough to be tried, by multiples of an angle."""
+def turns_of_quantum(quantum: float) -> int:
+    """Return the largest number of equal turns, up to MAX_TURNS, whose angle is a multiple of the quantum (radians)."""
     parts = 2 * np.pi / quantum
     if abs(parts - round(parts)) > RELATIVE_TOLERANCE * parts:
         return 1
     return max(turns for turns in range(1, MAX_TURNS + 1) if round(parts) % turns == 0)
 
 
-def _turned_together(
+def _rotated_together(
     charts: Charts,
     component: IntArray,
     turns: int,
     space: FloatArray | None,
     up: tuple[float, float, float] | None,
 ) -> FloatArray:
-    """Return (m, 3, 2) the charts, one of each component straight, and the others turned as far as it.
+    """Return (m, 3, 2) the charts, with one of each component axis-aligned and the others rotated by the same angle.
 
-    It is the largest of those whose border is straight, or of all. With an up direction each chart is then turned by
-    that number of equal turns which brings it up best; where its border is straight, along the axes.
+    The aligned chart is the largest of those with a straight border, or of all. With an up direction each chart is
+    then rotated by the number of equal turns that brings its up direction closest to v; charts with a straight
+    border stay aligned with the axes.
     """
     outlines = charts.outlines()
     directions = border_directions(outlines)
@@ -276,15 +280,15 @@ def _turned_together(
 
 
 def _best_turn(rise: NDArray[np.complex128], allowed: BoolArray) -> FloatArray:
-    """Return (k,) which of t equal parts of a turn, of those allowed, brings each direction next to v, as an angle."""
+    """Return (k,) the allowed multiple of a t-th of a turn that rotates each direction closest to v, in radians."""
     turns = 2 * np.pi / allowed.shape[1] * np.arange(allowed.shape[1])
     height = np.where(allowed, (rise[:, None] * np.exp(1j * turns)).imag, -np.inf)
     angles: FloatArray = turns[height.argmax(axis=1)]
     return angles
 
 
-def _upright(flat: FloatArray, chart: IntArray) -> FloatArray:
-    """Return (m, 3, 2) charts, those flipped of which more area is flipped than not."""
+def _unmirrored(flat: FloatArray, chart: IntArray) -> FloatArray:
+    """Return (m, 3, 2) the charts; a chart with negative total area is mirrored."""
     is_mirrored = np.bincount(chart, weights=signed_double_areas(flat)) < 0
     if not is_mirrored.any():
         return flat

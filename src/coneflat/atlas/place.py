@@ -1,4 +1,4 @@
-"""The search for a tight packing: charts placed one after the other, in orders and at angles that are tried."""
+"""Search for a tight packing: charts are placed one after the other, in varying orders and at varying angles."""
 
 from __future__ import annotations
 
@@ -14,28 +14,31 @@ from ..base.progress import check_cancelled
 from ..errors import OptionError
 from .charts import Outlines
 
-# Columns of the grid at least, those that so many charts need, and cells of all tiles at most.
+# Minimum number of columns of the grid, columns per square root of the number of charts, and the maximum number of
+# cells of all tiles.
 MIN_COLUMNS, COLUMNS_PER_CHART, MAX_CELLS = 400, 24.0, 4_000_000
-# Changes that are tried, and work that ends them earlier, in comparisons of runs of cells: about a second.
+# Number of changes that are tried, and the work after which the search ends, in comparisons of runs of cells: about a
+# second.
 MAX_TRIES, MAX_WORK = 150, 40_000_000
-# So few charts may keep to the right, too, and one does in this part of the tries. Of more, that does harm.
-ASIDE_CHARTS, ASIDE_SHARE = 5, 0.3
-# Of more charts than GROUPED_CHARTS, those whose boxes differ by less than this factor count as alike.
+# Up to OFFSET_CHARTS charts, a chart may be forced to the right, which happens in this fraction of the tries. With more
+# charts this makes the packing worse.
+OFFSET_CHARTS, OFFSET_SHARE = 5, 0.3
+# With more charts than GROUPED_CHARTS, those whose boxes differ by less than this factor are treated as equal.
 GROUPED_CHARTS, GROUP_RATIO = 1000, 1.02
-# The grid is so much wider than charts without gaps would need, and than the longest of them; no round number, so that
-# simple charts do not end where cells do and leave it to rounding which cell is the last.
+# Width of the grid relative to the width that charts without gaps would need, and to the longest chart. It is not a
+# round number, so that simple charts do not end at cell borders, where rounding would decide which cell is the last.
 GRID_MARGIN = 1.2347
 
 
 @dataclass(frozen=True, eq=False)
 class Packing:
-    """Charts in square tiles.
+    """Placement of k charts in square tiles.
 
     Attributes:
-        side: of a tile, without its margins, in the unit of the outlines.
-        angle: (k,) that each chart is turned by, radians.
-        shift: (k,) that it is then moved by, as complex numbers.
-        tile: (k,) the tile that it is in.
+        side: side of a tile without its margins, in the unit of the outlines.
+        angle: (k,) angle by which each chart is rotated, radians.
+        shift: (k,) translation after the rotation, as complex numbers.
+        tile: (k,) the tile of each chart.
     """
 
     side: float
@@ -45,14 +48,14 @@ class Packing:
 
 
 class Masks(NamedTuple):
-    """j = k * t shapes, which are k charts at t angles each; every cell that a chart has a point in belongs to it.
+    """Rasterized shapes of k charts at t angles each, j = k * t in all; a shape has every cell that its chart touches.
 
     Attributes:
         cell: width of a cell, in the unit of the outlines.
-        angle: (j,) that the chart is turned by, radians; those of chart 0 come first.
-        low: (j,) lower left corner of the turned chart, which is that of the shape's lower left cell.
+        angle: (j,) angle by which the chart is rotated, radians; those of chart 0 come first.
+        low: (j,) lower left corner of the box of the rotated chart and of the shape's lower left cell.
         size: (j, 2) columns and rows.
-        runs: (r, 3) row, first and last column of cells in a row.
+        runs: (r, 3) runs of adjacent cells: row, first and last column.
         first: (j + 1,) the first run of each shape.
     """
 
@@ -65,17 +68,17 @@ class Masks(NamedTuple):
 
 
 def cover_charts(outlines: Outlines, angles: FloatArray, cell: float) -> Masks:
-    """Return the cells, of the given width, of charts turned by (k, t) angles."""
-    low, extent = turned_boxes(outlines, angles)
+    """Return the shapes of charts rotated by (k, t) angles, in radians, on a grid of the given cell width."""
+    low, extent = rotated_boxes(outlines, angles)
     size = np.column_stack([extent.real.ravel() // cell, extent.imag.ravel() // cell]).astype(np.int64) + 1
     runs, first = cover(outlines.sides, outlines.start, angles, low, size, cell)
     return Masks(cell, angles.ravel(), low.ravel(), size, runs, first)
 
 
-def turned_boxes(
+def rotated_boxes(
     outlines: Outlines, angles: FloatArray
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Return (k, t) lower left corners of the boxes around charts turned by angles, and their widths and heights."""
+    """Return (k, t) lower left corners and (k, t) extents, as complex numbers, of the boxes around rotated charts."""
     start, chart = 2 * outlines.start[:-1], np.repeat(np.arange(len(outlines)), 2 * np.diff(outlines.start))
     turned = outlines.sides.reshape(-1, 1) * np.exp(1j * angles)[chart]
     low, high = (
@@ -94,16 +97,16 @@ def cover(
     size: IntArray,
     cell: float,
 ) -> tuple[IntArray, IntArray]:
-    """Return the cells that a chart has a point in, at several angles, as runs (r, 3): row, first and last column.
+    """Return (r, 3) runs of the cells that rotated charts touch, and (j + 1,) the first run of each shape.
 
-    And (j + 1,) the first run of each shape.
+    A run is its row, its first and its last column.
 
     Args:
-        sides: (s, 2) ends of the sides of outlines.
+        sides: (s, 2) end points of the sides of outlines.
         start: (k + 1,) the first side of each chart.
-        angles: (k, t) that charts are turned by.
-        low: (k, t) lower left corner of the turned chart.
-        size: (j, 2) the columns and rows of cells from there.
+        angles: (k, t) angles by which charts are rotated, radians.
+        low: (k, t) lower left corner of the rotated chart.
+        size: (j, 2) number of columns and rows of cells from there.
         cell: width of a cell.
     """
     runs, found, first = np.empty((1024, 3), np.int64), 0, np.zeros(angles.size + 1, np.int64)
@@ -127,7 +130,7 @@ def cover(
             if y0 > y1:
                 x0, y0, x1, y1, sign = x1, y1, x0, y0, -1
             slope = (x1 - x0) / (y1 - y0) if y1 > y0 else 0.0
-            # The cells that the side runs through, and where rows of cell centres cross it.
+            # Mark the cells that the side passes through, and where it crosses the lines of cell centres.
             for row in range(max(int(y0), 0), min(int(y1), rows - 1) + 1):
                 a, b = x0, x1
                 if y1 > y0:
@@ -157,24 +160,24 @@ def cover(
     return runs[:found], first
 
 
-class Way(NamedTuple):
-    """How k charts are placed.
+class Plan(NamedTuple):
+    """The order in which k charts are placed, and restrictions on their placement.
 
     Attributes:
-        order: (k,) of the charts.
-        allowed: (j,) which shapes may be used.
-        aside: (k,) how far to the right a chart is at least, relative to the room beside it.
+        order: (k,) the charts in the order of placement.
+        allowed: (j,) True for the shapes that may be used.
+        offset: (k,) minimum column of a chart, as a fraction of the free columns next to it.
     """
 
     order: IntArray
     allowed: BoolArray
-    aside: FloatArray
+    offset: FloatArray
 
 
 class _Placed(NamedTuple):
-    """Charts placed in a way; the others are what `place_all` returns."""
+    """Charts placed by a plan; the other fields are what `place_all` returns."""
 
-    way: Way
+    plan: Plan
     height: int
     work: int
     chosen: IntArray
@@ -184,28 +187,31 @@ class _Placed(NamedTuple):
 def pack(
     outlines: Outlines, area: float, angles: FloatArray, allowed: BoolArray, gap: float, tiles: int
 ) -> Packing:
-    """Return a tight packing of charts, none mirrored or scaled, in square tiles.
+    """Return a tight packing of charts in square tiles, by rotations and translations alone.
 
-    Charts are placed one after the other on a grid, those in the largest boxes first, each where its top is lowest.
-    The order, and the angles that each may take, are changed at random, a little each time, and a change is kept if
-    the charts do not stand higher for it in tiles of a given width; once they stand no higher than wide, the width is
-    made smaller.
+    Charts are placed one after the other on a grid, those with the largest boxes first, each where its top is lowest.
+    The order and the allowed angles are changed at random, a little each time. A change is kept if it does not
+    increase the height of the packing in tiles of a given width; once the height is at most the width, the width is
+    reduced.
 
     Args:
-        outlines: of k charts.
-        area: of all charts, about.
-        angles: (k, t) radians, that charts are turned by.
-        allowed: (k, t) which of these angles a chart may be turned by, one at least.
-        gap: between charts, in units of the side of a tile, without its margins.
+        outlines: outlines of k charts.
+        area: approximate area of all charts.
+        angles: (k, t) candidate rotation angles, radians.
+        allowed: (k, t) True for the angles that a chart may take, at least one per chart.
+        gap: minimum distance between charts, relative to the side of a tile without its margins.
         tiles: number of tiles.
 
+    Returns:
+        The best packing found.
+
     Raises:
-        OptionError: the gap is too wide for so many charts.
+        OptionError: the gap is too wide for this number of charts.
     """
     rng = np.random.default_rng(0)
     columns = int(max(MIN_COLUMNS, COLUMNS_PER_CHART * (len(outlines) / tiles) ** 0.5))
     columns = min(columns, int((MAX_CELLS / tiles) ** 0.5))
-    _, extent = turned_boxes(outlines, angles)
+    _, extent = rotated_boxes(outlines, angles)
     extent = np.where(allowed, extent, complex(np.inf, np.inf))
     longest = float(np.maximum(extent.real, extent.imag).min(axis=1).max())
     side = GRID_MARGIN * max((area / tiles) ** 0.5, longest) or 1.0
@@ -215,16 +221,16 @@ def pack(
     group = np.arange(len(order))
     if len(order) > GROUPED_CHARTS:
         group = np.unique(np.log(box + side / columns) // np.log(GROUP_RATIO), return_inverse=True)[1].ravel()
-    start, width = Way(order, allowed.ravel(), np.zeros(len(order))), columns
+    start, width = Plan(order, allowed.ravel(), np.zeros(len(order))), columns
 
-    def fill(way: Way, width: int, limit: int) -> _Placed:
-        return _Placed(way, *place_all(way, group, masks, _reach(gap * width), tiles, width, limit))
+    def fill(plan: Plan, width: int, limit: int) -> _Placed:
+        return _Placed(plan, *place_all(plan, group, masks, _reach(gap * width), tiles, width, limit))
 
     while (best := fill(start, width, width)).height > width:
         width += width // 12 + 1
         if tiles * width**2 > 4 * MAX_CELLS:
             raise OptionError(
-                f"a gap of {100 * gap:.3g} % of the texture's width between {len(order):,} charts leaves no room for "
+                f"a gap of {100 * gap:.3g} % of the texture's width between {len(order):,} charts leaves no space for "
                 "them: use less padding, a higher resolution or more tiles"
             )
     last, least, step, work = best, int(longest / masks.cell) + 1, width // 16, 0
@@ -235,9 +241,9 @@ def pack(
         check_cancelled()
         limit = goal + goal // 4
         if last is best:
-            found = fill(best.way, goal, limit)
+            found = fill(best.plan, goal, limit)
         else:
-            found = fill(_changed(last.way, start.allowed, rng), goal, min(last.height, limit))
+            found = fill(_changed(last.plan, start.allowed, rng), goal, min(last.height, limit))
         work += found.work
         if found.height <= goal:
             best, last, width = found, found, goal
@@ -248,35 +254,35 @@ def pack(
             last = found
     tile, column, row = best.place.T
     shift = (column + 1j * row) * masks.cell - masks.low[best.chosen]
-    # Tiles end where charts do, and not where cells do.
+    # The tile is cropped to the charts, not to the cells.
     low, high = masks.low[best.chosen] + shift, masks.low[best.chosen] + extent.ravel()[best.chosen] + shift
     corner = complex(low.real.min(), low.imag.min())
     side = max(high.real.max() - corner.real, high.imag.max() - corner.imag)
     return Packing(min(side, width * masks.cell), masks.angle[best.chosen], shift - corner, tile)
 
 
-def _changed(way: Way, may: BoolArray, rng: np.random.Generator) -> Way:
-    """Return charts of which some change places in the order, and of which one or two may take other angles.
+def _changed(plan: Plan, permitted: BoolArray, rng: np.random.Generator) -> Plan:
+    """Return a randomly changed plan: some charts swapped in the order, and other angles allowed for one or two.
 
-    Of few, one or two keep to the right, by another part of the room there is.
+    With few charts, the offset of a chart may change too. permitted: (j,) the shapes that may be allowed.
     """
-    order, allowed, aside = (each.copy() for each in way)
+    order, allowed, offset = (each.copy() for each in plan)
     count = len(order)
-    turns = len(may) // count
+    turns = len(permitted) // count
     for one, two in (rng.random((int(3 * rng.random()), 2)) * count).astype(np.int64):
         order[[one, two]] = order[[two, one]]
     for chart in (rng.random(1 + int(2 * rng.random())) * count).astype(np.int64):
         shapes = slice(chart * turns, (chart + 1) * turns)
-        allowed[shapes] = may[shapes] & (rng.random(turns) < rng.choice([0.3, 0.6, 1.0]))
-    if count <= ASIDE_CHARTS and rng.random() < ASIDE_SHARE:
-        aside[int(rng.random() * count)] = rng.choice([0.0, rng.random(), 1.0])
-    return Way(order, allowed, aside)
+        allowed[shapes] = permitted[shapes] & (rng.random(turns) < rng.choice([0.3, 0.6, 1.0]))
+    if count <= OFFSET_CHARTS and rng.random() < OFFSET_SHARE:
+        offset[int(rng.random() * count)] = rng.choice([0.0, rng.random(), 1.0])
+    return Plan(order, allowed, offset)
 
 
 def _reach(gap: float) -> IntArray:
-    """Return (d,) how many columns away, or fewer, cells that are some rows apart are closer than the gap.
+    """Return (d,) for each distance in rows, the distance in columns up to which two cells are closer than the gap.
 
-    Points of two cells that are a rows and b columns apart are at least (a - 1, b - 1) apart.
+    Points of two cells at a distance of a rows and b columns differ by at least (a - 1, b - 1) cells.
     """
     rows = np.arange(int(np.ceil(gap)) + 1)
     across = np.sqrt(np.maximum(gap**2 - np.maximum(rows - 1, 0) ** 2, 0.0))
@@ -285,38 +291,38 @@ def _reach(gap: float) -> IntArray:
 
 @compiled
 def place_all(
-    way: Way, group: IntArray, masks: Masks, reach: IntArray, tiles: int, width: int, limit: int
+    plan: Plan, group: IntArray, masks: Masks, reach: IntArray, tiles: int, width: int, limit: int
 ) -> tuple[int, int, IntArray, IntArray]:
-    """Fill tiles of cells from below: each chart goes where its top is lowest, and leftmost there.
+    """Fill tiles of cells from below: each chart is placed where its top is lowest, and leftmost among these places.
 
     Args:
-        way: the order of charts, and what they may do.
-        group: (k,) charts of a group are so much alike that none is tried below where the one before was placed.
-        masks: the shapes of charts, as many of each.
-        reach: (d,) a cell is too near to another chart's if they are less than d rows apart, and `reach` of the
-            number of rows or fewer columns.
+        plan: the order of charts and the restrictions on their placement.
+        group: (k,) group of each chart; charts of a group are so similar that none is tried below the previous one.
+        masks: the shapes of charts, the same number for each chart.
+        reach: (d,) two cells of different charts are too close if their distance is less than d rows and at most
+            `reach[rows]` columns.
         tiles, width, limit: number of tiles, their columns, and the rows that may be used.
 
     Returns:
-        The rows used, limit + 1 if a chart has no place; the work done, in comparisons of runs of cells; (k,) the shape
-        of each chart; and (k, 3) its tile, and the column and row of its lower left cell.
+        The number of rows used, limit + 1 if a chart has no place; the work done, in comparisons of runs of cells; (k,)
+        the shape of each chart; and (k, 3) its tile, and the column and row of its lower left cell.
     """
-    size, runs, first, turns = masks.size, masks.runs, masks.first, len(masks.size) // len(way.order)
-    chosen, place = np.empty(len(way.order), np.int64), np.empty((len(way.order), 3), np.int64)
-    # For each cell the next taken one, itself included, and the first one after that which is free again.
+    size, runs, first, turns = masks.size, masks.runs, masks.first, len(masks.size) // len(plan.order)
+    chosen, place = np.empty(len(plan.order), np.int64), np.empty((len(plan.order), 3), np.int64)
+    # For each cell, the next occupied cell in its row, itself included, and the first free cell after that.
     taken = np.full((tiles, limit, width), width, dtype=np.int16)
     clear = np.full((tiles, limit, width), width, dtype=np.int16)
     floor = np.zeros((tiles, group.max() + 1), np.int64)
     top, work, far = 0, tiles * limit, len(reach) - 1
-    for c in way.order:
+    for c in plan.order:
         best, shape, tile, column, row = limit + 1, -1, 0, 0, 0
         for j in range(c * turns, (c + 1) * turns):
-            if not way.allowed[j] or size[j, 0] > width:
+            if not plan.allowed[j] or size[j, 0] > width:
                 continue
             own, right = runs[first[j] : first[j + 1]], width - size[j, 0]
             for t in range(tiles):
                 x, y, steps = find_lowest(
-                    taken[t], clear[t], own, int(way.aside[c] * right), right, floor[t, group[c]], best - size[j, 1]
+                    taken[t], clear[t], own, int(plan.offset[c] * right), right, floor[t, group[c]], best - size[j, 1]
                 )  # fmt: skip
                 work += steps
                 if y >= 0:
@@ -338,7 +344,7 @@ def place_all(
                     free = free if following == x + 1 else x + 1
                     following = x
                 taken[tile, y, x], clear[tile, y, x] = following, free
-            work += width // 50  # cells that are gone over in the time of a comparison
+            work += width // 50  # number of cells that are visited in the time of a comparison
     return top, work, chosen, place
 
 
@@ -346,9 +352,9 @@ def place_all(
 def find_lowest(
     taken: IntArray, clear: IntArray, runs: IntArray, left: int, right: int, low: int, above: int
 ) -> tuple[int, int, int]:
-    """Return the lowest place where a shape fits, and the work.
+    """Return the column and row of the lowest place where a shape fits, and the work.
 
-    The row is from `low` to below `above`, -1 if there is none, the column from `left` to `right`.
+    The column is from `left` to `right`, the row from `low` to below `above`, or -1 if the shape does not fit.
     """
     work, k = 0, 0
     for y in range(low, above):
@@ -357,7 +363,8 @@ def find_lowest(
             work += 1
             row, start = y + runs[k, 0], x + runs[k, 1]
             if taken[row, start] <= x + runs[k, 2]:
-                # Every place up to where this run has passed what it hit is out. It is the first to look at next time.
+                # Skip all columns at which this run hits the same occupied cells. The next place is tested with this
+                # run first.
                 x, fits = clear[row, start] - runs[k, 1], 0
             else:
                 fits += 1

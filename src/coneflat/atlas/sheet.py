@@ -1,8 +1,8 @@
-"""A disk of triangles that is cut to pieces, at the expense of what is near the cuts.
+"""A disk of triangles that is cut into pieces, in time that depends on the size of the smaller pieces.
 
 In the plane a minimum cut between two triangles, with lengths of edges as capacities, is a shortest path between the
-two parts of the border that lie between them (planar duality): no flow has to be computed. Most of what is cut off is
-small: neither the search for a cut nor what tells its sides apart goes over all triangles.
+two parts of the border that separate them (planar duality), so no flow has to be computed. Most pieces that are cut
+off are small: neither the search for a cut nor the labelling of its sides visits all triangles.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from ..mesh.connectivity import TriangleMesh
 
 
 class Sheet:
-    """A disk in pieces.
+    """A disk that is cut into pieces.
 
     Attributes:
         disk: the mesh, a topological disk.
-        costs: (3m,) positive, what it costs to cut the side opposite each corner, the same from both triangles.
+        costs: (3m,) positive cost of cutting the side opposite each corner, equal in both triangles of an edge.
         piece: (m,) the piece of each triangle.
     """
 
@@ -29,30 +29,32 @@ class Sheet:
         self.disk, self.costs = disk, costs
         self.piece = np.zeros(len(disk.faces), dtype=np.int64)
         self._sides = disk.halfedge_edges, disk.edge_halfedges
-        # Of each piece its first triangle, or one before it, and a half-edge on its border.
+        # For each piece a lower bound of its first triangle, and a half-edge on its border.
         self._first, self._start = [0], [int(disk.edge_halfedges[np.argmax(disk.is_boundary_edge), 0])]
         self._owner = np.full(len(disk.faces), -1, dtype=np.int64)
         self._is_cut = np.zeros(len(disk.edges), dtype=bool)
         self._edge_costs = costs[disk.edge_halfedges[:, 0]]
 
     def border(self, own: int) -> IntArray:
-        """Return (b,) the half-edges on the border of a piece in order, with the piece to the left."""
+        """Return (b,) the half-edges on the border of a piece in order, with the piece on their left."""
         around: IntArray = walk_border(*self._sides, self.piece, self._start[own])
         return np.roll(around, -int(np.argmin(self._sides[0][around])))
 
     def is_pinched(self, own: int) -> bool:
-        """Whether a piece touches itself in a point."""
+        """Return True if the border of a piece passes through a vertex more than once."""
         border = self.border(own)
         return len(np.unique(self.disk.ends_of(border)[0])) < len(border)
 
     def separate(self, own: int, one: BoolArray, other: BoolArray) -> list[int] | None:
-        """Cut a piece in two, or more, between two sets of its triangles; return these, by their first triangles.
-
-        None if each set, down to a single triangle, keeps the other from the border.
+        """Cut a piece between two sets of its triangles; return the new pieces, sorted by their first triangles.
 
         Args:
-            own: the piece, whose number one of the new ones keeps.
-            one, other: (m,) True for the triangles to be separated: two sets, connected each, without a common member.
+            own: the piece; one of the new pieces keeps its index.
+            one, other: (m,) True for the triangles to separate: two disjoint connected sets.
+
+        Returns:
+            Two or more pieces, or None if each set, even reduced to a single triangle, separates the other from the
+            border.
         """
         border = self.border(own)
         both = self._both_to_the_border(own, border // 3, one, other)
@@ -62,7 +64,7 @@ class Sheet:
         mark = np.where(one[border // 3], 1, np.where(other[border // 3], 2, 0))
         starts, ends = (self.disk.ends_of(sides)[0] for sides in _between(border, mark))
         cut = self._path(own, one, other, starts, ends)
-        ids, first, start = part_piece(
+        ids, first, start = split_piece(
             *self._sides, self.piece, own, cut, self._owner, self._is_cut, len(self._first), self._first[own]
         )
         if len(ids) < 2:
@@ -75,8 +77,8 @@ class Sheet:
         return found
 
     def _path(self, own: int, one: BoolArray, other: BoolArray, starts: IntArray, ends: IntArray) -> IntArray:
-        """Return the edges of the cheapest path inside a piece, from starts to ends, through neither of two sets."""
-        # What lies beyond a boundary comes last, and is in no piece.
+        """Return the edges of the cheapest path in a piece from starts to ends that avoids two sets of triangles."""
+        # The last entry is for the outside of the boundary, which is in no piece.
         kind = np.zeros(len(self.piece) + 1, dtype=np.uint8)
         kind[:-1] = np.where(one, 2, np.where(other, 3, self.piece == own))
         left, right = kind[self.disk.edge_faces.T]
@@ -91,13 +93,13 @@ class Sheet:
     def widened(
         self, own: int, one: BoolArray, other: BoolArray, areas: FloatArray, least: float
     ) -> tuple[BoolArray, BoolArray]:
-        """Return two sets of a piece's triangles, each with those nearest to it, and nearer than to the other.
+        """Return two sets of a piece's triangles, each extended by triangles that are closer to it than to the other.
 
         Args:
             own: the piece.
-            one, other: (m,) True for the sets.
-            areas: (m,) of the triangles.
-            least: the area that each is to have at least, if it can.
+            one, other: (m,) True for the triangles of the sets.
+            areas: (m,) areas of the triangles.
+            least: area up to which each set is extended, where possible.
         """
         disk, inside = self.disk, self._inside(own)
         a, b, c = (disk.vertices[disk.faces[:, corner]] for corner in range(3))
@@ -108,16 +110,16 @@ class Sheet:
         return grown(paths, one, areas, least), grown(paths, other, areas, least)
 
     def _inside(self, own: int) -> IntArray:
-        """Return (k, 2) the pairs of triangles of a piece that share an edge, by edges."""
+        """Return (k, 2) the pairs of triangles of a piece that share an edge, in the order of edges."""
         pairs = self.disk.edge_faces[~self.disk.is_boundary_edge]
         return pairs[(self.piece[pairs[:, 0]] == own) & (self.piece[pairs[:, 1]] == own)]
 
     def _both_to_the_border(
-        self, own: int, beside: IntArray, one: BoolArray, other: BoolArray
+        self, own: int, border: IntArray, one: BoolArray, other: BoolArray
     ) -> tuple[BoolArray, BoolArray] | None:
-        """Return two sets with a path from each to the border; of one around the other, a single triangle.
+        """Return two sets, each extended by a path to the border, or None if this is impossible.
 
-        beside: the triangles along the border.
+        A set that encloses the other is reduced to a single triangle. border: the triangles along the border.
         """
         for first, second in (
             (one, other),
@@ -125,27 +127,27 @@ class Sheet:
             (one, _single(other)),
             (_single(one), _single(other)),
         ):
-            wide = self._to_the_border(own, beside, first, second)
+            wide = self._to_the_border(own, border, first, second)
             if wide is None:
                 continue
-            wider = self._to_the_border(own, beside, second, wide)
+            wider = self._to_the_border(own, border, second, wide)
             if wider is not None:
                 return wide, wider
         return None
 
     def _to_the_border(
-        self, own: int, beside: IntArray, chosen: BoolArray, barred: BoolArray
+        self, own: int, border: IntArray, chosen: BoolArray, blocked: BoolArray
     ) -> BoolArray | None:
-        """Return chosen triangles, with the shortest path from them to the border if none of them is there.
+        """Return the chosen triangles, extended by the shortest path to the border if none of them is there.
 
-        None if there is no path that does not lead through those that are barred.
+        The result is None if every path leads through blocked triangles.
         """
-        if chosen[beside].any():
+        if chosen[border].any():
             return chosen
         inside = self._inside(own)
-        inside = inside[~barred[inside].any(axis=1)]
+        inside = inside[~blocked[inside].any(axis=1)]
         dual = MultiGraph(len(chosen), inside, np.ones(len(inside)))
-        free = beside[~barred[beside]]
+        free = border[~blocked[border]]
         paths = dual.shortest_paths(np.flatnonzero(chosen), free)
         nearest = free[np.argsort(paths.distance[free], kind="stable")[:1]]
         if not np.isfinite(paths.distance[nearest]).any():
@@ -156,7 +158,7 @@ class Sheet:
 
 
 def grown(paths: Paths, chosen: BoolArray, areas: FloatArray, least: float) -> BoolArray:
-    """Return chosen triangles with those nearest to them, and nearer than to others, up to an area."""
+    """Return (m,) the chosen triangles and those whose nearest source they are, up to a total added area `least`."""
     near = np.flatnonzero((paths.source >= 0) & chosen[paths.source])
     near = near[np.argsort(paths.distance[near], kind="stable")]
     before = np.cumsum(areas[near]) - areas[near]
@@ -166,18 +168,18 @@ def grown(paths: Paths, chosen: BoolArray, areas: FloatArray, least: float) -> B
 
 
 def _single(chosen: BoolArray) -> BoolArray:
-    """Return one of the chosen triangles alone."""
+    """Return (m,) flags with only the first of the chosen triangles."""
     first = np.zeros_like(chosen)
     first[np.argmax(chosen)] = True
     return first
 
 
 def _between(border: IntArray, mark: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the half-edges of the border whose tails lie between the sides marked 1 and those marked 2, and 2 and 1.
+    """Return the border half-edges with tails between the sides marked 1 and 2, and those between 2 and 1.
 
-    border: (b,) in order. mark: (b,).
+    border: (b,) half-edges in order. mark: (b,) mark of each, 0 for none.
     """
-    # Turned so that the sides marked 1 come last; as both sets are connected, they do not alternate.
+    # Rotate so that the sides marked 1 come last; as both sets are connected, the marks do not alternate.
     marked = np.flatnonzero(mark)
     turn = marked[np.flatnonzero((mark[marked] == 1) & (mark[np.roll(marked, -1)] == 2))[0]] + 1
     border, mark = np.roll(border, -turn), np.roll(mark, -turn)
@@ -187,7 +189,7 @@ def _between(border: IntArray, mark: IntArray) -> tuple[IntArray, IntArray]:
 
 @compiled
 def across(halfedge_edges: IntArray, edge_halfedges: IntArray, h: int) -> int:
-    """Return the half-edge on the other side of a half-edge, -1 on the boundary."""
+    """Return the twin of a half-edge, -1 on the boundary."""
     e = halfedge_edges[h]
     other: int = edge_halfedges[e, 1] if edge_halfedges[e, 0] == h else edge_halfedges[e, 0]
     return other
@@ -195,9 +197,9 @@ def across(halfedge_edges: IntArray, edge_halfedges: IntArray, h: int) -> int:
 
 @compiled
 def walk_border(halfedge_edges: IntArray, edge_halfedges: IntArray, piece: IntArray, start: int) -> IntArray:
-    """Return the half-edges on the border of a piece in order, from one of them on."""
+    """Return the half-edges on the border of a piece in order, beginning with `start`."""
     own, around = piece[start // 3], np.empty(0, np.int64)
-    for is_known in (False, True):  # how many they are, and then which
+    for is_known in (False, True):  # the first pass counts them, the second stores them
         count, h = 0, start
         while count == 0 or h != start:
             if is_known:
@@ -215,7 +217,7 @@ def walk_border(halfedge_edges: IntArray, edge_halfedges: IntArray, piece: IntAr
 
 @compiled
 def join_lists(parent: IntArray, head: IntArray, last: IntArray, after: IntArray, i: int, j: int) -> int:
-    """Make two sets one, with the triangles that wait in either; return its root."""
+    """Merge two sets and their queues of triangles; return the root of the merged set."""
     one, two = find_root(parent, i), find_root(parent, j)
     if unite(parent, one, two):
         kept, gone = min(one, two), max(one, two)
@@ -231,7 +233,7 @@ def join_lists(parent: IntArray, head: IntArray, last: IntArray, after: IntArray
 
 @compiled
 def append_to(head: IntArray, last: IntArray, after: IntArray, i: int, f: int) -> None:
-    """Let a triangle wait in a set."""
+    """Append triangle f to the queue of set i."""
     if head[i] < 0:
         head[i] = f
     else:
@@ -241,7 +243,7 @@ def append_to(head: IntArray, last: IntArray, after: IntArray, i: int, f: int) -
 
 
 @compiled
-def part_piece(
+def split_piece(
     halfedge_edges: IntArray,
     edge_halfedges: IntArray,
     piece: IntArray,
@@ -252,19 +254,19 @@ def part_piece(
     following: int,
     first: int,
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Part a piece along edges; return the pieces, the first triangle of each, and a half-edge on the border of each.
+    """Split a piece along edges; return the pieces, the first triangle of each, and a half-edge on the border of each.
 
-    From both sides of the edges sets of triangles grow, a triangle of each in turn, and become one where they meet.
-    When only one grows still it is the rest, and keeps the number of the piece, however large it is.
+    Sets of triangles grow from both sides of the edges, by one triangle each in turn, and are merged where they meet.
+    When a single set still grows, it is the remainder and keeps the index of the piece, so it is not fully visited.
 
     Args:
-        halfedge_edges, edge_halfedges: of the mesh.
-        piece: (m,) the piece of each triangle, changed.
-        own: the piece.
-        cut: the edges, between triangles of it.
-        owner, is_cut: (m,) -1 and (e,) False, scratch; on return again.
-        following: the number of the next new piece.
-        first: the first triangle of the piece, or one before it.
+        halfedge_edges, edge_halfedges: connectivity of the mesh, see `TriangleMesh`.
+        piece: (m,) the piece of each triangle, changed in place.
+        own: the piece to split.
+        cut: the edges, between triangles of the piece.
+        owner, is_cut: (m,) -1 and (e,) False, work arrays that are reset on return.
+        following: index of the next new piece.
+        first: a lower bound of the first triangle of the piece.
     """
     sets = 2 * len(cut)
     parent, head, last = np.arange(sets), np.full(sets, -1), np.full(sets, -1)

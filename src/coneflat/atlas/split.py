@@ -1,4 +1,4 @@
-"""A layout that overlaps itself split into charts: the layers of its overlaps, and the cheapest cuts between them."""
+"""Splitting of a layout that overlaps itself: layers of overlaps are separated by the cheapest cuts."""
 
 from __future__ import annotations
 
@@ -27,26 +27,29 @@ def split_overlaps(
     most: float = np.inf,
     whole: TriangleMesh | None = None,
 ) -> IntArray | None:
-    """Return (m,) the chart of each triangle, numbered from 0, so that no chart has both of a pair; None if too many.
+    """Return (m,) the chart of each triangle, from 0, such that no chart has both triangles of a pair.
 
-    The two layers of the largest overlap are separated by the cheapest cut, then those of the largest that is left in
-    each piece.
+    The two layers of the largest overlap are separated by the cheapest cut, then those of the largest remaining overlap
+    in each piece.
 
     Args:
-        points: (u, 2) of the plane.
-        corners: (m, 3) indices of points; the triangles of a connected disk.
-        costs: (3m,) positive, what it costs to cut the side opposite each corner.
-        areas: (m,) by which overlaps are compared.
-        pairs: (k, 2) of triangles to be separated, in lexicographic order.
-        least: the area that a chart should have at least.
-        most: the number of charts that are too many.
-        whole: what `as_disk` returns of all triangles, if that is known.
+        points: (u, 2) positions in the plane.
+        corners: (m, 3) indices of points; the triangles form a connected disk.
+        costs: (3m,) positive cost of cutting the side opposite each corner.
+        areas: (m,) areas of the triangles, by which overlaps are compared.
+        pairs: (k, 2) triangles to separate, in lexicographic order.
+        least: minimum area that a chart should have.
+        most: number of charts at which splitting stops.
+        whole: the result of `as_disk` for all triangles, if it is known.
+
+    Returns:
+        The charts, or None if `most` charts are not enough.
     """
     chart, count = np.zeros(len(corners), dtype=np.int64), 1
     if not len(pairs):
         return chart
     sheets = [_Sheet.of(as_disk(points, corners) if whole is None else whole, costs, areas)]
-    # Pieces of sheets, and the pairs in each.
+    # Pieces of sheets, with the pairs in each.
     waiting = [(sheets[0], 0, pairs)]
     while waiting and count < most:
         check_cancelled()
@@ -63,7 +66,7 @@ def split_overlaps(
             one, other = sheet.widened(own, one, other, sheet.areas, least)
         pieces = sheet.separate(own, one, other)
         if pieces is None:
-            # They stay together and overlap, which the measures show.
+            # The layers cannot be separated: the overlap remains and is reported by the measures.
             continue
         sheet.chart += [0] * (len(pieces) - 1)
         number = sheet.chart[own]
@@ -73,7 +76,7 @@ def split_overlaps(
             within = pairs[(sheet.piece[pairs] == piece).all(axis=1)]
             if len(within):
                 waiting.append((sheet, piece, within))
-    for sheet in sheets:  # what was opened comes after what it was part of
+    for sheet in sheets:  # an opened sheet comes after the sheet that it is a piece of
         chart[sheet.faces] = np.array(sheet.chart)[sheet.piece]
     return None if waiting else chart
 
@@ -82,9 +85,9 @@ class _Sheet(Sheet):
     """A sheet of some of the triangles.
 
     Attributes:
-        faces: (m,) which they are.
-        areas: (m,) of them.
-        chart: the number of the chart that each piece is.
+        faces: (m,) indices of the triangles.
+        areas: (m,) their areas.
+        chart: the chart index of each piece.
     """
 
     def __init__(
@@ -99,7 +102,7 @@ class _Sheet(Sheet):
         return cls(disk, costs, areas, np.arange(len(areas)), 0)
 
     def opened(self, own: int, pairs: IntArray) -> tuple[_Sheet, int, IntArray]:
-        """Return a piece that touches itself in a point as a sheet, opened there, with its pairs of triangles."""
+        """Return a pinched piece as a sheet cut open at its pinch points, its piece index, and its pairs."""
         members = np.flatnonzero(self.piece == own)
         disk = as_disk(self.disk.vertices, self.disk.faces[members])
         costs = self.costs.reshape(-1, 3)[members].ravel()
@@ -108,14 +111,14 @@ class _Sheet(Sheet):
 
 
 def as_disk(points: FloatArray, corners: IntArray) -> TriangleMesh:
-    """Return triangles of the plane as a mesh of their own, opened where they touch in a point only."""
+    """Return triangles of the plane as a separate mesh, cut open at pinch points."""
     is_used = np.zeros(len(points), dtype=bool)
     is_used[corners] = True
     return unpinched(TriangleMesh(points[is_used], (np.cumsum(is_used) - 1)[corners]))
 
 
 def unpinched(mesh: TriangleMesh) -> TriangleMesh:
-    """Return triangles of the plane opened where they touch in a point only."""
+    """Return a mesh in the plane cut open at pinch points, where triangles meet only in a point."""
     if np.count_nonzero(mesh.is_boundary_edge) == np.count_nonzero(mesh.is_boundary_vertex):
         return mesh
     inside = mesh.edge_halfedges[~mesh.is_boundary_edge]
@@ -126,9 +129,12 @@ def unpinched(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def largest_layers(pairs: IntArray, triangles: IntArray, areas: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return the layers of the region of which the smaller layer has the most area.
+    """Return the two layers, as triangle indices, of the overlap region whose smaller layer has the most area.
 
-    areas: (m,) of the triangles.
+    Args:
+        pairs: (k, 2) overlapping triangles, in lexicographic order.
+        triangles: (m, 3) vertex indices.
+        areas: (m,) areas of the triangles.
     """
     count, label = _label_ordered(pairs, triangles)
     kept, moved = pairs.ravel(), pairs[:, ::-1].ravel()
@@ -143,10 +149,10 @@ def largest_layers(pairs: IntArray, triangles: IntArray, areas: FloatArray) -> t
 
 
 def _label_ordered(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray]:
-    """Return how many parts the pairs form, each in both orders, and the part of each; numbered as in `_steps`.
+    """Return the number of components of the pairs in both orders, and the component of each, numbered as in `_steps`.
 
-    Which triangle is in which layer goes on with the overlap: a region has two parts, one in the other order, unless
-    it is wound up.
+    The assignment of triangles to layers continues along an overlap. A region therefore has two components, one for
+    each order, unless it winds around so that the layers are connected.
     """
     source, place = _steps(pairs, triangles)
     return label_components(
@@ -155,27 +161,27 @@ def _label_ordered(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray]
 
 
 def _layers(pairs: IntArray, members: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the first and second triangles of pairs, numbered as in `_steps`; of one pair if they share any."""
+    """Return the first and second triangles of pairs numbered as in `_steps`; those of one pair if they intersect."""
     kept, moved = pairs.ravel()[members], pairs.ravel()[members ^ 1]
     one, other = np.unique(kept), np.unique(moved)
     return (kept[:1], moved[:1]) if len(np.intersect1d(one, other)) else (one, other)
 
 
 def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """Return between which pairs an overlap goes on when its second triangle gives way to a neighbour.
+    """Return (s,), (s,) the pairs of an overlap that are adjacent: the second triangle is replaced by a neighbour.
 
-    Pair i is numbered 2i as it stands and 2i + 1 in the other order.
+    Pair i has number 2i in its given order and 2i + 1 in the other order.
     """
     if not len(pairs):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    # Numbered by themselves, as most triangles have no part in it.
+    # The triangles of pairs are renumbered, as most triangles are in no pair.
     chosen, index = np.unique(pairs, return_inverse=True)
     pairs, count = index.reshape(-1, 2), len(chosen)
     one, two = _neighbours(triangles[chosen])
     two = two[sort_by_counting(one, count)]
     degree = np.bincount(one, minlength=count)
     starts = np.cumsum(degree) - degree
-    # Every pair in both orders; the second triangle goes to each of its neighbours.
+    # Every pair in both orders; the second triangle moves to each of its neighbours.
     kept, moved = pairs.ravel(), pairs[:, ::-1].ravel()
     first, degree = starts[moved], degree[moved]
     source = np.repeat(np.arange(len(moved)), degree)
@@ -189,7 +195,7 @@ def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _neighbours(triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the triangles that share a side, two and two, each in both orders."""
+    """Return (s,), (s,) the pairs of triangles that share a side, each in both orders."""
     points, corner = np.unique(triangles, return_inverse=True)
     corners = corner.reshape(-1, 3)
     order, first = sort_pairs(corners.ravel(), corners[:, NEXT].ravel(), len(points))

@@ -1,4 +1,4 @@
-"""Straight runs of charts' borders, and how charts are turned to have most of them along the axes."""
+"""Straight runs of charts' borders, and the rotations that align most of them with the axes."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..base.compiled import compiled
 
 HALF_PI = np.pi / 2
-# A run is straight if it strays from the line between its ends by less than this part of its length: an arc of less
-# than 5 degrees is; so is a side of a box whose points are off by a thousandth of it.
+# A run is straight if its distance from the line between its ends is below this fraction of its length. This includes
+# arcs of less than 5 degrees, and a side of a box whose points are off by a thousandth of it.
 MAX_STRAY = 0.01
-# Of a run, the part at each end that is not asked for the direction: there it may turn into a rounded corner.
+# Fraction of a run at each end that is ignored for the direction: there it may bend into a rounded corner.
 END_SHARE = 1 / 8
-# Directions that differ by less, in radians, are the same. Of a smooth border at most a tenth or so lies in one.
+# Directions that differ by less, in radians, are the same. At most about a tenth of a smooth border is in one of them.
 SAME_DIRECTION = np.radians(1.5)
-# The part of a border that must lie in one direction, but for quarter turns: of an equilateral triangle and a hexagon
-# a third does, of a rim of 24 sides a sixth, of free forms up to 28 % and mostly 10 %.
+# Fraction of a border that must be in one direction, modulo quarter turns. It is a third for an equilateral triangle
+# and a hexagon, a sixth for a rim of 24 sides, up to 28 % and mostly 10 % for free forms.
 MIN_STRAIGHT_SHARE = 0.4
-# Lengths, areas and parts of a turn that differ by less, relatively, and angles that do, in radians, are the same but
-# for rounding.
+# Lengths, areas and fractions of a turn with a smaller relative difference, and angles with a smaller difference in
+# radians, are equal up to rounding.
 RELATIVE_TOLERANCE = 1e-6
 
 
 def straight_directions(sides: ComplexArray) -> FloatArray:
-    """Return the directions, radians in [0, pi / 2), in which most of a border is straight; none if too little is.
+    """Return the directions, radians in [0, pi / 2), of the straight parts of a border; none if too little is straight.
 
-    Directions at right angles count as one. There are several only where as much of the border lies in each, as of a
-    regular polygon.
+    Perpendicular directions count as one. Several directions are returned only if the same length of the border is in
+    each, as for a regular polygon.
 
     Args:
-        sides: (s, 2) start and end of each side of an outline, in any order.
+        sides: (s, 2) start and end of each side of an outline as complex numbers, in any order.
     """
     runs = straight_runs(sides)
     lengths, angles = np.abs(runs), np.mod(np.angle(runs), HALF_PI)
@@ -51,9 +51,9 @@ def straight_directions(sides: ComplexArray) -> FloatArray:
 
 
 def _middle_angle(runs: ComplexArray, near: float) -> float:
-    """Return the median direction, by length, of the runs that are nearly along one or across it.
+    """Return the median direction, weighted by length, of the runs nearly parallel or perpendicular to a direction.
 
-    So what is exactly straight is not turned by the little that some runs are off.
+    With the median, small deviations of some runs do not rotate a border that is otherwise exactly straight.
     """
     turned = runs * np.exp(-1j * near)
     off = np.angle(turned * 1j ** -np.round(np.angle(turned) / HALF_PI))
@@ -65,22 +65,22 @@ def _middle_angle(runs: ComplexArray, near: float) -> float:
 
 
 def _separate(angles: list[float]) -> FloatArray:
-    """Return angles modulo a quarter turn without those that are nearly the same as one before."""
+    """Return the angles, modulo a quarter turn, without those nearly equal to an earlier one."""
     kept: list[float] = []
     for angle in angles:
         off = [abs((angle - other + HALF_PI / 2) % HALF_PI - HALF_PI / 2) for other in kept]
-        if all(apart > SAME_DIRECTION for apart in off):
+        if all(angle_off > SAME_DIRECTION for angle_off in off):
             kept.append(angle)
     return np.array(kept)
 
 
 def along_axes(directions: list[FloatArray], turned: FloatArray, angles: FloatArray) -> BoolArray:
-    """Return (k, t) the angles by which charts may be turned: where a border is straight, to be nearest to the axes.
+    """Return (k, t) True for the angles that rotate a chart's straight border closest to the axes; all if it has none.
 
     Args:
-        directions: in which the border of each of k charts is straight, see `straight_directions`.
-        turned: (k,) what each chart is turned by already, radians.
-        angles: (k, t) to choose from.
+        directions: for each of k charts the directions of its straight border, see `straight_directions`.
+        turned: (k,) the angle by which each chart is already rotated, radians.
+        angles: (k, t) further rotation angles to choose from, radians.
     """
     allowed = np.ones(angles.shape, dtype=bool)
     for c, of_border in enumerate(directions):
@@ -92,10 +92,10 @@ def along_axes(directions: list[FloatArray], turned: FloatArray, angles: FloatAr
 
 
 def straight_runs(sides: ComplexArray) -> ComplexArray:
-    """Return (r,) the straight runs of a border, as vectors along their middle that are as long as they are.
+    """Return (r,) the straight runs of a border, as complex vectors with their length and their middle's direction.
 
-    Each curve of it is split where it is farthest from the line between its ends, and again, until what is left is
-    straight (Ramer 1972, Douglas and Peucker 1973).
+    Each curve of the border is split recursively at its farthest point from the line between its ends, until all
+    pieces are straight (Ramer 1972, Douglas and Peucker 1973).
     """
     points, number = np.unique(sides.ravel(), return_inverse=True)
     order, first = border_curves(number.reshape(-1, 2), len(points))
@@ -104,10 +104,10 @@ def straight_runs(sides: ComplexArray) -> ComplexArray:
 
 
 def _runs_of_curve(sides: ComplexArray) -> ComplexArray:
-    """Return the straight runs of one curve, whose sides follow one another."""
+    """Return the straight runs of one curve, whose sides are in order."""
     curve = sides[:, 0]
     if sides[-1, 1] == curve[0]:
-        # What is farthest from the middle is a corner of whatever has corners.
+        # If the curve has corners, the point farthest from the centre is one of them.
         begin = int(np.abs(curve - curve.mean()).argmax())
         curve = np.roll(curve, -begin)
     curve = np.append(curve, curve[0] if sides[-1, 1] == sides[0, 0] else sides[-1, 1])
@@ -125,12 +125,12 @@ def _runs_of_curve(sides: ComplexArray) -> ComplexArray:
 
 @compiled
 def split_curve(curve: FloatArray, stray: float, is_end: BoolArray) -> None:
-    """Mark where a curve is split into straight runs, its ends included.
+    """Mark the points at which a curve is split into straight runs, including its ends.
 
     Args:
         curve: (n, 2) its points.
-        stray: how far a run may be from the segment between its ends, relative to the segment.
-        is_end: (n,) all False; changed.
+        stray: largest distance of a run from the segment between its ends, relative to the segment's length.
+        is_end: (n,) all False on entry; filled with True at the splits.
     """
     stack = np.empty((len(curve), 2), dtype=np.int64)
     stack[0, 0], stack[0, 1] = 0, len(curve) - 1
@@ -156,12 +156,12 @@ def split_curve(curve: FloatArray, stray: float, is_end: BoolArray) -> None:
 
 
 def border_curves(sides: IntArray, count: int) -> tuple[IntArray, IntArray]:
-    """Return the sides of a border in the order of its curves, and the first side of each curve and their number.
+    """Return (s,) the sides of a border ordered along its curves, and (c + 1,) where each of the c curves begins.
 
-    Curves end where not exactly one side comes in and one goes out.
+    A curve ends at a point unless exactly one side ends and exactly one side starts there.
 
     Args:
-        sides: (s, 2) start and end of each.
+        sides: (s, 2) start and end point index of each side.
         count: number of points.
     """
     start, end = sides.T
@@ -176,13 +176,13 @@ def border_curves(sides: IntArray, count: int) -> tuple[IntArray, IntArray]:
 
 @compiled
 def follow_curves(following: IntArray, begins: BoolArray, order: IntArray, first: IntArray) -> int:
-    """Fill in sides curve by curve, and the first of each, and return the number of curves.
+    """Fill in the sides curve by curve and where each curve begins; return the number of curves.
 
     Args:
-        following: (s,) the side after each; -1 at an end.
-        begins: (s,) True where no side comes before; curves without such a side are closed.
-        order: (s,) filled.
-        first: (s + 1,) filled up to one more than the number of curves.
+        following: (s,) the side after each side; -1 at an end.
+        begins: (s,) True where a curve begins; curves without such a side are closed.
+        order: (s,) filled with the sides in order.
+        first: (s + 1,) filled with where each curve begins in `order`, and with s after the last.
     """
     done = np.zeros(len(following), dtype=np.bool_)
     found, curves = 0, 0

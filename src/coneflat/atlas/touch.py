@@ -1,7 +1,8 @@
-"""Triangles that only touch, and what rounding does to them: moved apart, or turned back, by as little as it needs.
+"""Repair of rounding errors in layouts: overlaps of touching triangles, and thin triangles flipped by rounding.
 
-Polyhedra unfold to charts that touch themselves along edges, and charts without padding touch each other. Turned and
-scaled, such edges may come to lie across each other by a digit; numbers of fewer digits turn thin triangles over.
+Polyhedra unfold to charts that touch themselves along edges, and charts without padding touch each other. After
+rotation and scaling, such edges may cross each other by a rounding error. Rounding to 32-bit numbers can flip thin
+triangles. Points are moved by as little as necessary.
 """
 
 from __future__ import annotations
@@ -16,28 +17,32 @@ from ..geometry.overlap import Overlaps, find_overlaps
 from ..geometry.planar import signed_double_areas
 from ..mesh.connectivity import NEXT
 
-# Of the extent of the layout: what overlaps by less touches, and is then moved by so much more than it overlaps.
+# Relative to the extent of the layout: triangles that overlap by less than TOUCHING_OVERLAP are touching, and are
+# separated to a distance of SEPARATING_GAP.
 TOUCHING_OVERLAP, SEPARATING_GAP = 1e-11, 2.0**-49
-# Of 32-bit numbers below 1: how far apart they are. Of points that are stored as such, what overlaps by less than
-# sixteen times that touches, and is moved by twice that more than it overlaps.
+# Spacing of 32-bit numbers below 1. Points stored as such are touching if they overlap by less than sixteen spacings,
+# and are separated to a distance of two spacings.
 SINGLE_SPACING = 2.0**-24
-# What is moved may touch something else then, and triangles that are turned back may turn others over.
+# Maximum number of repetitions: moved points may cause new overlaps, and repaired triangles may flip others.
 MAX_ROUNDS = 10
 
 
 def part_touching(
     points: FloatArray, corners: IntArray, stored: Callable[[FloatArray], FloatArray] | None = None
 ) -> tuple[FloatArray, Overlaps]:
-    """Return points of the plane at which triangles that touch do not overlap, and what overlaps nevertheless.
+    """Return points moved such that touching triangles do not overlap, and the remaining overlaps.
 
     Args:
-        points: (u, 2).
+        points: (u, 2) positions in the plane.
         corners: (m, 3) indices of points.
-        stored: rounds points to those that can be stored, as 32-bit numbers; None for doubles.
+        stored: rounds points to values that can be stored, such as 32-bit numbers; None for doubles.
+
+    Returns:
+        (u, 2) the points, and the overlaps that remain.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     extent = float((high - low).max())
-    touching, apart = (
+    touching, gap = (
         (TOUCHING_OVERLAP, SEPARATING_GAP) if stored is None else (16 * SINGLE_SPACING, 2 * SINGLE_SPACING)
     )
     if stored is not None:
@@ -45,7 +50,7 @@ def part_touching(
     best, found = points, find_overlaps(points, corners)
     overlaps = found
     for _ in range(MAX_ROUNDS):
-        moves = _moves(points @ np.array([1, 1j]), corners, overlaps.pairs, touching * extent, apart * extent)
+        moves = _moves(points @ np.array([1, 1j]), corners, overlaps.pairs, touching * extent, gap * extent)
         if not moves.any():
             break
         points = np.clip(points + np.stack([moves.real, moves.imag], axis=1), low, high)
@@ -58,20 +63,20 @@ def part_touching(
 
 
 def _moves(
-    places: NDArray[np.complex128], corners: IntArray, pairs: IntArray, touching: float, apart: float
+    places: NDArray[np.complex128], corners: IntArray, pairs: IntArray, touching: float, gap: float
 ) -> NDArray[np.complex128]:
-    """Return (u,) by what points are to be moved so that triangles that hardly overlap are apart.
+    """Return (u,) translations of points that separate touching triangles.
 
-    touching: what overlaps by less does so hardly. apart: by how much they are then to be apart.
+    touching: largest depth of an overlap that is separated. gap: distance of the triangles afterwards.
     """
     moves = np.zeros(len(places), dtype=np.complex128)
     if not len(pairs):
         return moves
     both = corners[pairs]
     across, depth = _least_depth(places[both])
-    hardly = depth < touching
-    both, across, move = both[hardly], across[hardly], depth[hardly] / 2 + apart
-    # Where they have a point in common, it stays.
+    is_touching = depth < touching
+    both, across, move = both[is_touching], across[is_touching], depth[is_touching] / 2 + gap
+    # Points that the two triangles share stay in place.
     shared = (
         (both[:, 0, :, None] == both[:, 1, None, :]).any(axis=2),
         (both[:, 1, :, None] == both[:, 0, None, :]).any(axis=2),
@@ -85,15 +90,16 @@ def _moves(
 
 
 def _least_depth(corners: NDArray[np.complex128]) -> tuple[NDArray[np.complex128], FloatArray]:
-    """Return (k,) unit vectors along which the second of two triangles (k, 2, 3) is out of the first soonest, and when.
+    """Return (k,) unit vectors of least penetration and (k,) penetration depths of two triangles (k, 2, 3).
 
-    They are across a side of either (as for `geometry.overlap.join`).
+    Moving the second triangle along the vector by the depth separates it from the first. The vector is normal to a
+    side of either triangle (as for `geometry.overlap.join`).
     """
     sides = corners[..., NEXT] - corners
     turned = (np.conj(sides[..., 0]) * sides[..., 1]).imag < 0
     outward = -1j * sides / np.maximum(np.abs(sides), np.finfo(float).tiny)
     outward = np.where(turned[..., None], -outward, outward)
-    # Across the sides of the first away from it, and of the second towards it.
+    # Outward normals of the first triangle, and inward normals of the second.
     across = np.concatenate([outward[:, 0], -outward[:, 1]], axis=1)
     heights = (np.conj(across)[:, None, :, None] * corners[:, :, None, :]).real
     depths = heights[:, 0].max(axis=2) - heights[:, 1].min(axis=2)
@@ -102,42 +108,43 @@ def _least_depth(corners: NDArray[np.complex128]) -> tuple[NDArray[np.complex128
     return across[chosen], np.maximum(depths[chosen], 0.0)
 
 
-# Places that are tried for a point: so many spacings away at most, along each axis.
+# Positions that are tried for a point: up to this number of spacings away along each axis.
 MAX_GRID_STEPS = 3
-# Triangles that are flipped: more are too many to be turned back one by one.
-MAX_TURNED_BACK = 5000
+# Number of flipped triangles above which they are not repaired, as this is done one by one.
+MAX_FLIPPED = 5000
 
 
-def snap_apart(
+def round_safely(
     points: FloatArray, corners: IntArray, stored: Callable[[FloatArray], FloatArray]
 ) -> tuple[FloatArray, Overlaps]:
-    """Return points as stored, with triangles positively oriented and disjoint where they were and rounding permits.
-
-    And what overlaps nevertheless.
+    """Return points rounded to stored values, where possible without new flipped triangles or overlaps.
 
     Args:
-        points: (u, 2) of the plane.
+        points: (u, 2) positions in the plane.
         corners: (m, 3) indices of points.
-        stored: returns the points that are read where some are written.
+        stored: returns the points that are read back after the given ones are written.
+
+    Returns:
+        (u, 2) the rounded points, and the overlaps that remain.
     """
     rounded = stored(points)
     if np.array_equal(rounded, points):
         return points, find_overlaps(points, corners)
     is_positive = signed_double_areas(points[corners]) > 0
-    rounded = _turned_back(rounded, corners, is_positive, stored)
-    parted, overlaps = part_touching(rounded, corners, stored)
-    if (is_positive & (signed_double_areas(parted[corners]) <= 0)).any():
-        parted = _turned_back(parted, corners, is_positive, stored)
-        overlaps = find_overlaps(parted, corners)
-    return parted, overlaps
+    rounded = _unflipped(rounded, corners, is_positive, stored)
+    separated, overlaps = part_touching(rounded, corners, stored)
+    if (is_positive & (signed_double_areas(separated[corners]) <= 0)).any():
+        separated = _unflipped(separated, corners, is_positive, stored)
+        overlaps = find_overlaps(separated, corners)
+    return separated, overlaps
 
 
-def _turned_back(
+def _unflipped(
     points: FloatArray, corners: IntArray, is_positive: BoolArray, stored: Callable[[FloatArray], FloatArray]
 ) -> FloatArray:
-    """Return points, some a few spacings away, at which triangles that rounding flipped are positively oriented again.
+    """Return points, some moved by a few spacings, at which triangles flipped by rounding are positively oriented.
 
-    is_positive: (m,) True for triangles that are to be.
+    is_positive: (m,) True for triangles that must be positively oriented.
     """
     points = points.copy()
     steps = (
@@ -149,7 +156,7 @@ def _turned_back(
     steps = steps[np.argsort((steps**2).sum(axis=1), kind="stable")]
     for _ in range(MAX_ROUNDS):
         bad = np.flatnonzero((signed_double_areas(points[corners]) <= 0) & is_positive)
-        if not 0 < len(bad) <= MAX_TURNED_BACK:
+        if not 0 < len(bad) <= MAX_FLIPPED:
             break
         near = np.flatnonzero(np.isin(corners, corners[bad]).any(axis=1) & is_positive)
         for point in np.unique(corners[bad]).tolist():

@@ -1,4 +1,4 @@
-"""Reading meshes from files, and writing flattened meshes to them."""
+"""Reading of meshes from files, and writing of flattened meshes to files."""
 
 from .files import (
     PIPE,

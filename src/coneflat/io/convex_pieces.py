@@ -1,6 +1,7 @@
-"""The polygons of a file as they can be written: whole where they are convex in the plane, in convex pieces else.
+"""Polygons to write to a file: unchanged if they are convex in the plane, otherwise split into convex pieces.
 
-Readers split polygons into triangles by themselves, mostly into fans. Of a convex polygon every fan is upright.
+Readers split polygons into triangles, mostly into fans. For a convex polygon, the triangles of every fan are positively
+oriented.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..geometry.planar import heights, sides_between
 from ..mesh.polygons import Polygons, fan_corners
 
-# Height over longest side of the triangle at a corner from which on the corner is convex: above rounding, with which
-# areas are off by some 1e-16.
+# Minimum ratio of height to longest side of the triangle at a convex corner. It is above the rounding errors of areas,
+# which are about 1e-16.
 CONVEX_HEIGHT = 1e-12
 
 Node: TypeAlias = tuple[int, int]
@@ -27,9 +28,9 @@ class Pieces:
     """Polygons to write, in the order of those of the source.
 
     Attributes:
-        corners: (c,) corner of the source's polygons at each of theirs, one after the other.
-        points: (c,) their points in the plane.
-        sizes: (q,) how many corners each has.
+        corners: (c,) corner of the source for each corner to write, polygon after polygon.
+        points: (c,) point in the plane of each corner.
+        sizes: (q,) number of corners of each polygon to write.
         polygons: (q,) the polygon of the source that each is, or is a piece of.
         split: (s,) polygons of the source that are written in pieces since they are not convex in the plane.
     """
@@ -41,33 +42,33 @@ class Pieces:
     split: IntArray
 
     def fans(self) -> tuple[IntArray, IntArray]:
-        """Return the triangles that others read: (t, 3) corners of the source, and (t, 3) points in the plane."""
+        """Return the fan triangles of the polygons: (t, 3) corners of the source, and (t, 3) points in the plane."""
         rows = fan_corners(np.concatenate([[0], np.cumsum(self.sizes)]))
         return self.corners[rows], self.points[rows]
 
 
 def find_pieces(uv: FloatArray, uv_faces: IntArray, offsets: IntArray, face_corners: IntArray) -> Pieces:
-    """Return the polygons to write; of those that have lost triangles, what is left.
+    """Return the polygons to write; of polygons with removed triangles, the remaining pieces.
 
     Args:
-        uv: (u, 2) points of the plane.
+        uv: (u, 2) points in the plane.
         uv_faces: (m, 3) the point of each triangle corner.
-        offsets: (p + 1,) where the corners of the source's polygons begin.
+        offsets: (p + 1,) start of the corners of the source's polygons.
         face_corners: (m, 3) the source's corner at each triangle corner.
     """
     polygons = Polygons(offsets, face_corners)
     points, sizes, loops = polygons.points(uv_faces), polygons.sizes, polygons.loops()
     triples, at = polygons.corner_triples(points)
-    whole = polygons.are_whole(points)
+    complete = polygons.are_whole(points)
     height = heights(sides_between(uv[triples]))
-    # What is flipped as a whole is so in fans, too, and no better in pieces.
+    # A polygon that is flipped as a whole stays flipped in fans and in pieces, so it is not split.
     split = np.intersect1d(at[~(height > CONVEX_HEIGHT)], at[~(height < -CONVEX_HEIGHT)])
-    whole[split] = False
-    if whole.all():
+    complete[split] = False
+    if complete.all():
         return Pieces(loops, points[loops], sizes, np.arange(len(sizes)), split)
-    kept = np.repeat(whole, sizes)
-    intact = (loops[kept], points[loops[kept]], sizes[whole], np.flatnonzero(whole))
-    parts = _convex_parts(uv, uv_faces, face_corners, polygons.owner, ~whole)
+    kept = np.repeat(complete, sizes)
+    intact = (loops[kept], points[loops[kept]], sizes[complete], np.flatnonzero(complete))
+    parts = _convex_parts(uv, uv_faces, face_corners, polygons.owner, ~complete)
     corners, flat, counts, names = map(np.concatenate, zip(intact, parts, strict=True))
     order = np.argsort(names, kind="stable")
     rows = np.argsort(np.repeat(names, counts), kind="stable")
@@ -77,12 +78,12 @@ def find_pieces(uv: FloatArray, uv_faces: IntArray, offsets: IntArray, face_corn
 def _convex_parts(
     uv: FloatArray, uv_faces: IntArray, face_corners: IntArray, owner: IntArray, chosen: BoolArray
 ) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-    """Return what is left of the chosen polygons, in convex pieces: the first four attributes of `Pieces`."""
+    """Return the remaining triangles of the chosen polygons as convex pieces: the first four attributes of `Pieces`."""
     faces = np.flatnonzero(chosen[owner])
     faces = faces[np.argsort(owner[faces], kind="stable")]
     names, first = np.unique(owner[faces], return_index=True)
     pieces, polygons = [], []
-    # Of some polygons nothing may be left, and so of all of them.
+    # Some of the polygons, or all of them, may have no remaining triangles.
     for name, members in zip(names.tolist(), np.split(faces, first)[1:], strict=True):
         corners = np.stack([face_corners[members], uv_faces[members]], axis=2).tolist()
         loops = merge_convex(uv, [[(c, p) for c, p in triangle] for triangle in corners])
@@ -94,13 +95,14 @@ def _convex_parts(
 
 
 def merge_convex(uv: FloatArray, loops: list[Loop]) -> list[Loop]:
-    """Return loops joined across sides that two of them share, in turn, where that leaves them convex.
+    """Return loops merged across their common sides, one after the other, where the result is convex.
 
-    Hertel and Mehlhorn 1983: at most four times as many pieces as the fewest. Each begins with its smallest corner.
+    The number of pieces is at most four times the minimum (Hertel and Mehlhorn 1983). Each begins with its smallest
+    corner.
 
     Args:
-        uv: (u, 2) points of the plane.
-        loops: corners of the source with their points, as each triangle runs.
+        uv: (u, 2) points in the plane.
+        loops: for each triangle the corners of the source with their points, in its orientation.
     """
     owner = {side: i for i, loop in enumerate(loops) for side in _sides(loop)}
     merged = dict(enumerate(loops))
@@ -109,7 +111,7 @@ def merge_convex(uv: FloatArray, loops: list[Loop]) -> list[Loop]:
         if here == there:
             continue
         one, two = merged[here], merged[there]
-        # The first runs from a to b along the side that they share, the second back.
+        # The first loop traverses the common side from a to b, the second from b to a.
         i, j = one.index(b), two.index(a)
         joined = (one[i:] + one[:i]) + (two[j:] + two[:j])[1:-1]
         if _is_convex(uv, joined):

@@ -1,4 +1,4 @@
-"""The content of files, and writing a file so that it is there in full or not at all."""
+"""Reading of files, and atomic writing: a file is either written completely or not at all."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import IO, Any, TypeAlias
 
 from ..errors import ConeflatError, EmptyMeshError, MeshFileError, UnknownFormatError
 
-#: How users name files.
+#: The types of file names that users may pass.
 PathName: TypeAlias = "str | PathLike[str]"
 #: Stands for standard input, and for standard output.
 PIPE = Path("-")
@@ -26,19 +26,19 @@ def read_bytes(path: Path) -> bytes:
     """Return the content of a file.
 
     Raises:
-        MeshFileError: there is no such file, it is a directory, or it may not be read.
+        MeshFileError: the file does not exist, is a directory, or cannot be read.
         EmptyMeshError: the file is empty.
     """
     try:
         mode = path.stat().st_mode
-        # Devices, pipes and sockets may never end, or never begin: opening a pipe waits for who writes to it.
+        # Reading devices, pipes and sockets may never end, and opening a pipe waits for a writer.
         is_file = stat.S_ISREG(mode) or stat.S_ISDIR(mode)
         content = path.read_bytes() if is_file else b""
     except FileNotFoundError as error:
-        why = ": it is a link that leads nowhere" if path.is_symlink() else ""
+        why = ": it is a broken link" if path.is_symlink() else ""
         raise MeshFileError(f"{path}: there is no such file{why}") from error
     except (IsADirectoryError, PermissionError) as error:
-        reason = "is a folder, not a file" if os.path.isdir(path) else "may not be read (no permission)"
+        reason = "is a folder, not a file" if os.path.isdir(path) else "cannot be read (no permission)"
         raise MeshFileError(f"{path} {reason}") from error
     except (OSError, ValueError) as error:
         raise MeshFileError(f"{path} cannot be read: {_reason(error)}") from error
@@ -52,31 +52,35 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_input() -> bytes:
-    """Return what comes in on standard input.
+    """Return the content of standard input.
 
     Raises:
-        MeshFileError: that is a terminal, or cannot be read.
-        EmptyMeshError: nothing comes in.
+        MeshFileError: standard input is a terminal, or cannot be read.
+        EmptyMeshError: it is empty.
     """
     if sys.stdin is None or sys.stdin.isatty():
         raise MeshFileError(
-            "- stands for a mesh on standard input, and there is none: pipe a file into the command"
+            "- stands for a mesh on standard input, but there is none: pipe a file into the command"
         )
     try:
         content = sys.stdin.buffer.read()
     except OSError as error:
         raise MeshFileError(f"standard input cannot be read: {_reason(error)}") from error
     if not content or content.isspace():
-        raise EmptyMeshError("nothing came in on standard input")
+        raise EmptyMeshError("standard input is empty")
     return content
 
 
 @contextmanager
 def readable(path: Path, kind: str) -> Iterator[None]:
-    """Make one kind of error of whatever a damaged file makes a parser do; kind: what it should be, "PLY file".
+    """Convert the exceptions of a parser on a damaged file into MeshFileError, as a context manager.
+
+    Args:
+        path: the file, for messages.
+        kind: the expected kind of file, such as "PLY file".
 
     Raises:
-        MeshFileError: the block ends by an exception that is neither of the package's own nor a lack of memory.
+        MeshFileError: the block raises an exception other than ConeflatError and MemoryError.
     """
     try:
         yield
@@ -88,24 +92,27 @@ def readable(path: Path, kind: str) -> Iterator[None]:
 
 
 def as_path(path: object) -> Path:
-    """Return the path that text, bytes or a path object names.
+    """Return the path given by text, bytes or a path object.
 
     Raises:
-        MeshFileError: it is something else.
+        MeshFileError: `path` has another type.
     """
     try:
         return Path(os.fsdecode(path))  # type: ignore[arg-type]
     except TypeError as error:
-        raise MeshFileError(f"a file is named by text or a path, not by {type(path).__name__}") from error
+        raise MeshFileError(f"a file name must be text or a path, got {type(path).__name__}") from error
 
 
 def known_ending(path: Path, endings: Collection[str], what: str) -> str:
     """Return the ending of a path in lower case if it is known.
 
-    what: is done with files of these endings, for the message: "meshes are read from".
+    Args:
+        path: the path.
+        endings: the known endings.
+        what: how files with these endings are used, for the message: "meshes are read from".
 
     Raises:
-        UnknownFormatError: it is not.
+        UnknownFormatError: the ending is not known.
     """
     ending = path.suffix.lower()
     if ending not in endings:
@@ -115,24 +122,23 @@ def known_ending(path: Path, endings: Collection[str], what: str) -> str:
 
 
 def moved_path(name: bytes, here: str, there: str) -> bytes:
-    """Return a path relative to another folder that leads where one relative to the first did; slashes part it."""
+    """Return a path relative to folder `here` rewritten relative to folder `there`, separated by slashes."""
     if os.path.isabs(name):
         return name
     full = os.path.join(os.fsencode(here), name)
     try:
         relative = os.path.relpath(full, os.fsencode(there))
     except ValueError:
-        # On another drive nothing but the full path leads there.
+        # A file on another drive can be reached only by its full path.
         relative = full
     return relative.replace(os.fsencode(os.sep), b"/")
 
 
 def check_target(path: PathName) -> Path:
-    """Return the file that a path names, links followed, if it looks as if it could be written.
+    """Return the file of a path, with links resolved, if it can be expected to be writable.
 
     Raises:
-        MeshFileError: the folder is missing, or the path is a pipe or something else than a file, or writing is not
-            permitted.
+        MeshFileError: the folder is missing, the path is a pipe or not an ordinary file, or writing is not permitted.
     """
     path = as_path(path)
     if path == PIPE:
@@ -158,11 +164,11 @@ def check_target(path: PathName) -> Path:
 
 
 def checked_target(path: PathName, endings: Collection[str], what: str) -> Path:
-    """Return a path if a file can be expected to be written there that has one of some endings, see `known_ending`.
+    """Return a path if it has a known ending and can be expected to be writable, see `known_ending`, `check_target`.
 
     Raises:
-        UnknownFormatError: it has another ending.
-        MeshFileError: as of `check_target`.
+        UnknownFormatError: the ending is not known.
+        MeshFileError: the file cannot be written.
     """
     path = as_path(path)
     known_ending(path, endings, what)
@@ -171,23 +177,23 @@ def checked_target(path: PathName, endings: Collection[str], what: str) -> Path:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder, and those that it is in, if they are missing.
+    """Create a folder and its missing parents.
 
     Raises:
-        MeshFileError: it cannot be made.
+        MeshFileError: the folder cannot be created.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
-        raise MeshFileError(f"cannot make the folder {path}: {_reason(error)}") from error
+        raise MeshFileError(f"cannot create the folder {path}: {_reason(error)}") from error
 
 
 @contextmanager
 def atomic_write(path: PathName, mode: str = "wb") -> Iterator[IO[Any]]:
     """Open a file that appears under its name only when it is complete.
 
-    The content goes to a temporary file in the same folder, which takes the name at the end of the block; if
-    the block ends by any exception, it is removed and an older file of that name stays as it was.
+    The content is written to a temporary file in the same folder, which is renamed at the end of the block. If the
+    block raises an exception, the temporary file is removed and an older file of that name is not changed.
 
     Args:
         path: the file to write.
@@ -199,7 +205,7 @@ def atomic_write(path: PathName, mode: str = "wb") -> Iterator[IO[Any]]:
     if mode not in ("w", "wb"):
         raise ValueError(f"mode must be 'w' or 'wb', not {mode!r}")
     target = check_target(path)
-    # Created by open(), and not by tempfile, so that it has the permissions of any new file.
+    # Created by open() instead of tempfile, so that it has the default permissions of a new file.
     temporary = target.with_name(_temporary(target.name, secrets.token_hex(6)))
     text = {} if mode == "wb" else {"encoding": "utf-8", "newline": ""}
     try:
@@ -221,7 +227,7 @@ def _temporary(name: str, mark: str) -> str:
 
 
 def remove_unfinished(path: PathName) -> None:
-    """Remove what a process that was killed while it wrote a file has left of it."""
+    """Remove the temporary files of a process that was killed while it wrote a file."""
     target = Path(os.path.realpath(path))
     for left in target.parent.glob(_temporary(glob.escape(target.name[:100]), "?" * 12)):
         with suppress(OSError):

@@ -1,8 +1,8 @@
-"""Closing a mesh along sides that its file has twice.
+"""Joining of duplicated edges of a mesh file.
 
-Programs write a vertex once for each of its normals, materials or UVs, so that a surface that is closed for the eye
-falls apart in the file. Where the two borders of such a gap coincide bit for bit, and run opposite ways, they are
-taken for one. Numbers of vertices stay as they are: of those that become one, the first is used.
+Many programs write a vertex once for each of its normals, materials or UVs, so that a surface that looks closed is
+disconnected in the file. Where two border edges coincide bit for bit and have opposite directions, they are joined.
+Vertex indices do not change: of merged vertices, the first is used.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from .mesh_file import MeshFile
 
 @dataclass(frozen=True, eq=False)
 class Joined:
-    """A mesh as it was read, closed where the file has both sides of an edge.
+    """A mesh read from a file, with duplicated border edges joined.
 
     Attributes:
-        mesh: the mesh, with as many vertices as the file.
+        mesh: the mesh, with the same number of vertices as the file.
         used: (n,) the vertex that is used for each vertex of the file.
-        edges: how many edges were closed.
-        left: how many open edges coincide with others and stay open.
+        edges: number of edges that were joined.
+        left: number of open edges that coincide with others and stay open.
     """
 
     mesh: MeshFile
@@ -41,37 +41,37 @@ class Joined:
 
     @property
     def merged(self) -> int:
-        """How many vertices another one is used for."""
+        """Return the number of vertices that are replaced by another one."""
         return int(np.count_nonzero(self.used != np.arange(len(self.used))))
 
     def notes(self) -> tuple[str, ...]:
-        """Return what was merged on reading, one sentence each."""
+        """Return notes on what was merged on reading, one sentence each."""
         notes = []
         if self.edges:
             notes.append(
-                f"Closed {plural(self.edges, 'edge')} that the file has twice, at the same places "
+                f"Closed {plural(self.edges, 'edge')} that the file has twice, at the same positions "
                 f"({plural(self.merged, 'vertex', 'vertices')} merged); --no-weld leaves them open."
             )
         elif self.mesh.welded:
             notes.append(f"Merged {self.mesh.welded:,} vertices at the same positions.")
         if self.left:
             notes.append(
-                f"{plural(self.left, 'open edge')} at the same places as others, left open; --weld merges all vertices "
-                "at the same positions."
+                f"{plural(self.left, 'open edge')} at the same positions as others, left open; --weld merges all "
+                "vertices at the same positions."
             )
         return tuple(notes)
 
     def notes_of(self, notes: Sequence[str]) -> tuple[str, ...]:
-        """Return these notes and those on a result; vertices that another is used for are not left out."""
+        """Return these notes and those of a result; replaced vertices are not counted as left out."""
         kept = [note for note in notes if not (self.merged and is_left_out(note))]
         lone = len(self.used) - len(np.unique(self.mesh.corners)) - self.merged if self.merged else 0
         return (*self.notes(), *kept, *[left_out(lone)] * (lone > 0))
 
     def renamed(self, options: Mapping[str, Any]) -> dict[str, Any]:
-        """Return arguments of `coneflat.flatten` with the vertices that are used for those that they name.
+        """Return arguments of `coneflat.flatten` with vertices replaced by those that are used for them.
 
         Raises:
-            OptionError: two of them name one vertex.
+            OptionError: two given vertices are replaced by the same vertex.
         """
         if not self.merged:
             return dict(options)
@@ -84,7 +84,7 @@ class Joined:
                     other = seen.setdefault(self._used(vertex), vertex)
                     if other != vertex:
                         raise OptionError(
-                            f"vertices {other} and {vertex} lie at the same place and have become one: name one of "
+                            f"vertices {other} and {vertex} have the same position and were merged: use one of "
                             "them, or add --no-weld"
                         )
                 found[name] = dict(zip(seen, given.values(), strict=True))
@@ -105,30 +105,30 @@ class Joined:
         return np.array([self._used(v) for v in pairs.ravel().tolist()], dtype=np.int64).reshape(pairs.shape)
 
     def _used(self, vertex: int) -> int:
-        """Return the vertex that is used for one; numbers of none stay, for others to refuse."""
+        """Return the vertex that is used for another; invalid indices are returned unchanged and rejected later."""
         return int(self.used[vertex]) if 0 <= vertex < len(self.used) else vertex
 
 
 def join_borders(mesh: MeshFile) -> Joined:
-    """Return a mesh with borders joined where two sides, and no more, have the same places and run opposite ways.
+    """Return a mesh with border edges joined where exactly two have the same positions and opposite directions.
 
-    What was manifold and consistently oriented stays so: sides whose joining would give an edge a third face, or a
-    face one vertex twice, stay open, and so do those of components that are oriented inconsistently to begin with.
+    A manifold, consistently oriented mesh stays so: edges are not joined if an edge would get a third face or a face
+    would get the same vertex twice, nor in components that are inconsistently oriented.
     """
     faces, _ = triangulate(mesh.vertices, mesh.corners, mesh.offsets)
-    # Those with one vertex twice are not part of the surface.
+    # Triangles with a repeated vertex are not part of the surface.
     faces = faces[(faces != faces[:, [1, 2, 0]]).all(axis=1)]
     tails, heads = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
     every = np.arange(len(mesh.vertices))
     order, first = sort_pairs(tails, heads, len(every))
-    # Half-edges of edges that have no other.
+    # Half-edges without a twin.
     border = np.sort(order[first & np.append(first[1:], True)])
     if not len(border):
         return Joined(mesh, every)
     place = number_places(mesh.vertices)[1]
     one, two, coinciding = _opposite(border, place[tails], place[heads], len(every))
     bad = _inconsistent(tails, heads, len(every))
-    # Two sheets back to back, as of a leaf, are no gap: there the triangles on both sides are one and the same.
+    # Two sheets back to back, as of a leaf, are not a gap: the triangles on both sides have the same positions.
     apexes = place[faces[:, [2, 0, 1]].reshape(-1)]
     folded = apexes[one] == apexes[two]
     fits = ~(bad[tails[one]] | bad[tails[two]] | folded)
@@ -137,8 +137,8 @@ def join_borders(mesh: MeshFile) -> Joined:
     used = every
     while len(one):
         used = _merged(tails, heads, one, two, len(every))
-        spoilt = _spoilt(used[tails], used[heads], bad, len(every))
-        keep = ~(spoilt[used[tails[one]]] | spoilt[used[heads[one]]])
+        invalid = _invalid(used[tails], used[heads], bad, len(every))
+        keep = ~(invalid[used[tails[one]]] | invalid[used[heads[one]]])
         if keep.all():
             break
         one, two, used = one[keep], two[keep], every
@@ -154,13 +154,14 @@ def join_borders(mesh: MeshFile) -> Joined:
 def _opposite(
     border: IntArray, tails: IntArray, heads: IntArray, count: int
 ) -> tuple[IntArray, IntArray, int]:
-    """Return the half-edges (k,), (k,) that run between the same places, opposite ways, and are the only two there.
+    """Return (k,), (k,) half-edges that are the only two between their positions and have opposite directions.
 
-    Also how many half-edges run between the same places as others.
+    Also return the number of half-edges that coincide with others.
 
     Args:
         border: (b,) half-edges.
-        tails, heads: (3m,) numbers of the places where half-edges begin and end, below `count`.
+        tails, heads: (3m,) position index of the start and end of each half-edge, below `count`.
+        count: number of positions.
     """
     border = border[tails[border] != heads[border]]
     order, first = sort_pairs(tails[border], heads[border], count)
@@ -173,7 +174,7 @@ def _opposite(
 
 
 def _inconsistent(tails: IntArray, heads: IntArray, count: int) -> BoolArray:
-    """Return (n,) the vertices of components in which two half-edges run the same way."""
+    """Return (n,) True for the vertices of components with two half-edges of the same tail and head."""
     again = _repeated(tails, heads, count)
     if not again.any():
         return np.zeros(count, dtype=bool)
@@ -182,23 +183,23 @@ def _inconsistent(tails: IntArray, heads: IntArray, count: int) -> BoolArray:
 
 
 def _repeated(tails: IntArray, heads: IntArray, count: int) -> BoolArray:
-    """Return (3m,) half-edges whose tail and head are those of another one, too."""
+    """Return (3m,) True for half-edges with the same tail and head as another one."""
     _, number, counts = np.unique(tails * count + heads, return_inverse=True, return_counts=True)
     return np.asarray(counts[number.reshape(-1)] > 1)
 
 
 def _merged(tails: IntArray, heads: IntArray, one: IntArray, two: IntArray, count: int) -> IntArray:
-    """Return (n,) for each vertex the first of those that become one by joining half-edges."""
+    """Return (n,) for each vertex the first of the vertices that are merged with it by joining half-edges."""
     _, label = label_components(
         count, np.concatenate([tails[one], heads[one]]), np.concatenate([heads[two], tails[two]])
     )
     return np.asarray(np.unique(label, return_index=True)[1][label])
 
 
-def _spoilt(tails: IntArray, heads: IntArray, bad: BoolArray, count: int) -> BoolArray:
-    """Return (n,) the vertices at which the joining does harm, beside components that were bad before."""
-    # Of three corners one side is enough to tell that two are the same.
-    harm = (_repeated(tails, heads, count) | (tails == heads)) & ~bad[tails]
-    spoilt = np.zeros(count, dtype=bool)
-    spoilt[tails[harm]] = spoilt[heads[harm]] = True
-    return spoilt
+def _invalid(tails: IntArray, heads: IntArray, bad: BoolArray, count: int) -> BoolArray:
+    """Return (n,) True for vertices at which joining makes invalid triangles or edges, outside bad components."""
+    # If two corners of a triangle are equal, the half-edge between them has equal ends.
+    is_invalid = (_repeated(tails, heads, count) | (tails == heads)) & ~bad[tails]
+    invalid = np.zeros(count, dtype=bool)
+    invalid[tails[is_invalid]] = invalid[heads[is_invalid]] = True
+    return invalid

@@ -1,4 +1,4 @@
-"""Meshes with the UVs that they have, from files, results and arrays."""
+"""Meshes with existing UVs, from files, results and arrays."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Mapped:
-    """Triangles with the UVs of their corners, of which some may be missing.
+    """Triangles with the UVs of their corners, some of which may be missing.
 
     Attributes:
         vertices: (n, 3) positions.
-        faces: (m, 3) triangles; of polygons their fans from the first corner, which other programs see.
-        corner_uv: (m, 3, 2) UVs, v upwards; NaN where there is none.
-        polygons: how many they are parts of.
-        without, not_finite: how many corners of polygons have no UV, or one that is NaN or infinite.
-        notes: what was done on reading, one sentence each.
-        source: the file they are from, if any.
+        faces: (m, 3) triangles; polygons are split into fans from the first corner, as in other programs.
+        corner_uv: (m, 3, 2) UVs, v upwards; NaN where missing.
+        polygons: number of polygons that the triangles are from.
+        without, not_finite: number of polygon corners without UV, and with a UV that is NaN or infinite.
+        notes: changes made on reading, one sentence each.
+        source: the file, if any.
     """
 
     vertices: FloatArray
@@ -48,14 +48,25 @@ class Mapped:
 
     @property
     def has_uv(self) -> BoolArray:
-        """(m,) whether all corners have finite UVs."""
+        """Return (m,) True for triangles whose corners all have finite UVs."""
         return np.asarray(np.isfinite(self.corner_uv).all(axis=(1, 2)))
 
 
 def as_mapped(
     mesh: Any, faces: ArrayLike | None = None, corner_uv: ArrayLike | None = None, weld: bool | None = None
 ) -> Mapped:
-    """Return the triangles and UVs of whatever the user has; see `measure_uv`."""
+    """Return the triangles and UVs of a mesh in any of the forms that `measure_uv` accepts.
+
+    Args:
+        mesh: a path, a `MeshFile`, a result, or (n, 3) vertices if `faces` is given.
+        faces: (m, 3) vertex indices.
+        corner_uv: (m, 3, 2) UVs; needed with `faces`.
+        weld: as of `read_joined`, for a path.
+
+    Raises:
+        ArrayShapeError: `mesh` has another type, or an array has the wrong shape.
+        MissingUVError: there are no UVs.
+    """
     if faces is not None:
         return _of_arrays(mesh, faces, corner_uv)
     if isinstance(mesh, (str, PathLike)):
@@ -72,17 +83,17 @@ def as_mapped(
 
 
 def of_file(joined: Joined) -> Mapped:
-    """Return the triangles of a file, polygons as fans, with the UVs that it gives their corners.
+    """Return the triangles of a file, polygons as fans, with the UVs of their corners.
 
     Raises:
-        MissingUVError: it gives none.
+        MissingUVError: the file has no UVs.
     """
     mesh = joined.mesh
     if mesh.texture is None or mesh.uv is None or not has_uv(mesh):
         raise MissingUVError(
-            f"{mesh.path} has no UV coordinates: `coneflat flatten` makes some"
+            f"{mesh.path} has no UV coordinates: `coneflat flatten` computes them"
             if mesh.texture is None or mesh.uv is not None
-            else f"{mesh.path} numbers UV coordinates, but does not hold them"
+            else f"{mesh.path} refers to UV coordinates, but does not contain them"
         )
     points = np.append(mesh.uv, [[np.nan, np.nan]], axis=0)
     texture = np.where(mesh.texture < 0, len(mesh.uv), mesh.texture)
@@ -101,7 +112,7 @@ def of_file(joined: Joined) -> Mapped:
 
 
 def has_uv(mesh: MeshFile) -> bool:
-    """Return whether a file gives any corner a UV."""
+    """Return True if any corner of a file has a UV."""
     return mesh.uv is not None and mesh.texture is not None and bool((mesh.texture >= 0).any())
 
 
@@ -115,13 +126,13 @@ def _of_arrays(vertices: ArrayLike, faces: ArrayLike, corner_uv: ArrayLike | Non
     points = np.asarray(given.vertices, dtype=np.float64)
     triangles = as_faces(given.faces, len(points))
     if corner_uv is None:
-        raise MissingUVError("vertices and faces alone have no UV coordinates: give corner_uv, too")
+        raise MissingUVError("vertices and faces alone have no UV coordinates: give corner_uv as well")
     try:
         uv = np.asarray(corner_uv, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise ArrayShapeError(f"corner_uv must be an array of numbers: {error}") from error
     if uv.shape != (*triangles.shape, 2):
-        raise ArrayShapeError(f"corner_uv must have the shape {(*triangles.shape, 2)}, not {uv.shape}")
+        raise ArrayShapeError(f"corner_uv must have the shape {(*triangles.shape, 2)}, got {uv.shape}")
     without = np.isnan(uv).all(axis=2)
     broken = ~np.isfinite(uv).all(axis=2) & ~without
     return Mapped(points, triangles, uv, len(triangles), int(without.sum()), int(broken.sum()))

@@ -1,4 +1,4 @@
-"""A mesh as its file has it: polygons, and what must survive from reading to writing."""
+"""A mesh as read from its file: polygons, and the data that is preserved from reading to writing."""
 
 from __future__ import annotations
 
@@ -22,25 +22,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class MeshFile:
-    """A mesh read from a file, with its polygons untouched.
+    """A mesh read from a file, with its polygons unchanged.
 
     Attributes:
-        path: where it came from.
+        path: the file.
         vertices: (n, 3) positions, model units.
         corners: (c,) vertex index of every polygon corner, polygon after polygon.
-        offsets: (p + 1,) polygon i owns corners[offsets[i]:offsets[i + 1]].
-        welded: how many vertices were merged because they lay at the same position.
-        unwelded: (c,) what `corners` was before vertices were merged; None where none were.
+        offsets: (p + 1,) polygon i has the corners corners[offsets[i]:offsets[i + 1]].
+        welded: number of vertices that were merged because they had the same position.
+        unwelded: (c,) the corners before vertices were merged; None if none were.
         obj: the text of an OBJ file, from which the output keeps groups, materials and comments.
-        properties: what the file says of every vertex besides its position, by name, each (n,): `quality` or
-            `red` of a PLY file, say. Colours are 0 to 1.
-        texture: (c,) a number for the UV point that the file gives every corner, -1 for those that it gives none;
-            None if it gives none at all.
-        uv: (u, 2) the UV points that `texture` numbers, v upwards, not checked: they may be NaN; None where the
-            reader has none.
-        normals: (k, 3) the normals that the file gives, of any length, in the directions of its positions.
-        normal: (c,) index into `normals` of every corner, -1 where it has none; None where the file has none at all.
-        scene: what else there is in a glTF file, which a GLB written keeps.
+        properties: further data of every vertex by name, each (n,), for example `quality` or `red` of a PLY file.
+            Colours are 0 to 1.
+        texture: (c,) index of the UV point of every corner, -1 for corners without one; None if no corner has one.
+        uv: (u, 2) the UV points that `texture` refers to, v upwards, not validated: they may be NaN; None if the file
+            has none.
+        normals: (k, 3) the normals in the file, of any length, in the coordinate frame of the positions.
+        normal: (c,) index into `normals` of every corner, -1 for corners without one; None if no corner has one.
+        scene: the other data of a glTF file, which a written GLB keeps.
 
     Examples:
         >>> mesh = coneflat.read_mesh(coneflat.sample_path())
@@ -66,24 +65,26 @@ class MeshFile:
 
     @property
     def has_colours(self) -> bool:
-        """Whether every vertex has a colour."""
+        """Return True if every vertex has a colour."""
         return all(name in self.properties for name in COLOURS)
 
     @cached_property
     def triangles(self) -> IntArray:
-        """(m, 3) the polygons as triangles, which `flatten` takes in their place: quads and larger ones are split.
+        """Return (m, 3) the polygons as triangles, as `flatten` uses them: quads and larger polygons are split.
 
         Raises:
-            DegenerateFaceError, FaceIndexError: a polygon has fewer than 3 corners, or a corner no vertex.
+            DegenerateFaceError, FaceIndexError: a polygon has fewer than 3 corners, or a corner has an invalid index.
         """
         return triangulate(self.vertices, self.corners, self.offsets)[0]
 
 
 def check_corners(path: Path, mesh: MeshFile) -> None:
-    """Refuse a mesh without vertices or faces, with a face of fewer than 3 corners, or a bad index.
+    """Raise an error for a mesh without vertices or faces, with a face of fewer than 3 corners, or with a bad index.
 
     Raises:
-        EmptyMeshError, MeshFileError, FaceIndexError: respectively.
+        EmptyMeshError: there are no vertices or no faces.
+        MeshFileError: a face has fewer than 3 corners.
+        FaceIndexError: a corner has an invalid vertex index.
     """
     count = len(mesh.vertices)
     check_filled(path, count, len(mesh.offsets) - 1)
@@ -95,19 +96,19 @@ def check_corners(path: Path, mesh: MeshFile) -> None:
     if c is not None:
         i = int(np.searchsorted(mesh.offsets, c, side="right")) - 1
         raise FaceIndexError(
-            f"{path}: face {i} names vertex {mesh.corners[c]}, but there are {count} vertices, from 0 on"
+            f"{path}: face {i} names vertex {mesh.corners[c]}, but there are {count} vertices, from 0"
         )
 
 
 def check_filled(path: Path, vertices: int, faces: int) -> None:
-    """Raise EmptyMeshError if a file has no vertices, or no faces."""
+    """Raise EmptyMeshError if a file has no vertices or no faces."""
     for count, name in ((vertices, "vertices"), (faces, "faces")):
         if count <= 0:
             raise EmptyMeshError(f"{path} has no {name}")
 
 
 def offsets_of(sizes: IntArray) -> IntArray:
-    """Return (p + 1,) the offsets of polygons of (p,) sizes."""
+    """Return (p + 1,) the offsets of polygons with given sizes (p,)."""
     offsets = np.zeros(len(sizes) + 1, dtype=np.int64)
     np.cumsum(sizes, out=offsets[1:])
     return offsets

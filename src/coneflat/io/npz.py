@@ -1,6 +1,6 @@
-"""NumPy archives: results as these, and reading them array by array, each checked, lest they are damaged.
+"""NumPy archives: writing of results, and reading with validation of every array.
 
-A result has every array, and its report as JSON.
+The archive of a result contains all its arrays, and its report as JSON.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from .files import PathName, as_path, read_bytes, readable
 if TYPE_CHECKING:
     from ..result import Flattening
 
-#: The arrays that make a result. The others of an archive, those of `SeamData`, follow from them.
+#: The arrays that define a result. The other arrays of an archive, those of `SeamData`, follow from them.
 _NAMES = (
     "uv", "uv_faces", "vertices", "faces", "cones", "curvatures", "log_scale", "curvature_residual", "seams",
     "vertex_origin", "face_origin", "qc", "log_area_scale", "uv_scale", "report",
 )  # fmt: skip
-#: Archives of version 0.1.0 do not have these, and only results of given lengths have lengths.
+#: Optional arrays: archives of version 0.1.0 do not have these, and only results for given lengths have lengths.
 _NEWER = ("prescribed", "lengths")
 
 
@@ -58,10 +58,13 @@ def write_npz(result: Flattening, stream: IO[bytes]) -> None:
 
 
 def read_flattening(path: PathName) -> Flattening:
-    """Return a result that was written as .npz; what it says of the file it came from is not kept.
+    """Return a result that was written as .npz, without its source file.
+
+    Args:
+        path: the .npz file.
 
     Raises:
-        MeshFileError: the file is not there, may not be read, or is not such a result.
+        MeshFileError: the file does not exist, cannot be read, or is not a result of coneflat.
 
     Examples:
         >>> import tempfile
@@ -113,7 +116,7 @@ def _flattening(reading: CheckedArrays) -> Flattening:
     measures: dict[str, Any] = {name: number(report.get(name)) for name in MEASURES}
     settings, rotations = report["settings"], None
     if report["rotation_deviation"] is not None:
-        quantum = settings.get("quantise", settings.get("quantum"))  # as it was called at first
+        quantum = settings.get("quantise", settings.get("quantum"))  # the old name
         rotations = Rotations(quantum, report["rotation_deviation"], tuple(report["handle_deviations"]))
     return Flattening(
         vertices=vertices,
@@ -144,34 +147,35 @@ def _flattening(reading: CheckedArrays) -> Flattening:
     )
 
 
-Made = TypeVar("Made")
+Built = TypeVar("Built")
 
-#: Results are not packed; programs that pack them gain a factor of a few.
-_MOST_UNPACKED = 30
+#: Maximum ratio of uncompressed to compressed size. Results are written uncompressed; programs that compress them reach
+#: a factor of a few.
+_MAX_UNPACKING = 30
 
 
 class CheckedArrays:
-    """Arrays of an archive, each of which must be what it should be there.
+    """Arrays of an archive, with validated access.
 
     Attributes:
         path: the archive.
-        arrays: by name, as they are.
+        arrays: the unvalidated arrays by name.
     """
 
     def __init__(self, path: Path, arrays: dict[str, NDArray[Any]]) -> None:
         self.path, self.arrays = path, arrays
 
     def need(self, names: Iterable[str], what: str) -> None:
-        """Raise MeshFileError if arrays are missing; what: the file is to hold."""
+        """Raise MeshFileError if arrays are missing; `what` is the expected content of the file."""
         for name in names:
             if name not in self.arrays:
                 raise MeshFileError(f"{self.path} holds no {what}: {name!r} is missing")
 
     def floats(self, name: str, shape: tuple[int | None, ...]) -> FloatArray:
-        """Return an array of numbers of a shape; None stands for any length.
+        """Return an array of numbers of a given shape, in which None stands for any length.
 
         Raises:
-            MeshFileError: it has another shape, or is of no numbers.
+            MeshFileError: it has another shape, or does not contain numbers.
         """
         values = self.arrays[name]
         fits = len(shape) == values.ndim and all(
@@ -181,12 +185,12 @@ class CheckedArrays:
             wanted = ", ".join("any" if length is None else f"{length}" for length in shape)
             raise MeshFileError(
                 f"{self.path}: {name!r} has the shape {values.shape} and the type {values.dtype}, not the shape "
-                f"({wanted}) and a type of numbers"
+                f"({wanted}) and a numeric type"
             )
         return values.astype(np.float64)
 
     def finite(self, name: str, shape: tuple[int | None, ...]) -> FloatArray:
-        """Return an array of finite numbers of a shape.
+        """Return an array of finite numbers of a given shape.
 
         Raises:
             MeshFileError: it has another shape, or numbers that are not finite.
@@ -199,34 +203,34 @@ class CheckedArrays:
     def indices(
         self, name: str, shape: tuple[int | None, ...], bound: int | None, least: int = 0
     ) -> IntArray:
-        """Return an array of integers from `least` up to a bound, or to what an index can be.
+        """Return an array of integers from `least` to below `bound`, or below 2^53 if it is None.
 
         Raises:
-            MeshFileError: it has another shape, or numbers beyond.
+            MeshFileError: it has another shape, or values out of range.
         """
         values = self.floats(name, shape)
         end = 2**53 if bound is None else bound
         if not np.all((values >= least) & (values < end) & (values == np.floor(values))):
-            there = "indices can be" if bound is None else f"the {bound} there are"
-            raise MeshFileError(f"{self.path}: {name!r} has indices beyond {there}")
+            there = "integers" if bound is None else f"{bound} elements"
+            raise MeshFileError(f"{self.path}: {name!r} has indices outside the range of {there}")
         return values.astype(np.int64)
 
     def notes(self, report: dict[str, Any]) -> tuple[str, ...]:
         """Return the notes of a report.
 
         Raises:
-            ValueError: they are not a list of texts.
+            ValueError: they are not a list of strings.
         """
         notes = report["notes"]
         if not isinstance(notes, list) or not all(isinstance(note, str) for note in notes):
-            raise ValueError("its report has notes that are not text")
+            raise ValueError("its report has notes that are not strings")
         return tuple(notes)
 
     def report(self) -> dict[str, Any]:
-        """Return what the archive says in JSON, of which all numbers are finite or None.
+        """Return the report of the archive, parsed from JSON.
 
         Raises:
-            ValueError: it is none.
+            ValueError: the report is not an object.
         """
         report = json.loads(str(self.arrays["report"]))
         if not isinstance(report, dict):
@@ -235,44 +239,49 @@ class CheckedArrays:
 
 
 def number(value: Any) -> Any:
-    """Return a number of a report; JSON has no NaN, for which it has None.
+    """Return a number of a report, NaN for None, as JSON has no NaN.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the value is neither a number nor None.
     """
     if value is not None and not isinstance(value, (int, float)):
         raise ValueError(f"its report has {str(value)[:20]!r} for a number")
     return math.nan if value is None else value
 
 
-def read_archive(path: Path, names: Iterable[str], made: Callable[[CheckedArrays], Made]) -> Made:
-    """Return what is made of the arrays of an .npz file; others than those named are left unread.
+def read_archive(path: Path, names: Iterable[str], build: Callable[[CheckedArrays], Built]) -> Built:
+    """Return the object that a function builds from the arrays of an .npz file.
+
+    Args:
+        path: the file.
+        names: the arrays to read.
+        build: function of the arrays.
 
     Raises:
-        MeshFileError: the file is not there, may not be read, or is damaged.
+        MeshFileError: the file does not exist, cannot be read, or is damaged.
     """
     content = read_bytes(path)
     with readable(path, "NPZ file"):
-        return made(CheckedArrays(path, _arrays(path, content, names)))
+        return build(CheckedArrays(path, _arrays(path, content, names)))
 
 
 def _arrays(path: Path, content: bytes, names: Iterable[str]) -> dict[str, NDArray[Any]]:
-    """Return the arrays of some names, none of which is larger than it can be in a file of this size.
+    """Return the arrays with given names, after a check that their size is plausible for the size of the file.
 
-    NumPy allocates what the header of an array asks for, and unpacks whatever an archive holds.
+    NumPy itself allocates any size given in the header of an array, and decompresses any archive.
     """
     arrays: dict[str, NDArray[Any]] = {}
-    left = _MOST_UNPACKED * len(content)
+    left = _MAX_UNPACKING * len(content)
     with zipfile.ZipFile(BytesIO(content)) as archive:
-        held = archive.namelist()
+        members = archive.namelist()
         for name in names:
-            if f"{name}.npy" not in held:
+            if f"{name}.npy" not in members:
                 continue
             member = archive.getinfo(f"{name}.npy")
             left -= member.file_size
             if left < 0:
                 raise MeshFileError(
-                    f"{path} unpacks to more than {_MOST_UNPACKED} times its size: it is not a result"
+                    f"{path} unpacks to more than {_MAX_UNPACKING} times its size: it is not a result"
                 )
             with archive.open(member) as stream:
                 arrays[name] = _array(stream.read())
@@ -280,15 +289,15 @@ def _arrays(path: Path, content: bytes, names: Iterable[str]) -> dict[str, NDArr
 
 
 def _array(content: bytes) -> NDArray[Any]:
-    """Return the array that a .npy file holds."""
+    """Return the array in the content of a .npy file."""
     stream = BytesIO(content)
     version = np.lib.format.read_magic(stream)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, is_fortran, kind = read(stream)
     if kind.hasobject:
-        raise ValueError("it holds Python objects")
+        raise ValueError("it contains Python objects")
     count = math.prod(shape)
     if min(shape, default=0) < 0 or count * kind.itemsize != len(content) - stream.tell():
-        raise ValueError(f"an array of the shape {shape} is not as large as it should be")
+        raise ValueError(f"an array of the shape {shape} does not have the expected number of bytes")
     values = np.frombuffer(content, kind, count, stream.tell()) if count else np.empty(0, kind)
     return values.reshape(shape, order="F" if is_fortran else "C")

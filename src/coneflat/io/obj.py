@@ -1,7 +1,7 @@
-"""Wavefront OBJ: reading it, and writing the input's own text with new texture coordinates.
+"""Wavefront OBJ: a reader, and a writer that outputs the input's text with new texture coordinates.
 
-An own parser, because no library keeps all of what the output has to reproduce: the file's numbering of
-vertices, its polygons, groups, materials and comments.
+This package has its own parser, because no library keeps all data that the output must reproduce: the numbering of
+vertices, polygons, groups, materials and comments.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ if TYPE_CHECKING:
     from ..result import Flattening
 
 _OTHER, _VERTEX, _FACE, _TEXTURE, _NORMAL, _ELEMENT, _COMMENTED_FACE = range(7)
-#: By the first two characters of a line, as a 16-bit number, what it is.
+#: The kind of a line by its first two characters as a 16-bit number.
 _KINDS = np.full(1 << 16, _OTHER, np.uint8)
 _HEADS = {b"v ": _VERTEX, b"f ": _FACE, b"l ": _ELEMENT, b"p ": _ELEMENT, b"vt": _TEXTURE, b"vn": _NORMAL}
 _KINDS[[int.from_bytes(head, "big") for head in _HEADS]] = [*_HEADS.values()]
 _TEXTURE_INDICES = re.compile(rb"(#[^\r\n]*)|/[-+0-9]*")
 _MATERIALS = re.compile(rb"(?m)^([ \t]*mtllib[ \t]+)([^\r\n]*?)(?=[ \t]*\r?$)")
-#: Lines written at a time: their numbers take some MB as Python has them.
+#: Number of lines written at a time: their numbers take some MB as Python objects.
 _LINES = 1 << 15
 
 
 @dataclass(frozen=True)
 class ObjText:
-    """What an OBJ file holds besides its polygons.
+    """The content of an OBJ file in addition to its polygons.
 
     Attributes:
-        gaps: the text that stands before the line of polygon i, verbatim but for the texture coordinates,
-            which are left out; the number of polygons is the key of what follows the last.
-        normals: (c,) the number of the normal at every polygon corner as the file gives it (it may count
-            backwards), 0 where there is none; None where no corner has one.
-        newline: how the file ends its lines.
+        gaps: the text before the line of polygon i, verbatim except for texture coordinates, which are left out; the
+            text after the last polygon has the number of polygons as key.
+        normals: (c,) the normal index at every polygon corner as in the file (it may be negative, to count backwards),
+            0 where there is none; None if no corner has one.
+        newline: the line ending of the file.
     """
 
     gaps: Mapping[int, bytes]
@@ -59,12 +59,12 @@ class ObjText:
 def parse_obj(path: Path, content: bytes) -> MeshFile:
     """Return the mesh of an OBJ file.
 
-    The weight w behind the coordinates is not used; it survives in the text.
+    The weight w after the coordinates is ignored; it is kept in the text.
 
     Raises:
         EmptyMeshError: there is no vertex or no face.
-        MeshFileError: a `v`, `vt` or `f` line is not what it should be.
-        FaceIndexError: a face names vertex 0, or a vertex or UV point that does not exist.
+        MeshFileError: a `v`, `vt` or `f` line is invalid.
+        FaceIndexError: a face refers to vertex 0, or to a vertex or UV point that does not exist.
     """
     newline = newline_of(content)
     vertices, colours, directions = (Growing(np.float64, 3) for _ in range(3))
@@ -81,19 +81,19 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
             i = int(np.argmax(counts < 3))
             block.fail(int(rows[i]), f"a face needs at least 3 corners, but has {counts[i]}")
         given, texture, normal = words.corners()
-        del words  # whose text would take room beside that of the next block
+        del words  # free its text before the next block is read
         above = len(vertices) + np.cumsum(kinds == _VERTEX)[rows]
         for polygon, text in _texts(block, kinds, newline):
             gaps[len(sizes) + polygon] += text
         vertices.add(points[:, :3])
-        # Many programs write a colour behind the position.
+        # Many programs write a colour after the position.
         if points.shape[1] in (6, 7):
             colours.add(points[:, 3:6])
         sizes.add(counts)
         if texture is not None:
             beyond = len(uv) + np.cumsum(kinds == _TEXTURE)[rows]
             counted = np.repeat(beyond, counts) + texture
-            # A number that counts back beyond the first is not a sign that there is none, as -1 is.
+            # -1 means that there is no UV point; an index that counts back too far becomes -2, which is an error.
             texture = np.where(texture < 0, np.where(counted < 0, -2, counted), texture - 1)
         uv.add(_uv_points(block, np.flatnonzero(kinds == _TEXTURE)))
         shade = normal
@@ -105,7 +105,7 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
             if found is not None:
                 known.add(np.full(len(corners) - len(known), none))
                 known.add(found)
-        # A negative number counts back from the vertices that stand above the face.
+        # A negative index counts back from the last vertex above the face.
         corners.add(np.where(given < 0, np.repeat(above, counts) + given, given - 1))
     check_filled(path, len(vertices), len(sizes))
     for known, none in ((textures, -1), (normals, 0), (shading, 0)):
@@ -123,7 +123,7 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
         ),
         properties=dict(zip(COLOURS, colours.done().T, strict=True)) if len(colours) == len(vertices) else {},
         texture=textures.done() if len(textures) else None,
-        # Some programs number UV points that they do not write.
+        # Some programs write indices of UV points, but not the points.
         uv=uv.done() if len(textures) and len(uv) else None,
         normals=directions.done(),
         normal=shading.done() - 1 if len(shading) else None,
@@ -133,7 +133,7 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
 
 
 def _uv_points(block: TextBlock, rows: IntArray) -> FloatArray:
-    """Return (k, 2) the points of `vt` lines; v is 0 where a line has but one number, and a third is left out."""
+    """Return (k, 2) the points of `vt` lines; v is 0 if a line has only one number, and a third is ignored."""
     words = block.words(rows, first=1)
     if len(rows) and words.counts.min() < 1:
         block.fail(int(rows[np.argmin(words.counts)]), "a UV point needs at least 1 number, but has none")
@@ -143,7 +143,7 @@ def _uv_points(block: TextBlock, rows: IntArray) -> FloatArray:
 
 
 def _directions(block: TextBlock, rows: IntArray) -> FloatArray:
-    """Return (r, 3) the normals in some lines; NaN if one of them is not of three numbers, which nothing hangs on."""
+    """Return (r, 3) the normals in some lines; all NaN if one is invalid, as normals are optional."""
     try:
         return block.words(rows, first=1).points()[:, :3]
     except MeshFileError:
@@ -151,7 +151,7 @@ def _directions(block: TextBlock, rows: IntArray) -> FloatArray:
 
 
 def _texts(block: TextBlock, kinds: NDArray[np.uint8], newline: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield what `ObjText.gaps` keeps of a block, in pieces, each with the polygons of the block before it."""
+    """Yield pieces of a block's text for `ObjText.gaps`, each with the number of polygons of the block before it."""
     polygons = np.cumsum(kinds == _FACE)
     kinds = np.where((kinds == _VERTEX) | (kinds == _NORMAL), _OTHER, kinds)
     if b"#" in block.raw:
@@ -164,7 +164,7 @@ def _texts(block: TextBlock, kinds: NDArray[np.uint8], newline: bytes) -> Iterat
     for i in np.flatnonzero(kept).tolist():
         kind, text = kinds[runs[i]], block.raw[starts[i] : starts[i + 1]]
         if kind == _ELEMENT:
-            # The new texture coordinates have other numbers.
+            # Indices of texture coordinates are removed, as the new ones differ.
             text = _TEXTURE_INDICES.sub(rb"\1", text)
         elif kind == _COMMENTED_FACE:
             text = text[text.index(b"#") :].rstrip(b"\r\n") + newline
@@ -172,7 +172,7 @@ def _texts(block: TextBlock, kinds: NDArray[np.uint8], newline: bytes) -> Iterat
 
 
 def _check_corners(path: Path, content: bytes, mesh: MeshFile) -> None:
-    """Raise FaceIndexError for the first corner that names no vertex, or no UV point."""
+    """Raise FaceIndexError for the first corner with an invalid index of a vertex or UV point."""
     c = first_bad_corner(mesh.corners, len(mesh.vertices))
     if c is not None:
         line, given = _corner_line(path, content, c, 0)
@@ -189,7 +189,7 @@ def _check_corners(path: Path, content: bytes, mesh: MeshFile) -> None:
 
 
 def _corner_line(path: Path, content: bytes, c: int, part: int) -> tuple[int, int]:
-    """Return the line in which corner c stands, and the number there of its vertex (part 0) or UV point (part 1)."""
+    """Return the line number of corner c, and the index there of its vertex (part 0) or UV point (part 1)."""
     for block in text_blocks(path, content, continued=True):
         rows = np.flatnonzero(_KINDS[block.heads()] == _FACE)
         words = block.words(rows, first=1)
@@ -204,24 +204,24 @@ def _corner_line(path: Path, content: bytes, c: int, part: int) -> tuple[int, in
 def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
     """Write a result as OBJ.
 
-    If the mesh was read from an OBJ file, every line of that file stands in its place, but for its old
-    texture coordinates: the new ones are put before the first face, and each face line names them beside the
-    file's own vertex and normal numbers. Polygons stay polygons, those whose orientation was repaired run the
-    other way, and those that the repair dropped are left out. A polygon that is not convex in the plane, is cut
-    by a seam, or was dropped in part, is written in convex pieces. Of another file, what is written are its
-    vertices, polygons and normals. Paths of material libraries are made to fit `folder`.
+    If the mesh was read from an OBJ file, all lines of that file are kept in their order, except for old texture
+    coordinates: the new ones are written before the first face, and each face line refers to them in addition to the
+    file's vertex and normal indices. Polygons are kept; those with repaired orientation are reversed, and those that
+    the repair dropped are left out. A polygon that is not convex in the plane, is cut by a seam, or was partly dropped,
+    is written in convex pieces. For a mesh from another file, its vertices, polygons and normals are written. Paths of
+    material libraries are rewritten relative to `folder`.
 
     Args:
-        result: what to write.
+        result: the result to write.
         stream: a binary file.
-        folder: where the file will be, for paths of material libraries.
+        folder: folder of the file, for paths of material libraries.
     """
     source, text, normals = result.source, ObjText({}, None, b"\n"), None
     vertices, faces, face_corners = result.vertices, result.faces, result.face_corners
     if source is not None and face_corners is not None:
         vertices, offsets, numbers = source.vertices, source.offsets, source.corners + 1
         if source.obj is not None:
-            # Its own vertices stand in the text, those that were merged as well.
+            # The text contains the vertices of the file, including merged ones.
             numbers = numbers if source.unwelded is None else source.unwelded + 1
             text = _relocated(source.obj, source.path.parent, folder)
         elif source.normals is not None and source.normal is not None:
@@ -253,7 +253,7 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
 
 
 def lines_of(begin: str, rows: FloatArray | IntArray, newline: bytes) -> Iterator[bytes]:
-    """Yield a text with a line for each of (r, k) rows: the fewest digits from which the same numbers are read."""
+    """Yield text with a line for each of (r, k) rows, with the fewest digits from which the same numbers are read."""
     line = begin + " %r" * rows.shape[1] + newline.decode()
     for i in range(0, len(rows), _LINES):
         block = rows[i : i + _LINES]
@@ -261,7 +261,7 @@ def lines_of(begin: str, rows: FloatArray | IntArray, newline: bytes) -> Iterato
 
 
 def _face_lines(sizes: IntArray, rows: IntArray, newline: bytes) -> bytes:
-    """Return the lines of faces, with one row of numbers for each corner; a normal of 0 is none."""
+    """Return the lines of faces, with one row of indices for each corner; a normal of 0 is left out."""
     corner, end = " " + "/".join(["%d"] * rows.shape[1]), newline.decode()
     lines = "".join(["f" + corner * size + end for size in sizes.tolist()])
     text = (lines % tuple(rows.ravel().tolist())).encode()
@@ -269,19 +269,19 @@ def _face_lines(sizes: IntArray, rows: IntArray, newline: bytes) -> bytes:
 
 
 def _ended(text: bytes, newline: bytes, is_last: bool) -> bytes:
-    """Return text that a line can follow."""
+    """Return text that ends with a newline, unless it is empty or the last."""
     return text + newline if text and not is_last and not text.endswith((b"\n", b"\r")) else text
 
 
 def _relocated(text: ObjText, old: Path, new: Path) -> ObjText:
-    """Return the text with its material libraries named relative to another folder."""
+    """Return the text with paths of material libraries rewritten relative to another folder."""
     here, there = os.path.realpath(old), os.path.realpath(new)
     if here == there:
         return text
 
     def line(match: re.Match[bytes]) -> bytes:
         names = match[2]
-        # Several names may stand on a line, and so may one name with blanks; the folder tells.
+        # A line may have several names, or one name with blanks; it is one name if such a file exists.
         is_one = os.path.exists(os.path.join(os.fsencode(here), names))
         parts = [names] if is_one else names.split()
         return match[1] + b" ".join(moved_path(name, here, there) for name in parts)

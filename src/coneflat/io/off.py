@@ -1,4 +1,4 @@
-"""Reading OFF, with its polygons."""
+"""Reader for OFF files, which keeps polygons."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ..errors import MeshFileError
 from .mesh_file import MeshFile, offsets_of
 from .text import Growing, TextBlock, text_blocks
 
-# Normals follow the position, then colours and texture coordinates, so that these can be passed over; "4" and "n"
-# change what the position itself is.
+# Colours and texture coordinates follow the position and normal, so that they can be ignored; "4" and "n" change the
+# dimension of the position.
 _HEADER = re.compile(rb"(ST)?(C)?(N)?(4)?(n)?OFF\b", re.IGNORECASE)
 _LINE = re.compile(rb"([^\r\n]*)(?:\r\n|[\r\n]|\Z)")
 
 
 def is_off(content: bytes) -> bool:
-    """Return whether a file begins as one of OFF does that has its keyword."""
+    """Return True if a file begins with the keyword of OFF."""
     return _HEADER.match(next((line for _, line, _ in _filled_lines(content[:4096])), b"")) is not None
 
 
@@ -29,7 +29,7 @@ def parse_off(path: Path, content: bytes) -> MeshFile:
     """Return the mesh of an OFF file: OFF, COFF, NOFF, STOFF and their combinations, in text.
 
     Raises:
-        MeshFileError: the file is not OFF, is shorter than its header promises, or has text for a number.
+        MeshFileError: the file is not OFF, has fewer elements than its header declares, or has text for a number.
     """
     vertex_count, face_count, begin, has_normals = _header(path, content)
     vertices, normals = Growing(np.float64, 3), Growing(np.float64, 3)
@@ -48,9 +48,9 @@ def parse_off(path: Path, content: bytes) -> MeshFile:
         corners.add(named)
         lines += len(rows)
     if lines < vertex_count:
-        raise MeshFileError(f"{path} ends after {lines} of the {vertex_count} vertices it promises")
-    if (held := lines - vertex_count) < face_count:
-        raise MeshFileError(f"{path} ends after {held} of the {face_count} faces it promises")
+        raise MeshFileError(f"{path} ends after {lines} of the {vertex_count} vertices in its header")
+    if (found := lines - vertex_count) < face_count:
+        raise MeshFileError(f"{path} ends after {found} of the {face_count} faces in its header")
     mesh = MeshFile(path, vertices.done(), corners.done(), offsets_of(sizes.done()))
     if len(normals) < vertex_count or not vertex_count:
         return mesh
@@ -60,7 +60,7 @@ def parse_off(path: Path, content: bytes) -> MeshFile:
 def _polygons(block: TextBlock, rows: IntArray) -> tuple[IntArray, IntArray]:
     """Return the sizes and the corners of the polygons in some lines."""
     sizes = block.words(rows, stop=1).integers("a number of corners")
-    # What follows the corners is a colour, which need not be of integers.
+    # A colour may follow the corners; its numbers need not be integers.
     words = block.words(rows, first=1, stop=1 + np.maximum(sizes, 0))
     corners = words.integers()
     short = (words.counts != sizes) | (sizes < 3)
@@ -73,15 +73,15 @@ def _polygons(block: TextBlock, rows: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _header(path: Path, content: bytes) -> tuple[int, int, int, bool]:
-    """Return the counts of vertices and faces, where the lines behind them begin, and if vertices have normals."""
+    """Return the numbers of vertices and faces, the position after the header, and whether vertices have normals."""
     lines = _filled_lines(content)
     number, first, end = next(lines, (0, b"", 0))
     if not first:
-        raise MeshFileError(f"{path} is not an OFF file: it has nothing but comments")
+        raise MeshFileError(f"{path} is not an OFF file: it contains only comments")
     keyword = _HEADER.match(first)
     if keyword:
         if keyword.group(4) or keyword.group(5):
-            raise MeshFileError(f"{path}: OFF with points of another dimension than 3 is not supported")
+            raise MeshFileError(f"{path}: OFF with points of a dimension other than 3 is not supported")
         first = first[keyword.end() :].strip()
         if first.upper().startswith(b"BINARY"):
             raise MeshFileError(f"{path} is a binary OFF file, which is not supported; convert it to text")
@@ -92,15 +92,15 @@ def _header(path: Path, content: bytes) -> tuple[int, int, int, bool]:
         vertex_count, face_count = int(words[0]), int(words[1])
     except (ValueError, IndexError):
         raise MeshFileError(
-            f"{path}, line {number}: not an OFF file, the numbers of vertices and faces were expected"
+            f"{path}, line {number}: not an OFF file, expected the numbers of vertices and faces"
         ) from None
     if vertex_count < 0 or face_count < 0:
-        raise MeshFileError(f"{path}, line {number}: a number of vertices or faces is negative")
+        raise MeshFileError(f"{path}, line {number}: the number of vertices or faces is negative")
     return vertex_count, face_count, end, keyword is not None and keyword.group(3) is not None
 
 
 def _filled_lines(content: bytes) -> Iterator[tuple[int, bytes, int]]:
-    """Yield the number, the text without comment and the end of each line that has any."""
+    """Yield the number, the text without comment and the end position of each line that is not blank."""
     for number, line in enumerate(_LINE.finditer(content), 1):
         text = line[1].partition(b"#")[0].strip()
         if text:

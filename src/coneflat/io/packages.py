@@ -1,6 +1,6 @@
-"""Meshes from arrays, files and the mesh classes of other packages, and results as meshes of these.
+"""Conversion of arrays, files and meshes of other packages to input meshes, and of results to meshes of other packages.
 
-Other packages are imported when they are asked for.
+Other packages are imported only when they are needed.
 """
 
 from __future__ import annotations
@@ -24,21 +24,22 @@ if TYPE_CHECKING:
 
 
 def as_input(mesh: Any, faces: ArrayLike | None = None) -> InputMesh:
-    """Return the triangles of whatever the user has.
+    """Return the input mesh for any of the supported types of meshes.
 
     Args:
-        mesh: vertices (n, 3) if `faces` is given; else a path, a `MeshFile`, a pair (vertices, faces), or
+        mesh: vertices (n, 3) if `faces` is given; otherwise a path, a `MeshFile`, a pair (vertices, faces), or
             an object like those of trimesh (`vertices`, `faces`), meshio (`points`, `cells`) or pyvista
             (`points`, `faces`).
         faces: (m, 3) vertex indices.
 
     Raises:
-        ArrayShapeError: it is none of these, or a file with faces beside it.
+        ArrayShapeError: `mesh` has another type, or `faces` is given in addition to a mesh or file.
+        MeshFileError: the file cannot be read; see `read_mesh` for further errors.
     """
     if faces is not None:
         if isinstance(mesh, (str, PathLike)) or hasattr(mesh, "faces"):
             raise ArrayShapeError(
-                "a mesh or file has faces of its own: leave out faces, or give vertices (n, 3)"
+                "a mesh or file already has faces: leave out faces, or give vertices (n, 3)"
             )
         return InputMesh(mesh, faces)
     if isinstance(mesh, (str, PathLike)):
@@ -70,7 +71,7 @@ def _from_meshio(mesh: Any) -> InputMesh:
 
 def _from_pyvista(mesh: Any) -> InputMesh:
     padded = np.asarray(mesh.faces)
-    if padded.ndim == 2:  # not padded: rows of one size
+    if padded.ndim == 2:  # not padded: rows of equal size
         return InputMesh(mesh.points, padded)
     if padded.size and padded.size % 4 == 0 and (padded[::4] == 3).all():
         return InputMesh(mesh.points, padded.reshape(-1, 4)[:, 1:])
@@ -80,8 +81,8 @@ def _from_pyvista(mesh: Any) -> InputMesh:
         end = position + 1 + size
         if size < 1 or end > padded.size:
             raise ArrayShapeError(
-                f"the flat array of faces is broken at {position}: a face of {size} corners with "
-                f"{padded.size - position - 1} numbers left"
+                f"the flat array of faces is invalid at {position}: a face of {size} corners, but "
+                f"{padded.size - position - 1} numbers are left"
             )
         polygons.append(padded[position + 1 : end].tolist())
         position = end
@@ -90,10 +91,10 @@ def _from_pyvista(mesh: Any) -> InputMesh:
 
 def _from_polygons(points: ArrayLike, polygons: list[list[int]]) -> InputMesh:
     vertices = np.asarray(points, dtype=np.float64)
-    if vertices.ndim == 2 and vertices.shape[1] == 2:  # meshes of the plane
+    if vertices.ndim == 2 and vertices.shape[1] == 2:  # planar meshes
         vertices = np.column_stack([vertices, np.zeros(len(vertices))])
     if vertices.ndim != 2 or vertices.shape[1] != 3:
-        raise ArrayShapeError(f"points must have the shape (n, 3), not {vertices.shape}")
+        raise ArrayShapeError(f"points must have the shape (n, 3), got {vertices.shape}")
     offsets = offsets_of(np.array([len(polygon) for polygon in polygons], dtype=np.int64))
     corners = np.array([v for polygon in polygons for v in polygon], dtype=np.int64)
     return InputMesh(vertices, triangulate(vertices, corners, offsets)[0])
@@ -117,7 +118,7 @@ def to_pyvista(result: Flattening) -> Any:
     """Return a `pyvista.PolyData`; see `Flattening.to_pyvista`."""
     pyvista = _imported("pyvista", "PyVista")
     split = split_at_seams(result)
-    # Before each triangle stands its number of corners.
+    # Each triangle is preceded by its number of corners.
     padded = np.insert(split.faces, 0, 3, axis=1)
     mesh = pyvista.PolyData(split.vertices, padded.ravel())
     mesh.point_data["vertex"] = split.own
@@ -133,7 +134,7 @@ def to_meshio(result: Flattening) -> Any:
     return meshio.Mesh(
         split.vertices,
         [("triangle", split.faces)],
-        # The name by which meshio itself reads and writes them.
+        # The name that meshio uses to read and write UVs.
         point_data={"obj:vt": split.uv, "vertex": split.own},
         cell_data={"chart": [result.seam_data.face_chart]},
     )

@@ -1,7 +1,7 @@
-"""PLY: reading it, text and binary, with its polygons, and writing it.
+"""Reader for PLY files, text and binary, which keeps polygons, and writer for PLY.
 
-An own reader, since polygons, all numbers of vertices and the UVs of corners are to survive, and what a header promises
-is not to be believed before it is found.
+This package has its own reader to keep polygons, all vertex properties and the UVs of corners, and to check the counts
+in a header before memory is allocated.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from .text import Growing, text_blocks
 if TYPE_CHECKING:
     from ..result import Flattening
 
-#: The code of each type, both numpy's and struct's.
+#: The code of each type, in numpy and in struct.
 _TYPES = {
     "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d",
     "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q",
     "float32": "f", "float64": "d",
 }  # fmt: skip
-#: One property of an element, all rows of it.
+#: One property of an element in all rows.
 Column: TypeAlias = "np.ndarray[tuple[int, ...], np.dtype[Any]]"
 
 _CORNERS = ("vertex_indices", "vertex_index")
-#: What programs call a vertex's UV point, and the list of those of a face's corners: u, v, u, v, ...
+#: Names that programs use for a vertex's UV point, and for the list of those of a face's corners: u, v, u, v, ...
 _VERTEX_UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("u0", "v0"))
 _FACE_UV = "texcoord"
 
@@ -56,7 +56,7 @@ class _Element:
 
     @cached_property
     def steps(self) -> list[tuple[int, struct.Struct | None]]:
-        """Of each property, the bytes of the value or of an item, and what reads a list's length."""
+        """Return for each property the bytes of the value or of an item, and the struct that reads a list's length."""
         sizes = (np.dtype(p.kind).itemsize for p in self.properties)
         counts = (struct.Struct(p.count) if p.count else None for p in self.properties)
         return list(zip(sizes, counts, strict=True))
@@ -66,13 +66,13 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
     """Return the mesh of a PLY file.
 
     Raises:
-        MeshFileError: the file is not PLY, is shorter than its header promises, or has text for a number.
+        MeshFileError: the file is not PLY, has fewer elements than its header declares, or has text for a number.
         EmptyMeshError: it has no vertex or no face.
     """
     form, elements, start = _header(path, content)
     if form == "ascii":
-        # As an array of doubles the text is read by the same code as the binary forms; doubles hold every
-        # index a file can have.
+        # Converted to an array of doubles, the text is read by the same code as the binary forms; doubles represent
+        # every possible index exactly.
         content, start = _text_values(path, content, start), 0
     vertices: FloatArray = np.empty((0, 3))
     sizes: IntArray = np.empty(0, np.int64)
@@ -84,14 +84,14 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
             columns, start = _decode(content, start, _stored(element, form), wanted)
         except _EndOfFile as error:
             raise MeshFileError(
-                f"{path} ends before the {element.length} {element.name} elements its header promises"
+                f"{path} ends before the {element.length} {element.name} elements in its header"
             ) from error
         if element.name == "vertex":
             names = [element.properties[i].name for i in wanted]
             vertices = np.stack([np.asarray(c, np.float64) for c in columns[:3]], axis=1)
             properties = {name: _shade(name, c) for name, c in zip(names[3:], columns[3:], strict=True)}
         elif element.name == "face":
-            sizes, corners = columns[0].astype(np.int64), _whole(path, columns[1])
+            sizes, corners = columns[0].astype(np.int64), _as_integers(path, columns[1])
             texture, uv = _corner_uv(path, sizes, *columns[2:]) if columns[2:] else (None, None)
         missing.discard(element.name)
         if not missing:
@@ -120,10 +120,10 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
 
 
 def _corner_uv(path: Path, sizes: IntArray, counts: Column, numbers: Column) -> tuple[IntArray, FloatArray]:
-    """Return (c,) the number of each corner's UV point and (u, 2) the points; a face may have no list.
+    """Return (c,) the index of each corner's UV point and (u, 2) the points; a face may have an empty list.
 
     Raises:
-        MeshFileError: a face's list has not two numbers for each of its corners.
+        MeshFileError: a face's list does not have two numbers for each of its corners.
     """
     wrong = (counts != 0) & (counts != 2 * sizes)
     if wrong.any():
@@ -138,7 +138,7 @@ def _corner_uv(path: Path, sizes: IntArray, counts: Column, numbers: Column) -> 
 
 
 def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
-    """Return the form, the elements, and where the header ends."""
+    """Return the format, the elements, and the position after the header."""
     end = content.find(b"end_header")
     if not content.startswith(b"ply") or end < 0:
         raise MeshFileError(f"{path} is not a PLY file: it has no PLY header")
@@ -146,7 +146,7 @@ def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
     start = end + len(b"end_header")
     while content[start : start + 1] == b" ":
         start += 1
-    # A lone carriage return ends the lines of some old files; what follows it is data then.
+    # Some old files end lines with a single carriage return; then a line feed after it is data.
     start += 2 if content[start : start + 2] == b"\r\n" and b"\n" in content[:end] else 1
 
     form = ""
@@ -167,14 +167,14 @@ def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
                     new = _Property(words[2], _TYPES[words[1]])
                 elements[-1] = replace(elements[-1], properties=(*elements[-1].properties, new))
         except (IndexError, KeyError, ValueError) as error:
-            raise MeshFileError(f"{path}, line {i + 1}: not a line of a PLY header: {line!r}") from error
+            raise MeshFileError(f"{path}, line {i + 1}: invalid line in a PLY header: {line!r}") from error
     if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
-        raise MeshFileError(f"{path} is not a PLY file: its header names no known format")
+        raise MeshFileError(f"{path} is not a PLY file: its header has no known format")
     return form, elements, start
 
 
 def _wanted(path: Path, element: _Element) -> list[int]:
-    """Return which properties of an element make up the mesh."""
+    """Return the indices of the properties of an element that are part of the mesh."""
     if element.name == "vertex":
         names = [p.name for p in element.properties]
         missing = [axis for axis in "xyz" if axis not in names]
@@ -192,17 +192,17 @@ def _wanted(path: Path, element: _Element) -> list[int]:
 
 
 def _shade(name: str, values: Column) -> FloatArray:
-    """Return a property as doubles; colours, which are bytes in most files, from 0 to 1."""
+    """Return a property as doubles; colours, which are bytes in most files, are scaled to 0 to 1."""
     numbers = np.asarray(values, np.float64)
     return numbers / 255 if name in COLOURS and numbers.max(initial=0.0) > 1 else numbers
 
 
 class _EndOfFile(Exception):
-    """The file is shorter than its header promises."""
+    """Signals that the file is shorter than its header declares."""
 
 
 def _decode(content: bytes, start: int, element: _Element, wanted: list[int]) -> tuple[list[Column], int]:
-    """Return the wanted columns of an element, a list as two (lengths, items), and where it ends."""
+    """Return the wanted columns of an element, a list as two columns (lengths, items), and its end position."""
     lists = [i for i, p in enumerate(element.properties) if p.count]
     first = _row(content, start, element)[1] if element.length else [0] * len(lists)
     lengths = dict(zip(lists, first, strict=True))
@@ -228,7 +228,7 @@ def _decode(content: bytes, start: int, element: _Element, wanted: list[int]) ->
 def _decode_ragged(
     content: bytes, start: int, element: _Element, wanted: list[int]
 ) -> tuple[list[Column], int]:
-    """Return what `_decode` does, of an element whose lists differ in length."""
+    """Return the same as `_decode` for an element whose lists differ in length."""
     codes = np.frombuffer(content, np.uint8)
     starts = [start]
     for _ in range(element.length):
@@ -255,10 +255,10 @@ def _decode_ragged(
 
 
 def _row(content: bytes, start: int, element: _Element) -> tuple[int, list[int]]:
-    """Return where a row of an element ends, and how long its lists are.
+    """Return the end position of a row of an element, and the lengths of its lists.
 
     Raises:
-        _EndOfFile: the content ends before.
+        _EndOfFile: the content ends within the row.
     """
     lengths = []
     for size, count in element.steps:
@@ -285,7 +285,7 @@ def _text_values(path: Path, content: bytes, start: int) -> bytes:
 
 
 def _stored(element: _Element, form: str) -> _Element:
-    """Return an element with its properties' types as they are stored, those of a text as `_text_values` gives them."""
+    """Return an element with the stored types of its properties; for text they are those of `_text_values`."""
     order = ">" if form == "binary_big_endian" else "<"
 
     def kind(code: str) -> str:
@@ -295,8 +295,8 @@ def _stored(element: _Element, form: str) -> _Element:
     return replace(element, properties=tuple(stored))
 
 
-def _whole(path: Path, corners: Column) -> IntArray:
-    """Return corners as integers, which in a text they need not be."""
+def _as_integers(path: Path, corners: Column) -> IntArray:
+    """Return corners as integers; in a text file they may be given as decimal numbers."""
     numbers = corners.astype(np.int64, copy=False)
     if corners.dtype.kind == "f" and np.any(numbers != corners):
         odd = corners[np.argmax(numbers != corners)]
@@ -307,12 +307,11 @@ def _whole(path: Path, corners: Column) -> IntArray:
 def write_ply(result: Flattening, stream: IO[bytes]) -> None:
     """Write a result as binary little-endian PLY, coordinates as doubles.
 
-    Every vertex has its UV as `s` and `t`, and as `source_vertex` the vertex of the input that it came from;
-    where the mesh was cut there are several of the same. If the input has normals or colours, so have they. Vertices
-    without a face are left out.
+    Every vertex has its UV as `s` and `t`, and its vertex in the input as `source_vertex`; a vertex at a seam is
+    repeated. Normals and colours of the input are kept. Vertices without a face are left out.
 
     Args:
-        result: what to write.
+        result: the result to write.
         stream: a binary file.
     """
     mesh = split_at_seams(result, source_normals(result))
@@ -342,9 +341,9 @@ def write_parts(
 
     Args:
         stream: a binary file.
-        comment: a line of the header.
-        properties: of a vertex: "double x", say.
-        vertices: (n, ...) as they lie in the file, with these properties.
+        comment: a comment line of the header.
+        properties: declarations of the vertex properties, such as "double x".
+        vertices: (n, ...) structured array with these properties in the layout of the file.
         faces: (m, k) vertex indices.
     """
     rows = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", faces.shape[1])])
@@ -366,7 +365,7 @@ def write_parts(
 
 
 def _colours(result: Flattening, vertices: IntArray) -> NDArray[np.uint8]:
-    """Return (k, 3) the colours that the file gives vertices of the result, 0 to 255; (k, 0) if it gives none."""
+    """Return (k, 3) the colours of vertices of the result in the source file, 0 to 255; (k, 0) if it has none."""
     source = result.source
     if source is None or result.face_corners is None or not source.has_colours:
         return np.empty((len(vertices), 0), np.uint8)

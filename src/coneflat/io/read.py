@@ -1,4 +1,4 @@
-"""Reading a mesh from a file."""
+"""Reading of a mesh from a file."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _READERS: dict[str, Callable[[Path, bytes], MeshFile]] = {
     ".gltf": parse_gltf,
     ".glb": parse_gltf,
 }
-#: STL has no shared vertices at all; glTF repeats a vertex wherever a normal or a UV differs.
+#: STL has no shared vertices; glTF repeats a vertex wherever a normal or a UV differs.
 _WELDED_BY_DEFAULT = {".stl", ".gltf", ".glb"}
 
 #: Endings of the files that `read_mesh` reads.
@@ -42,24 +42,27 @@ INPUT_FORMATS = tuple(_READERS)
 def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
     """Return the mesh of a file, with its polygons, in the file's own order of vertices and faces.
 
-    The format follows the path's ending, in any case: .obj, .ply, .stl, .off, .gltf, .glb. Of a glTF scene
-    all meshes are joined, each placed by its nodes' transforms. NaN and infinite coordinates are passed on.
+    The format is given by the path's ending, in upper or lower case: .obj, .ply, .stl, .off, .gltf, .glb. All meshes of
+    a glTF scene are combined, each transformed by its nodes. NaN and infinite coordinates are not rejected here.
 
-    OBJ, OFF, PLY and STL have parsers of their own: libraries renumber vertices, split polygons, or drop the
-    groups, materials and comments that an OBJ is to keep.
+    OBJ, OFF, PLY and STL have parsers in this package, because libraries renumber vertices, split polygons, or drop the
+    groups, materials and comments that are needed to write an OBJ.
 
-    Of glTF, vertices of one node alone are merged. What the file says of normals, or of smoothing, is kept.
+    For glTF, vertices are merged only within a node. Normals and smoothing groups of the file are kept.
 
     Args:
-        path: the file; "-" for standard input, whose content tells the format.
-        weld: whether to merge vertices at exactly the same position; by default only where the format
-            cannot share vertices, which is STL and glTF.
+        path: the file; "-" for standard input, whose format is recognized by its content.
+        weld: whether to merge vertices at exactly the same position; by default only for formats that
+            cannot share vertices, which are STL and glTF.
+
+    Returns:
+        The mesh.
 
     Raises:
         UnknownFormatError: the ending is not one of `INPUT_FORMATS`.
-        MeshFileError: the file is not there, may not be read, or is not what its ending says.
+        MeshFileError: the file does not exist, cannot be read, or is not of the format of its ending.
         EmptyMeshError: it has no vertex or no face.
-        FaceIndexError: a face names a vertex that does not exist.
+        FaceIndexError: a face refers to a vertex that does not exist.
 
     Examples:
         >>> mesh = coneflat.read_mesh(coneflat.sample_path())
@@ -84,22 +87,23 @@ def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
 def read_mesh_from(
     content: bytes, name: PathName, weld: bool | None = None, ending: str | None = None
 ) -> MeshFile:
-    """Return the mesh that the content of a file is; see `read_mesh`.
+    """Return the mesh in the content of a file; see `read_mesh`.
 
     Args:
         content: the whole file.
-        name: what to call it. A glTF's buffers and images are sought beside it, an OBJ's materials left there.
+        name: its path. Buffers and images of a glTF are read from the same folder; paths of OBJ materials are relative
+            to it.
         weld: as of `read_mesh`.
-        ending: one of `INPUT_FORMATS`, which tells the format; by default the content does.
+        ending: the format, one of `INPUT_FORMATS`; by default it is recognized by the content.
 
     Raises:
         UnknownFormatError: the ending is not one of `INPUT_FORMATS`.
         MeshFileError, EmptyMeshError, FaceIndexError: as of `read_mesh`.
-        OptionError: `weld` is none of these.
+        OptionError: `weld` is not True, False or None.
     """
     path = Path(name)
     if weld is not None and not isinstance(weld, (bool, np.bool_)):
-        raise OptionError(f"weld is True, False or None, not {shown(weld)}")
+        raise OptionError(f"weld must be True, False or None, got {shown(weld)}")
     if not content or content.isspace():
         raise EmptyMeshError(f"{path} is empty")
     ending = format_of(content) if ending is None else ending.lower()
@@ -108,7 +112,7 @@ def read_mesh_from(
             f"{ending!r} is not a format that meshes are read from: {', '.join(INPUT_FORMATS)}"
         )
     with readable(path, f"{ending[1:].upper()} file"):
-        with np.errstate(invalid="ignore"):  # coordinates that are not numbers are passed on
+        with np.errstate(invalid="ignore"):  # NaN coordinates are not rejected here
             mesh = _READERS[ending](path, content)
         check_corners(path, mesh)
     normal = None
@@ -119,7 +123,7 @@ def read_mesh_from(
 
 
 def format_of(content: bytes) -> str:
-    """Return the ending that files of such content have: one of `INPUT_FORMATS`; .obj of what is nothing else."""
+    """Return the ending in `INPUT_FORMATS` for the format of a content; .obj if it is none of the others."""
     head = content[:512].removeprefix(b"\xef\xbb\xbf").lstrip()
     if content.startswith(b"glTF"):
         return ".glb"
@@ -133,7 +137,7 @@ def format_of(content: bytes) -> str:
 
 
 def _welded(mesh: MeshFile) -> MeshFile:
-    """Return a mesh with vertices at the same position merged, those of each node of a scene for themselves."""
+    """Return a mesh with vertices at the same position merged, separately for each node of a scene."""
     blocks = (0, len(mesh.vertices)) if mesh.scene is None else mesh.scene.blocks
     kept, merged, count = [], [], 0
     for begin, end in pairwise(blocks):
@@ -155,10 +159,10 @@ def _welded(mesh: MeshFile) -> MeshFile:
 
 
 def find_meshes(pattern: str) -> list[str]:
-    """Return the paths that a pattern names, in their order: a file, a folder's meshes, or what *, ? and ** match.
+    """Return the sorted paths of a pattern: a file, the meshes of a folder, or the meshes that *, ? and ** match.
 
     Raises:
-        OptionError: it matches no mesh.
+        OptionError: the pattern matches no mesh.
         MeshFileError: the folder cannot be read.
     """
     if os.path.isdir(pattern):
@@ -177,18 +181,18 @@ def find_meshes(pattern: str) -> list[str]:
 
 
 def read_joined(path: PathName, weld: bool | None = None) -> Joined:
-    """Return the mesh of a file, closed where nobody could want it open.
+    """Return the mesh of a file with duplicated border edges joined.
 
     Args:
         path: the file.
         weld: True merges all vertices at the same position and False none; None merges them in the formats that
-            cannot share vertices, and in the others joins borders that coincide.
+            cannot share vertices, and joins coinciding borders in the others.
 
     Raises:
         MeshError, MeshFileError: as of `read_mesh`.
     """
     mesh = read_mesh(path, weld)
-    # What a scene has as several nodes stays apart.
+    # Different nodes of a scene stay separate.
     if weld is not None or mesh.unwelded is not None or mesh.scene is not None:
         return Joined(mesh, np.arange(len(mesh.vertices)))
     return join_borders(mesh)

@@ -1,6 +1,6 @@
-"""Vertices split along UV seams and creases, and the normals that the file or its smoothing groups give.
+"""Splitting of vertices along UV seams and creases, and normals from the file or its smoothing groups.
 
-For formats with one UV and one normal per vertex.
+This is needed for formats with one UV point and one normal per vertex.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ _SMOOTHING = re.compile(rb"(?m)^[ \t]*s[ \t]+(\S+)")
 
 
 class CornerNormals(NamedTuple):
-    """Normals of a surface that need not be smooth everywhere.
+    """Normals of the triangle corners of a surface, which may have creases.
 
     Attributes:
-        normals: (k, 3) unit vectors, all different.
-        corners: (m, 3) index into them of every triangle corner.
+        normals: (k, 3) distinct unit vectors.
+        corners: (m, 3) index into `normals` of every triangle corner.
     """
 
     normals: FloatArray
@@ -35,15 +35,15 @@ class CornerNormals(NamedTuple):
 
 
 class SplitMesh(NamedTuple):
-    """A mesh with one vertex for each vertex, UV point and normal that a triangle has together.
+    """A mesh with one vertex for each combination of vertex, UV point and normal at a triangle corner.
 
     Attributes:
         vertices: (k, 3) positions.
         uv: (k, 2) UV points.
         faces: (m, 3) triangles.
-        own: (k,) the vertex of the result.
-        origin: (k,) the vertex of the input.
-        normals: (k, 3) normals, if some were given.
+        own: (k,) the vertex of the result for each vertex.
+        origin: (k,) the vertex of the input for each vertex.
+        normals: (k, 3) normals, if they were given.
     """
 
     vertices: FloatArray
@@ -55,9 +55,11 @@ class SplitMesh(NamedTuple):
 
 
 def split_at_seams(result: Flattening, normals: CornerNormals | None = None) -> SplitMesh:
-    """Return the mesh of a result, split; in the order of its vertices, those without a face left out.
+    """Return the mesh of a result split at its UV seams, in the order of its vertices, without unused vertices.
 
-    normals: those at which it is to be split, too.
+    Args:
+        result: the flattening.
+        normals: normals of the triangle corners; vertices are also split where these differ.
     """
     own, point, faces = _pairs(result.faces.reshape(-1), result.uv_faces.reshape(-1), len(result.uv))
     shading = None
@@ -70,11 +72,11 @@ def split_at_seams(result: Flattening, normals: CornerNormals | None = None) -> 
 
 
 def _pairs(vertices: IntArray, points: IntArray, point_count: int) -> tuple[IntArray, IntArray, IntArray]:
-    """Return the vertices and the points of all different pairs, in order, and the number of every pair."""
+    """Return the vertices and the points of all distinct pairs, in order, and the index of every given pair."""
     vertex_of = np.full(point_count, -1, dtype=np.int64)
     vertex_of[points] = vertices
     if np.array_equal(vertex_of[points], vertices):
-        # Each point has one vertex, as in all layouts of our own: they are fewer than the pairs, and sooner sorted.
+        # Each point has one vertex, as in all layouts of this package: sorting the points is faster than the pairs.
         used = np.flatnonzero(vertex_of >= 0)
         point = used[np.argsort(vertex_of[used], kind="stable")]
         number = np.empty(point_count, dtype=np.int64)
@@ -85,7 +87,7 @@ def _pairs(vertices: IntArray, points: IntArray, point_count: int) -> tuple[IntA
 
 
 def usable_normals(normals: FloatArray, corners: IntArray) -> IntArray | None:
-    """Return (c,) index of each corner into (k, 3) normals, -1 for those that are none; None if no corner has any."""
+    """Return (c,) the index of each corner into (k, 3) normals, -1 for unusable normals; None if all are unusable."""
     is_usable = np.append(np.isfinite(normals).all(axis=1) & normals.any(axis=1), False)
     known = np.where((corners >= 0) & (corners < len(normals)), corners, -1)
     known = np.where(is_usable[known], known, -1)
@@ -93,10 +95,10 @@ def usable_normals(normals: FloatArray, corners: IntArray) -> IntArray | None:
 
 
 def source_normals(result: Flattening) -> CornerNormals | None:
-    """Return the shading of the file that a result was read from; None where it says nothing of it.
+    """Return the corner normals of the file that a result was read from; None if it has neither normals nor groups.
 
-    That is the file's normals, or what its smoothing groups make; corners without either have the mean normal of
-    their vertex.
+    These are the file's normals, or those computed from its smoothing groups; corners without either get the mean
+    normal of their vertex.
     """
     source = result.source
     if source is None or result.face_corners is None:
@@ -113,13 +115,13 @@ def source_normals(result: Flattening) -> CornerNormals | None:
         corners = np.where(missing, len(normals) + result.faces, corners)
         normals = np.concatenate([normals, vertex_normals(result.vertices, result.faces)])
     used, numbers = np.unique(corners, return_inverse=True)
-    # Many files have a normal for every corner, most of them the same.
+    # Many files have a normal for every corner, most of them equal.
     kept, merged = weld(shading_normals(normals[used]))
     return CornerNormals(shading_normals(normals[used][kept]), merged[numbers.reshape(corners.shape)])
 
 
 def _smoothing_groups(source: MeshFile) -> IntArray | None:
-    """Return (p,) the smoothing group of each polygon of an OBJ file, 0 for none; None if they make no difference."""
+    """Return (p,) the smoothing group of each polygon of an OBJ file, 0 for none; None if groups have no effect."""
     if source.obj is None:
         return None
     known: dict[bytes, int] = {}
@@ -137,7 +139,7 @@ def _smoothing_groups(source: MeshFile) -> IntArray | None:
 
 
 def _smoothed(result: Flattening, source: MeshFile, groups: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return normals, and the (m, 3) of each corner: the mean over the group at the vertex, or the polygon's own."""
+    """Return normals, and (m, 3) their index at each corner: means over a vertex's group, or the polygon's normal."""
     assert result.face_corners is not None
     polygon = polygon_of(result.face_corners, source.offsets)
     group = groups[polygon][:, None]
@@ -150,6 +152,6 @@ def _smoothed(result: Flattening, source: MeshFile, groups: IntArray) -> tuple[F
 
 
 def shading_normals(vectors: FloatArray) -> FloatArray:
-    """Return vectors of length one; (0, 0, 1) for those without a direction, as files need one."""
+    """Return (k, 3) unit vectors; zero vectors become (0, 0, 1), as files need a direction."""
     units = unit_vectors(vectors)
     return np.where(units.any(axis=1, keepdims=True), units, [0.0, 0.0, 1.0])

@@ -1,4 +1,4 @@
-"""Reading STL, binary and text; every triangle has corners of its own."""
+"""Reader for STL files, binary and text, in which triangles share no vertices."""
 
 from __future__ import annotations
 
@@ -17,51 +17,51 @@ _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attrib
 
 
 def is_stl(content: bytes) -> bool:
-    """Return whether a file is one of STL, by its first word or by a length that is just that of its triangles."""
-    return bool(re.match(rb"\s*solid\s", content, re.IGNORECASE)) or len(content) == _promised(content)[1]
+    """Return True if a file is STL, by its first word or because its length matches its number of triangles."""
+    return bool(re.match(rb"\s*solid\s", content, re.IGNORECASE)) or len(content) == _declared(content)[1]
 
 
 def parse_stl(path: Path, content: bytes) -> MeshFile:
     """Return the triangles of an STL file, three vertices each.
 
     Raises:
-        MeshFileError: the file is neither, or it is cut short.
+        MeshFileError: the file is neither binary nor text STL, or it is truncated.
         EmptyMeshError: it has no triangle.
     """
-    promised, needed = _promised(content)
+    declared, needed = _declared(content)
     is_text = re.match(rb"\s*solid", content, re.IGNORECASE) is not None
-    # Binary files may begin with "solid" too, so an exact fit decides before the first word does.
+    # Binary files may also begin with "solid", so an exact match of the length takes precedence over the first word.
     if len(content) == needed or (len(content) > needed > 0 and not is_text):
-        triangles = np.frombuffer(content, _TRIANGLE, promised, _HEADER.itemsize)
+        triangles = np.frombuffer(content, _TRIANGLE, declared, _HEADER.itemsize)
         points = triangles["corners"].reshape(-1, 3).astype(np.float64)
     elif is_text:
         points = _text_points(path, content)
     elif needed:
-        held = (len(content) - _HEADER.itemsize) // _TRIANGLE.itemsize
-        raise MeshFileError(f"{path} ends after {held} of the {promised} triangles its header promises")
+        found = (len(content) - _HEADER.itemsize) // _TRIANGLE.itemsize
+        raise MeshFileError(f"{path} ends after {found} of the {declared} triangles in its header")
     else:
-        raise MeshFileError(f"{path} is not an STL file: it is shorter than the header of one")
+        raise MeshFileError(f"{path} is not an STL file: it is shorter than an STL header")
     if not len(points):
         raise EmptyMeshError(f"{path} has no faces")
     return MeshFile(path, points, np.arange(len(points)), np.arange(0, len(points) + 1, 3))
 
 
-def _promised(content: bytes) -> tuple[int, int]:
-    """Return how many triangles a binary file promises, and its bytes with these; 0, 0 if it has no header."""
+def _declared(content: bytes) -> tuple[int, int]:
+    """Return the number of triangles in the header of a binary file, and its expected bytes; 0, 0 without a header."""
     if len(content) < _HEADER.itemsize:
         return 0, 0
-    promised = int(np.frombuffer(content, _HEADER, 1)["count"][0])
-    return promised, _HEADER.itemsize + promised * _TRIANGLE.itemsize
+    declared = int(np.frombuffer(content, _HEADER, 1)["count"][0])
+    return declared, _HEADER.itemsize + declared * _TRIANGLE.itemsize
 
 
 def _text_points(path: Path, content: bytes) -> FloatArray:
     """Return (3m, 3) the corners of m triangles."""
     if not re.search(rb"(?m)^\s*endsolid", content[-4096:].lower()):
-        raise MeshFileError(f"{path} ends early: the last line of an STL text, 'endsolid', is missing")
+        raise MeshFileError(f"{path} is truncated: the last line of an STL text, 'endsolid', is missing")
     facets, vertices = 0, Growing(np.float64, 3)
     for block in text_blocks(path, content):
         facets += len(block.beginning_with(b"facet"))
         vertices.add(block.words(block.beginning_with(b"vertex"), first=1).points()[:, :3])
     if len(vertices) != 3 * facets:
-        raise MeshFileError(f"{path} has {facets} facets but {len(vertices)} vertices; three each are needed")
+        raise MeshFileError(f"{path} has {facets} facets but {len(vertices)} vertices, expected three each")
     return vertices.done()

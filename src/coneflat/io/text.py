@@ -1,6 +1,6 @@
-"""The lines, words and numbers of a text file, one block of it at a time.
+"""Lines, words and numbers of a text file, processed in blocks.
 
-Blocks keep the arrays about lines and words small, whatever the size of the file.
+Blocks keep the arrays of lines and words small for files of any size.
 """
 
 from __future__ import annotations
@@ -17,14 +17,15 @@ from numpy.typing import NDArray
 from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..errors import MeshFileError
 
-#: Bytes of a block: so many that Python's time per block does not count, so few that its arrays fit in a cache.
+#: Bytes of a block: large enough that Python's time per block is negligible, small enough that its arrays fit in a
+#: cache.
 BLOCK_BYTES = 1 << 20
 
 _NEWLINE, _SLASH = b"\n/"
 _BOM = b"\xef\xbb\xbf"
 
 _LINE_END = re.compile(rb"\r\n|[\r\n]")
-# Where no line continued by a backslash is torn apart.
+# The end of a line that is not continued by a backslash.
 _BLOCK_END = re.compile(rb"(?<!\\)(?<!\\\r)(?:\r\n|[\r\n])")
 _RETURN = re.compile(rb"\r(?!\n)")
 _OPEN_SLASH = re.compile(rb"/(?=\s)")
@@ -32,14 +33,14 @@ _COMMENT = re.compile(rb"#[^\r\n]*")
 _COMMENT_LINE = re.compile(rb"(?<![^\r\n])[ \t]*#[^\r\n]*")
 _CONTINUATION = re.compile(rb"\\(?:\r\n|[\r\n])")
 
-# What the parser of numbers reads, to find the word that it does not.
+# The forms that the number parser reads, used to find the word that it rejects.
 _FLOAT = re.compile(rb"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|inf(?:inity)?|nan)", re.IGNORECASE)
 _INTEGER = re.compile(rb"[-+]?\d+")
 _CORNER = re.compile(rb"[-+]?\d+(?:/(?:[-+]?\d+)?){0,2}")
 
 
 def newline_of(content: bytes) -> bytes:
-    """Return how the first line of a text ends."""
+    """Return the line ending of the first line of a text."""
     end = _LINE_END.search(content)
     return end[0] if end else b"\n"
 
@@ -47,14 +48,14 @@ def newline_of(content: bytes) -> bytes:
 def text_blocks(
     path: Path, content: bytes, begin: int = 0, *, comments: bool = True, continued: bool = False
 ) -> Iterator[TextBlock]:
-    """Yield a text from a position on, in blocks of whole lines.
+    """Yield a text from a given position in blocks of complete lines.
 
     Args:
-        path: for messages.
+        path: the file, for messages.
         content: the whole file.
-        begin: where the first line begins.
-        comments: a # begins a comment, to the end of the line.
-        continued: a backslash at the end of a line that is not a comment joins the next to it.
+        begin: start of the first line.
+        comments: whether a # begins a comment, to the end of the line.
+        continued: whether a backslash at the end of a line that is not a comment joins the next line to it.
     """
     while begin < len(content):
         cut = _BLOCK_END.search(content, begin + BLOCK_BYTES)
@@ -64,12 +65,12 @@ def text_blocks(
 
 
 class TextBlock:
-    """Some lines of a text, as words; the words of comments are none.
+    """Some lines of a text, split into words; comments are ignored.
 
     Attributes:
         raw: the text of the lines, verbatim.
-        line_starts: (k + 1,) where in `raw` each of the k lines begins, and where the last ends.
-        counts: (k,) how many words each line has.
+        line_starts: (k + 1,) start of each of the k lines in `raw`, and the end of the last.
+        counts: (k,) number of words of each line.
     """
 
     def __init__(
@@ -89,7 +90,7 @@ class TextBlock:
     def heads(self) -> IntArray:
         """Return (k,) the first two characters of each line's first word as a 16-bit number; 0 without a word.
 
-        A blank stands for the second where the word is one letter.
+        The second character is a blank if the word is a single letter.
         """
         heads = np.zeros(len(self.counts), dtype=np.int64)
         filled = np.flatnonzero(self.counts)
@@ -100,7 +101,7 @@ class TextBlock:
         return heads
 
     def beginning_with(self, word: bytes) -> IntArray:
-        """Return the rows of the lines whose first word is a lower-case one, in either case."""
+        """Return the rows of the lines whose first word is a given lower-case word, ignoring case."""
         rows = np.flatnonzero(self.counts)
         last = len(self._codes) - 1
         for i, letter in enumerate(word):
@@ -110,7 +111,7 @@ class TextBlock:
         return rows[_is_blank(self._codes[behind])]
 
     def words(self, rows: IntArray, first: int | IntArray = 0, stop: int | IntArray | None = None) -> Words:
-        """Return the words of some lines, in each those from `first` up to `stop`; both may differ by line."""
+        """Return the words of some lines, from index `first` up to `stop` in each line; both may be (r,) arrays."""
         counts = self.counts[rows]
         begins = self._first_words[rows] + first
         counts = np.maximum((counts if stop is None else np.minimum(stop, counts)) - first, 0)
@@ -122,7 +123,7 @@ class TextBlock:
         return Words(self, rows, counts, self._codes[chosen].tobytes())
 
     def fail(self, row: int, reason: str) -> NoReturn:
-        """Say what is wrong with a line.
+        """Raise an error about a line.
 
         Raises:
             MeshFileError: always.
@@ -138,7 +139,7 @@ class Words:
     """Words of some lines of a block.
 
     Attributes:
-        counts: (r,) how many there are of each line.
+        counts: (r,) number of words of each line.
     """
 
     def __init__(self, block: TextBlock, rows: IntArray, counts: IntArray, text: bytes) -> None:
@@ -146,10 +147,10 @@ class Words:
         self._block, self._rows, self._text = block, rows, text
 
     def points(self) -> FloatArray:
-        """Return (r, 3) the first three numbers of each line, with those behind where all lines have as many.
+        """Return (r, 3) the first three numbers of each line, or (r, k) all if every line has k numbers.
 
         Raises:
-            MeshFileError: a line has fewer, or a word that is not a number.
+            MeshFileError: a line has fewer than three numbers, or a word that is not a number.
         """
         counts = self.counts
         if not len(counts):
@@ -166,26 +167,26 @@ class Words:
         """Return all words as numbers.
 
         Raises:
-            MeshFileError: a word is none.
+            MeshFileError: a word is not a number.
         """
         numbers = _numbers(self._text, int(self.counts.sum()), np.float64)
-        return self._blame(_FLOAT) if numbers is None else numbers
+        return self._reject(_FLOAT) if numbers is None else numbers
 
     def integers(self, what: str = "a number") -> IntArray:
         """Return all words as integers.
 
         Raises:
-            MeshFileError: a word is none; the message says that it is not `what`.
+            MeshFileError: a word is not an integer; the message says that it is not `what`.
         """
         numbers = _numbers(self._text, int(self.counts.sum()), np.int64)
-        return self._blame(_INTEGER, what) if numbers is None else numbers
+        return self._reject(_INTEGER, what) if numbers is None else numbers
 
     def corners(self) -> tuple[IntArray, IntArray | None, IntArray | None]:
         """Return the parts of words `v`, `v/vt`, `v//vn` or `v/vt/vn`.
 
         Returns:
-            (c,) the `v` of every word; (c,) the `vt` and `vn` of every word, 0 where there is none, each None
-            where no word has one.
+            (c,) the `v` of every word; (c,) the `vt` and (c,) the `vn` of every word, 0 if it is missing, or None if
+            no word has one.
 
         Raises:
             MeshFileError: a word is not of these forms.
@@ -196,8 +197,8 @@ class Words:
         slashes = np.flatnonzero(codes == _SLASH)
         parts = np.diff(np.searchsorted(slashes, _word_starts(codes)), append=len(slashes)) + 1
         text = self._text
-        # An absent number becomes 0, so that every slash separates two numbers and the whole text can be
-        # converted at once, whatever mixture of forms it holds.
+        # A missing number becomes 0, so that every slash separates two numbers and the whole text can be
+        # converted at once, for any mixture of forms.
         behind = codes[slashes + 1]
         if np.any(behind == _SLASH):
             text = text.replace(b"//", b"/0/")
@@ -205,25 +206,25 @@ class Words:
             text = _OPEN_SLASH.sub(b"/0", text)
         numbers = _numbers(text.replace(b"/", b" "), int(parts.sum()), np.int64)
         if numbers is None or parts.max() > 3:
-            self._blame(_CORNER)
+            self._reject(_CORNER)
         first = np.cumsum(parts) - parts
         texture, normals = (
             np.where(parts > i, numbers[np.minimum(first + i, len(numbers) - 1)], 0) for i in (1, 2)
         )
         return numbers[first], texture if texture.any() else None, normals if normals.any() else None
 
-    def _blame(self, form: re.Pattern[bytes], what: str = "a number") -> NoReturn:
-        """Raise MeshFileError for the first word that has not a form."""
+    def _reject(self, form: re.Pattern[bytes], what: str = "a number") -> NoReturn:
+        """Raise MeshFileError for the first word that does not match a pattern."""
         words = self._text.split()
         i = next((i for i, word in enumerate(words) if not form.fullmatch(word)), len(words) - 1)
         row = self._rows[np.searchsorted(np.cumsum(self.counts), i, side="right")]
-        # In quotes, and not too long.
+        # Quoted, and truncated if it is long.
         shown = repr(words[i].decode("utf-8", "replace")[:40])
         self._block.fail(int(row), f"{shown} is not {what}")
 
 
 def _plain_lines(text: bytes, comments: bool, continued: bool) -> bytes:
-    """Return lines with blanks for all that is not a word, at the same places; each ends with one newline."""
+    """Return lines with comments and continuations blanked out, positions unchanged; each ends with one newline."""
     if text.startswith(_BOM):
         text = text.replace(_BOM, b"   ", 1)
     if continued and b"\\" in text:
@@ -241,10 +242,11 @@ def _blanks(match: re.Match[bytes]) -> bytes:
 
 
 def _numbers(text: bytes, count: int, kind: type[np.generic]) -> NDArray[Any] | None:
-    """Return (count,) the words of a text as numbers, or None if a word is none."""
+    """Return (count,) the words of a text as numbers, or None if a word is not a number."""
     if count == 0:
         return np.empty(0, kind)
-    # It rounds as float() does, without a Python object for each word. It takes "1-2" for two numbers, hence the count.
+    # np.fromstring rounds as float() does, without a Python object for each word. It reads "1-2" as two numbers, so the
+    # count is checked.
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)
         try:
@@ -255,7 +257,7 @@ def _numbers(text: bytes, count: int, kind: type[np.generic]) -> NDArray[Any] | 
 
 
 def _word_starts(codes: NDArray[np.uint8]) -> IntArray:
-    """Return the positions where a word begins."""
+    """Return the start positions of words."""
     blank = _is_blank(codes)
     starts = ~blank
     starts[1:] &= blank[:-1]
@@ -263,19 +265,18 @@ def _word_starts(codes: NDArray[np.uint8]) -> IntArray:
 
 
 def _is_blank(codes: NDArray[np.uint8]) -> BoolArray:
-    """Return which characters bytes.split() takes for blank: 9 to 13, and 32."""
+    """Return flags for the characters that bytes.split() treats as blank: 9 to 13, and 32."""
     return (codes == ord(" ")) | (codes - np.uint8(9) < 5)
 
 
 class Growing:
-    """Rows that come in blocks, in one array that grows in place.
+    """An array of rows that grows in place as blocks are appended.
 
-    Blocks kept and joined at the end would take twice the memory, and leave half of it in pieces too small for
-    anything large afterwards.
+    Concatenating a list of blocks at the end would need twice the memory, and would leave half of it fragmented.
     """
 
     def __init__(self, kind: type[np.generic], *columns: int) -> None:
-        """Begin with no rows, of so many columns; of none if there is but one number to a row."""
+        """Start without rows; `columns` is empty if each row is a single number."""
         self._rows: NDArray[Any] = np.empty((0, *columns), kind)
         self._length = 0
 
@@ -296,5 +297,5 @@ class Growing:
         return self._rows
 
     def _resize(self, length: int) -> None:
-        # Nobody else has seen the array yet, so that it may move.
+        # No other reference to the array exists yet, so it may be moved in memory.
         self._rows.resize((length, *self._rows.shape[1:]), refcheck=False)

@@ -1,4 +1,4 @@
-"""The checkerboard that shows what a flattening does, and images: textures of GLB files, pictures of pages."""
+"""Checkerboard textures that visualize a flattening, and images: textures of GLB files, pictures of pages."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 LIGHT_CELL = (0.86, 0.87, 0.89)
 #: Blue, so that red and black marks stand out.
 DARK_CELL = (0.34, 0.46, 0.62)
-#: Cells in a row that is as long as the square root of the area: about 20 across a ball.
+#: Number of cells along the square root of the area: about 20 across a ball.
 CELLS = 36
-#: The formats that glTF knows, and their names there.
+#: The image formats of glTF, and their names there.
 EMBEDDED = {"PNG": "image/png", "JPEG": "image/jpeg"}
-#: A page with a picture that has more is slow to open.
-MOST_BYTES = 32 * 2**20
+#: Maximum size of a picture in a page; larger ones are slow to open.
+MAX_BYTES = 32 * 2**20
 
 _BEGINNINGS = {
     b"\x89PNG\r\n\x1a\n": "image/png",
@@ -35,19 +35,19 @@ _BEGINNINGS = {
 
 
 class Texture(NamedTuple):
-    """An image file's content, and its kind as glTF names it."""
+    """The content of an image file, and its media type."""
 
     content: bytes
     kind: str
 
 
 def cell_side(uv: FloatArray, uv_faces: IntArray, cells: float = CELLS) -> float:
-    """Return the side, in UV units, of square cells of which the layout's area holds `cells` squared.
+    """Return the side, in UV units, of square cells such that `cells` squared of them have the layout's area.
 
     Args:
         uv: (u, 2) points of the layout.
-        uv_faces: (m, 3) index into them of every triangle corner.
-        cells: how many are as long as the root of the area.
+        uv_faces: (m, 3) index into `uv` of every triangle corner.
+        cells: number of cells along the square root of the area.
 
     Raises:
         OptionError: `cells` is not a positive number.
@@ -58,23 +58,23 @@ def cell_side(uv: FloatArray, uv_faces: IntArray, cells: float = CELLS) -> float
 
 
 def check_cells(cells: float) -> None:
-    """Raise OptionError if a checkerboard cannot have so many cells."""
+    """Raise OptionError if the number of cells of a checkerboard is not a positive finite number."""
     if not 0 < cells < np.inf:
-        raise OptionError(f"the number of cells of the checkerboard must be positive, not {cells:g}")
+        raise OptionError(f"the number of cells of the checkerboard must be positive, got {cells:g}")
 
 
 def find_texture(texture: PathName, result: Flattening | None = None) -> Texture | None:
-    """Return the texture that is meant: the checkerboard for a result, or an image file's.
+    """Return the texture for an option: the checkerboard for a result, or the image of a file.
 
-    PNG and JPEG files are taken as they are; others that Pillow reads become PNG.
+    PNG and JPEG files are used unchanged; other formats that Pillow reads are converted to PNG.
 
     Args:
         texture: "checker", or an image file.
-        result: what it is for; without one, the checkerboard is None.
+        result: the result to texture; without one, None is returned for the checkerboard.
 
     Raises:
         OptionError: Pillow is not installed.
-        MeshFileError: there is no such file, or it is not an image.
+        MeshFileError: the file does not exist, or is not an image.
     """
     try:
         from PIL import Image
@@ -92,33 +92,33 @@ def find_texture(texture: PathName, result: Flattening | None = None) -> Texture
 
 
 def image_kind(content: bytes) -> str | None:
-    """Return the media type of an image, of those that GLB files or pages can have, by how it begins; else None."""
+    """Return the media type of an image by its first bytes, if GLB files or pages support it; otherwise None."""
     if content[:4] == b"RIFF" and content[8:12] == b"WEBP":
         return "image/webp"
     return next((kind for beginning, kind in _BEGINNINGS.items() if content.startswith(beginning)), None)
 
 
 def read_picture(path: PathName) -> Texture:
-    """Return a PNG, JPEG, GIF or WebP file as it is: browsers read them. The content counts, not the ending.
+    """Return an unchanged PNG, JPEG, GIF or WebP file, the formats of browsers, recognized by its content.
 
     Raises:
-        MeshFileError: it cannot be read, is no such picture, or is too large.
+        MeshFileError: the file cannot be read, has another format, or is too large.
     """
     path = as_path(path)
     content = read_bytes(path)
     kind = image_kind(content)
     if kind is None or kind == "image/ktx2":
         raise MeshFileError(f"{path} is not a PNG, JPEG, GIF or WebP picture")
-    if len(content) > MOST_BYTES:
-        size = f"{len(content) / 2**20:.0f} MiB; a page takes up to {MOST_BYTES / 2**20:.0f}"
+    if len(content) > MAX_BYTES:
+        size = f"{len(content) / 2**20:.0f} MiB; the limit for a page is {MAX_BYTES / 2**20:.0f}"
         raise MeshFileError(f"the picture {path} has {size}")
     return Texture(content, kind)
 
 
 def _checkerboard(result: Flattening, image: Any) -> Texture:
-    """Return a checkerboard of whole cells across the unit square, as large as those of the figures."""
+    """Return a checkerboard with an integer number of cells across the unit square, sized as in the figures."""
     cells = max(round(1.0 / cell_side(result.uv, result.uv_faces)), 1)
-    pixels = max(2048 // cells, 1)  # of each cell's side, about 2048 in all
+    pixels = max(2048 // cells, 1)  # pixels per side of a cell, about 2048 in all
     along = np.arange(cells * pixels) // pixels
     # The first row is the upper one, where v is largest.
     dark = (along[None, :] + along[::-1, None]) % 2

@@ -1,4 +1,4 @@
-"""Writing a flattened mesh to a file, and what the file holds of it: numbers as they are stored, measured."""
+"""Writing of a flattened mesh to a file, and the result as the file stores it, measured on the stored numbers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from ..atlas.touch import snap_apart
+from ..atlas.touch import round_safely
 from ..base.arrays import FloatArray, IntArray
 from ..base.text import plural
 from ..errors import MeshFileError, OptionError, UnknownFormatError
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 #: Endings of the files that `write_flattening` writes.
 OUTPUT_FORMATS = tuple(f".{name}" for name in FORMATS)
-# Sizes of models the squares of whose details are 32-bit numbers, too, as programs that read them compute.
+# Range of model sizes for which squares of small lengths are also 32-bit numbers, as other programs compute them.
 SMALLEST, LARGEST = 1e-15, 1e18
 _MATERIAL = re.compile(rb"^[ \t]*usemtl\s", re.MULTILINE)
 
@@ -39,13 +39,17 @@ _MATERIAL = re.compile(rb"^[ \t]*usemtl\s", re.MULTILINE)
 def check_output(path: PathName, texture: PathName | None = None) -> Path:
     """Return the path if `write_flattening` can be expected to succeed with it and a texture.
 
-    Worth asking before long work.
+    This is useful before a long computation.
+
+    Args:
+        path: the file.
+        texture: as of `write_flattening`.
 
     Raises:
         UnknownFormatError: the ending is not one of `OUTPUT_FORMATS`.
-        MeshFileError: the folder is missing, the path is a folder, or writing is not permitted; or the texture is no
-            image that can be read.
-        OptionError: files of this ending carry no texture, or Pillow is not installed.
+        MeshFileError: the folder is missing, the path is a folder, or writing is not permitted; or the texture is not
+            an image that can be read.
+        OptionError: the format does not support textures, or Pillow is not installed.
     """
     path = checked_target(path, OUTPUT_FORMATS, "results are written as")
     _check_texture(path, path.suffix.lower(), texture)
@@ -55,29 +59,29 @@ def check_output(path: PathName, texture: PathName | None = None) -> Path:
 
 
 def write_flattening(result: Flattening, path: PathName, texture: PathName | None = None) -> Path:
-    """Write a flattened mesh, in full or not at all, and return the path.
+    """Write a flattened mesh, either completely or not at all, and return the path.
 
-    The format follows the path's ending, in any case. An .obj keeps the polygons, groups, materials and
-    comments of the OBJ the mesh was read from. A .glb keeps the scene of the glTF or GLB that the mesh was read from.
-    Of other meshes, a .ply and a .glb hold the triangles, with a vertex for every pair of vertex and UV point, the
-    input's normals, and the input's vertex as an attribute. An .npz holds all arrays of the result
-    and its report as JSON.
+    The format is given by the path's ending, in upper or lower case. An .obj keeps the polygons, groups, materials and
+    comments of the OBJ that the mesh was read from. A .glb keeps the scene of the glTF or GLB that the mesh was read
+    from. Otherwise, a .ply and a .glb contain the triangles, with a vertex for every pair of vertex and UV point, the
+    input's normals, and the input's vertex as an attribute. An .npz contains all arrays of the result and its report as
+    JSON.
 
     Args:
-        result: what to write.
+        result: the result to write.
         path: the file.
-        texture: of a .glb: "checker" for a checkerboard, or an image file that becomes part of it.
+        texture: for a .glb: "checker" for a checkerboard, or an image file to embed.
 
     Raises:
         UnknownFormatError: the ending is not one of `OUTPUT_FORMATS`.
         MeshFileError: the file cannot be written, or the texture cannot be read.
-        OptionError: files of this ending carry no texture, or Pillow is not installed.
+        OptionError: the format does not support textures, or Pillow is not installed.
     """
     return _write(result, path, texture)[0]
 
 
 def write_measured(result: Flattening, path: PathName, texture: PathName | None = None) -> Flattening:
-    """Write a flattened mesh as `write_flattening` does, and return it as the file holds it; see `as_written`."""
+    """Write a flattened mesh as `write_flattening` does, and return it as the file stores it; see `as_written`."""
     written, stored = _write(result, path, texture)
     return as_written(stored, written.suffix.lower())
 
@@ -100,11 +104,11 @@ def write_stream(
     """Write a flattened mesh to a binary stream, and return the arrays that were written; see `write_flattening`.
 
     Args:
-        result: what to write.
-        stream: where to; it need not know its position.
+        result: the result to write.
+        stream: a binary stream; it need not be seekable.
         ending: one of `OUTPUT_FORMATS`.
         texture: as of `write_flattening`.
-        folder: where the file will be, for paths in it; by default the current one.
+        folder: folder of the file, for relative paths in it; by default the current one.
 
     Raises:
         UnknownFormatError, MeshFileError, OptionError: as of `write_flattening`.
@@ -116,7 +120,7 @@ def write_stream(
         )
     _check_texture(f"a {ending}", ending, texture)
     image = None if texture is None else find_texture(texture, result)
-    # A .glb holds fewer digits, at which triangles are to be positively oriented and apart, too.
+    # A .glb has fewer digits; triangles must also be positively oriented and disjoint after rounding.
     stored = as_written(result, ending) if ending == ".glb" else result
     writers: dict[str, Callable[[], None]] = {
         ".obj": lambda: write_obj(stored, stream, folder),
@@ -130,22 +134,22 @@ def write_stream(
 
 def _check_texture(name: object, ending: str, texture: PathName | None) -> None:
     if texture is not None and ending != ".glb":
-        raise OptionError(f"only .glb files carry a texture, and {name} is none")
+        raise OptionError(f"only .glb files carry a texture, and {name} is not one")
 
 
 def as_written(result: Flattening, ending: str) -> Flattening:
-    """Return a result as a file of a format holds it, measured on that.
+    """Return a result as a file of a given format stores it, with measures of the stored numbers.
 
-    A .glb has 32-bit numbers, v from the top down; what rounding made of touching triangles is parted. An .obj has
-    polygons, which are measured as the fans of triangles that others read. A .ply and an .npz hold what there is.
-    Notes name what a format does not keep of the input.
+    A .glb has 32-bit numbers and v pointing down; touching triangles that overlap after rounding are separated. An
+    .obj has polygons, which are measured as triangle fans, as other programs read them. A .ply and an .npz store the
+    result unchanged. Notes list the data of the input that a format does not keep.
 
     Args:
-        result: what is written.
-        ending: ".glb" and so on.
+        result: the result that is written.
+        ending: the ending of the format, such as ".glb".
 
     Raises:
-        MeshFileError: the file cannot hold numbers so large.
+        MeshFileError: numbers are out of range for the format.
     """
     stored, lost = result, left_out(result, ending)
     if ending == ".glb":
@@ -164,7 +168,7 @@ def _in_single_precision(result: Flattening) -> Flattening:
     is_stored = np.array_equal(stored_in_glb(result.uv), result.uv)
     if is_stored and np.array_equal(vertices, result.vertices):
         return result
-    uv, overlaps = snap_apart(result.uv, result.uv_faces, stored_in_glb)
+    uv, overlaps = round_safely(result.uv, result.uv_faces, stored_in_glb)
     return remeasured(result, replace(result, vertices=vertices, uv=uv), SINGLE, overlaps=overlaps)
 
 
@@ -172,23 +176,23 @@ def _positions_in_glb(vertices: FloatArray) -> FloatArray:
     """Return (n, 3) positions as 32-bit numbers.
 
     Raises:
-        MeshFileError: the largest is beyond them, or so small that they have hardly a digit for it.
+        MeshFileError: the largest coordinate is too large or too small for 32-bit numbers.
     """
     with np.errstate(over="ignore"):
         stored = vertices.astype(np.float32).astype(np.float64)
     largest = float(np.abs(vertices).max())
     if not SMALLEST < largest < LARGEST:
         raise MeshFileError(
-            f"positions of up to {largest:.3g} are beyond the 32-bit numbers of .glb, which are good for sizes from "
+            f"positions of up to {largest:.3g} are beyond the 32-bit numbers of .glb, which support sizes from "
             f"{SMALLEST:.0e} to {LARGEST:.0e}: scale the mesh, or write .ply"
         )
     return stored
 
 
 def stored_in_glb(uv: FloatArray) -> FloatArray:
-    """Return (u, 2) the points that are read where these are written: 32-bit numbers, the second from the top down.
+    """Return (u, 2) the UV points as they are read back from a .glb: rounded to 32-bit numbers.
 
-    Both v and 1 - v are such numbers then, lest a reader that turns v around in 32 bits rounds once more.
+    Both v and 1 - v are 32-bit numbers, so that a reader that computes 1 - v in 32 bits does not round again.
     """
     u = uv[:, 0].astype(np.float32).astype(np.float64)
     largest = np.maximum(np.maximum(np.abs(uv[:, 1]), np.abs(1 - uv[:, 1])), 1.0)
@@ -197,7 +201,7 @@ def stored_in_glb(uv: FloatArray) -> FloatArray:
 
 
 def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> Flattening:
-    """Return the result with polygons in fans, as most programs read them."""
+    """Return the result with polygons split into fans, as most programs read them."""
     if np.all(np.diff(offsets) == 3):
         return result
     pieces = find_pieces(result.uv, result.uv_faces, offsets, face_corners)
@@ -210,7 +214,7 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
     if len(pieces.split):
         names = plural(len(pieces.split), "polygon is", "polygons are")
         notes = (
-            f"{names} written in convex pieces, as others would read flipped triangles: they are not convex in "
+            f"{names} written in convex pieces, because other programs would read flipped triangles: not convex in "
             f"the plane (the first is {pieces.split[0]}).",
         )
     fans = replace(
@@ -219,16 +223,16 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
         uv_faces=uv_faces,
         face_corners=corners,
         face_origin=face_origin[order],
-        # What these were before relaxing is known of other triangles alone.
+        # The values before relaxing are known only for the original triangles.
         solve=replace(result.solve, qc_mean_unrelaxed=float("nan"), qc_max_unrelaxed=float("nan")),
     )
     return remeasured(result, fans, DOUBLE, notes)
 
 
 def left_out(result: Flattening, ending: str) -> tuple[str, ...]:
-    """Return what a file does not keep of the one that the mesh was read from, since its format is another.
+    """Return notes on data of the source file that a file of another format does not keep, one sentence each.
 
-    One sentence each. An .npz holds the result, not the file.
+    There are none for an .npz, which stores the result and not the source file.
     """
     source = result.source
     if source is None or result.face_corners is None or ending == ".npz":

@@ -1,4 +1,4 @@
-"""From a flat metric on a disk to points in the plane."""
+"""Layout of a flat metric on a disk as points in the plane."""
 
 from .free_seams import free_seams
 from .lay_out import lay_out

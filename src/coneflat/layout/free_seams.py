@@ -1,4 +1,4 @@
-"""Layouts without inverted triangles, where seams with equal sides leave no room for all."""
+"""Removal of inverted triangles that cannot be flipped while both sides of the seams stay equal."""
 
 from __future__ import annotations
 
@@ -20,42 +20,47 @@ from .relax import StretchEnergy, relax
 from .relax.relax import rest_sides
 from .relax_layouts import LayoutGroup
 from .unfold import unfold
-from .untangle import MAX_RINGS, are_low, untangle
+from .untangle import MAX_RINGS, any_degenerate, untangle
 
 
 def free_seams(
     layout: Layout, weights: FloatArray | None, names: IntArray, stretch: float, quantum: float | None
 ) -> Layout:
-    """Return a layout whose inverted triangles are flipped at the expense of the seams near them.
+    """Return a layout whose inverted triangles are positively oriented, while seams near them may become unequal.
 
     Points move in the plane, those on the two sides of a seam independently, and are relaxed there. The lengths of the
-    sides and the angles around their vertices, cones among them, are what comes out. Where triangles stay inverted, the
-    chart is embedded anew as a disk and relaxed. A prescribed boundary stays, and so do seams that turn by quanta.
+    sides and the angles around their vertices, including cones, may change. If triangles stay inverted, the chart is
+    embedded again as a disk and relaxed. Vertices of a prescribed boundary do not move. Layouts whose seams rotate by
+    multiples of a quantum are returned unchanged.
 
     Args:
-        layout: in one chart.
+        layout: a layout in one chart.
         weights: (n,) importance of the vertices, or None.
         names: (n,) the user's number of each vertex.
-        stretch: from angles, 0, to areas, 1, for relaxing.
-        quantum: seams turn by multiples of it, so that nothing is changed; None for any rotation.
+        stretch: balance of the relaxation between angles, 0, and areas, 1.
+        quantum: angle in radians of whose multiples the seam rotations are, in which case the layout is not changed;
+            None for any rotation.
+
+    Returns:
+        The layout, with a note if triangles were flipped.
 
     Notes:
         W. T. Tutte, "How to draw a graph", 1963: with every inner point at the mean of its neighbours and the border on
-        a convex curve no triangle is inverted. Relaxed from there, a layout is much worse than from one of a flat
-        metric.
+        a convex curve no triangle is inverted. A layout relaxed from this embedding is much worse than one relaxed from
+        a layout of a flat metric.
     """
     flat = _in_the_plane(layout.points, layout.corners)
-    if quantum is not None or not are_low(flat.sides, DEGENERATE_HEIGHT):
+    if quantum is not None or not any_degenerate(flat.sides, DEGENERATE_HEIGHT):
         return layout
     disk = TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
     vertex = np.empty(len(layout.points), dtype=np.int64)
     vertex[layout.corners] = layout.mesh.faces
-    held = layout.is_held[vertex]
-    # The angle at a vertex of a prescribed boundary stays if the seams that end there do, which they should.
+    fixed = layout.is_held[vertex]
+    # The angle at a vertex of a prescribed boundary is preserved if the adjacent seam edges do not move.
     border = disk.edges[disk.is_boundary_edge]
-    beside = held.copy()
-    beside[border[held[border].any(axis=1)]] = True
-    # Any angle will do on the border of the chart.
+    is_near = fixed.copy()
+    is_near[border[fixed[border].any(axis=1)]] = True
+    # The angles on the border of the chart are free.
     angles = np.where(disk.is_boundary_vertex, np.nan, 2 * np.pi)
     flat = replace(flat, twin=halfedge_twins(disk))
     untangled = untangle(
@@ -63,17 +68,17 @@ def free_seams(
         disk.faces,
         angles,
         disk.is_boundary_vertex,
-        (beside, held),
+        (is_near, fixed),
         rest_sides(layout.lengths),
         2 * MAX_RINGS,
     )
     points, is_free = unfold(untangled.flat, disk.faces), np.zeros(len(vertex), dtype=bool)
     is_free[untangled.moved] = True
-    but = "the sides of seams near them are unequal"
-    if len(untangled.left) and not held.any() and disk.boundary_loops[0] == 1:
+    caveat = "the sides of seams near them are unequal"
+    if len(untangled.left) and not fixed.any() and disk.boundary_loops[0] == 1:
         embedded = embedded_disk(disk, float(np.abs(signed_double_areas(points[disk.faces])).sum()))
-        if not are_low(_in_the_plane(embedded, disk.faces).sides, DEGENERATE_HEIGHT):
-            points, is_free, but = embedded, ~held, "no seam or cone is exact"
+        if not any_degenerate(_in_the_plane(embedded, disk.faces).sides, DEGENERATE_HEIGHT):
+            points, is_free, caveat = embedded, ~fixed, "no seam or cone is exact"
     if not is_free.any():
         return layout
     group = LayoutGroup([layout], [weights])
@@ -88,32 +93,32 @@ def free_seams(
     ).points
     was_free = np.zeros(len(layout.mesh.vertices), dtype=bool)
     was_free[vertex[is_free]] = True
-    found = group.described(points, was_free)[0]
+    found = group.updated(points, was_free)[0]
     before, after = (
         heights(sides_between(each[disk.faces])) > DEGENERATE_HEIGHT for each in (layout.points, points)
     )
-    turned = np.flatnonzero(after & ~before)
-    if not len(turned):
+    flipped = np.flatnonzero(after & ~before)
+    if not len(flipped):
         return layout
-    name = names[layout.mesh.faces[turned[0], 0]]
+    name = names[layout.mesh.faces[flipped[0], 0]]
     return replace(
         found,
         notes=(
             *found.notes,
-            f"{plural(len(turned), 'triangle')} had no room between seams with equal sides, as at vertex "
-            f"{name}: they are positively oriented, but {but}.",
+            f"{plural(len(flipped), 'triangle')} had no room between seams with equal sides, as at vertex "
+            f"{name}: they are positively oriented, but {caveat}.",
         ),
     )
 
 
 def _in_the_plane(points: FloatArray, corners: IntArray) -> FlatTriangles:
-    """Return triangles of the plane, all in one frame, without their neighbours."""
+    """Return triangles of the plane in a common frame, without adjacency."""
     sides = sides_between(points[corners]).ravel()
     return FlatTriangles(sides, np.ones_like(sides), np.full(len(sides), -1))
 
 
 def embedded_disk(disk: TriangleMesh, double_area: float) -> FloatArray:
-    """Return (c, 2) points of a disk, its border on a circle and every inner point at the mean of its neighbours."""
+    """Return (c, 2) points of a disk by Tutte's embedding: the border on a circle, inner points at neighbour means."""
     border = disk.tails[disk.boundary_walk()]
     turn = 2 * np.pi * np.arange(len(border)) / len(border)
     points = np.zeros((len(disk.vertices), 2))

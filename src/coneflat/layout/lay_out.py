@@ -1,4 +1,4 @@
-"""From a flat metric and a cut to points in the plane."""
+"""Layout of a flat metric on a cut mesh as points in the plane."""
 
 from __future__ import annotations
 
@@ -22,8 +22,12 @@ from .untangle import untangle
 def lay_out(metric: FlatMetric, cut: Cut) -> Layout:
     """Return the layout of a flat metric on a mesh that is cut open (Section 4.3 of the paper).
 
-    Straight triangles that fit each other are unfolded, after inverted ones are flipped. Lengths that fit only
-    nearly are laid out by least squares. Other methods map the cut mesh themselves.
+    An exact metric with straight triangles is unfolded, after inverted triangles are flipped. Lengths of an
+    approximately flat metric are laid out by least squares. Other methods provide a map of the cut mesh.
+
+    Args:
+        metric: the flat metric.
+        cut: the seams and the mesh cut open along them.
 
     Raises:
         MetricError: the layout has no area.
@@ -83,7 +87,7 @@ def _unfolded(metric: FlatMetric, triangles: FlatTriangles, cut: Cut) -> Layout:
         untangled_vertices=len(untangled.moved),
         untangled_move=untangled.largest_move,
     )
-    # Where the curvature is not prescribed, the target is what comes out.
+    # Where the curvature is not prescribed, the target is set to the resulting curvature.
     target = np.where(metric.is_open, curvature, metric.target)
     return replace(_layout(metric, cut, points, curvature), statistics=statistics, target=target)
 

@@ -16,7 +16,7 @@ from ..linalg.shortest_paths import MultiGraph
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
 from ..mesh.ties import argmax_tied, tie_key
 
-# Radians that an angle has which came out as none: they keep the shape of its triangle finite.
+# Minimum angle in radians, which replaces angles that are not positive, so that the shape of the triangle is finite.
 LEAST_ANGLE = 1e-3
 
 
@@ -27,7 +27,7 @@ class TriangleShapes:
     Attributes:
         third: (m,) the corner p3 opposite the longest side p1 p2, counterclockwise.
         turn: (m,) the complex number (l13 / l12) e^(i a1) with p3 - p1 = turn (p2 - p1).
-        is_broken: (m,) True where there is no triangle of the lengths or angles asked for.
+        is_broken: (m,) True where no triangle has the given lengths or angles.
     """
 
     third: IntArray
@@ -38,14 +38,14 @@ class TriangleShapes:
 def shapes_of_lengths(lengths: FloatArray) -> TriangleShapes:
     """Return the shapes of triangles given by their (m, 3) side lengths.
 
-    Where the triangle inequality is broken, the angles are the real parts of the complex ones: p3 lies on
+    Where the triangle inequality is violated, the angles are the real parts of the complex ones: p3 is on
     the side p1 p2 and divides it as l13 : l32.
     """
     rows = np.arange(len(lengths))
     third = np.argmax(lengths, axis=1)
     first, second = NEXT[third], PREVIOUS[third]
     l13, l32 = lengths[rows, second], lengths[rows, first]
-    l12 = np.minimum(lengths[rows, third], l13 + l32)  # a side that is too long is as if just long enough
+    l12 = np.minimum(lengths[rows, third], l13 + l32)  # a side that is too long is shortened
     turn = l13 / l12 * np.exp(1j * corner_angles(lengths)[rows, first])
     return TriangleShapes(third, turn, is_broken(lengths))
 
@@ -53,7 +53,7 @@ def shapes_of_lengths(lengths: FloatArray) -> TriangleShapes:
 def shapes_of_angles(angles: FloatArray) -> TriangleShapes:
     """Return the shapes of triangles given by their (m, 3) corner angles, radians, which sum to pi.
 
-    Those that are not positive are taken as `LEAST_ANGLE`, and the largest makes up for it.
+    Angles that are not positive are replaced by `LEAST_ANGLE`, and the largest angle is reduced accordingly.
     """
     rows = np.arange(len(angles))
     third = np.argmax(angles, axis=1)
@@ -64,7 +64,7 @@ def shapes_of_angles(angles: FloatArray) -> TriangleShapes:
 
 
 def least_squares_layout(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
-    """Lay out a disk so that its angles fit those of a nearly flat metric in the least squares sense.
+    """Return the layout of a disk whose angles fit those of a nearly flat metric in the least squares sense.
 
     Args:
         disk: a topological disk.
@@ -84,12 +84,12 @@ def least_squares_layout(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
 def fit_shapes(disk: TriangleMesh, shapes: TriangleShapes, lengths: FloatArray) -> FloatArray:
     """Return (n, 2) points of a disk, up to a similarity, whose triangles fit given shapes in the least squares sense.
 
-    With p1 p2 the longest side of a triangle, p3 - p1 = (l13 / l12) e^(i a1) (p2 - p1) is asked of each.
+    The equation of a triangle with longest side p1 p2 is p3 - p1 = (l13 / l12) e^(i a1) (p2 - p1).
 
     Args:
         disk: a topological disk.
-        shapes: of its triangles.
-        lengths: (m, 3) side lengths, by which it is decided what is far apart.
+        shapes: shapes of its triangles.
+        lengths: (m, 3) side lengths, used to choose two distant pins.
 
     Raises:
         MetricError: the system has no finite solution.
@@ -99,7 +99,7 @@ def fit_shapes(disk: TriangleMesh, shapes: TriangleShapes, lengths: FloatArray) 
     if not np.isfinite(points).all():
         raise MetricError(
             f"the layout of {len(disk.faces)} triangles has no finite solution: "
-            f"{int(shapes.is_broken.sum())} of them break the triangle inequality"
+            f"{int(shapes.is_broken.sum())} of them violate the triangle inequality"
         )
     return as_pairs(points)
 
@@ -108,8 +108,8 @@ def pinned_least_squares(equations: csr_matrix, pins: IntArray) -> ComplexArray:
     """Return (n,) the z that minimises |equations z| with z = 0 at the first pin and 1 at the second.
 
     Args:
-        equations: (m, n) complex.
-        pins: (2,) columns.
+        equations: (m, n) complex matrix.
+        pins: (2,) columns with prescribed values.
     """
     normal = csr_matrix(equations.conj().T @ equations)
     free = np.ones(equations.shape[1], dtype=bool)
@@ -117,14 +117,14 @@ def pinned_least_squares(equations: csr_matrix, pins: IntArray) -> ComplexArray:
     factor = HermitianFactor(normal[free][:, free])
     z = np.zeros(len(free), dtype=np.complex128)
     z[pins[1]] = 1.0
-    # The second round removes what the squared condition number of normal equations cost.
+    # The second iteration refines the solution, as the normal equations have a squared condition number.
     for _ in range(2):
         z[free] -= factor.solve((equations.conj().T @ (equations @ z))[free])
     return z
 
 
 def _equations(disk: TriangleMesh, shapes: TriangleShapes) -> csr_matrix:
-    """Return the complex (m, n) matrix whose rows vanish on triangles of the right shape."""
+    """Return the complex (m, n) matrix whose row for a triangle gives 0 if the triangle has its given shape."""
     rows = np.arange(len(disk.faces))
     third, turn = shapes.third, shapes.turn
     columns = disk.faces[rows[:, None], np.stack([NEXT[third], PREVIOUS[third], third], axis=1)]
@@ -135,9 +135,14 @@ def _equations(disk: TriangleMesh, shapes: TriangleShapes) -> csr_matrix:
 
 
 def far_pins(disk: TriangleMesh, lengths: FloatArray, avoided: BoolArray | None = None) -> IntArray:
-    """Return two vertices far apart, off broken triangles, or off (m,) others that are given.
+    """Return (2,) two distant vertices that are not in broken triangles.
 
-    Two pins close together, or held by a triangle that has no shape, leave the system nearly singular.
+    Two pins that are close together, or in a triangle without a valid shape, make the system nearly singular.
+
+    Args:
+        disk: a topological disk.
+        lengths: (m, 3) side lengths.
+        avoided: (m,) True for triangles without pins; None for those that violate the triangle inequality.
     """
     graph = MultiGraph(len(disk.vertices), disk.edges, lengths.ravel()[disk.edge_halfedges[:, 0]])
     allowed = np.ones(len(disk.vertices), dtype=bool)
@@ -145,7 +150,8 @@ def far_pins(disk: TriangleMesh, lengths: FloatArray, avoided: BoolArray | None 
     if allowed.sum() < 2:
         allowed[:] = True
     key = tie_key(disk.vertices)
-    # A start that does not depend on the numbering: far out, and inside, as both copies of a seam vertex are alike.
+    # A start that does not depend on the numbering: a vertex with a large key, and an inner one, as the two copies of
+    # a seam vertex have equal keys.
     inside = allowed & ~disk.is_boundary_vertex
     pins = [int(np.argmax(np.where(inside if inside.any() else allowed, key, -np.inf)))]
     for _ in range(2):  # the farthest from there, then the farthest from that

@@ -1,4 +1,4 @@
-"""Patches of a flat surface whose vertices move until their triangles are positively oriented."""
+"""Patches of a flat surface whose vertices are moved so that their triangles become positively oriented."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from ..linalg.newton import ARMIJO, HALVINGS
 from ..mesh.connectivity import label_components
 from .relax.elements import RELATIVE_RIDGE
 
-# Height over longest side up to which a triangle counts as degenerate: coordinates in the plane are good to
+# Ratio of height to longest side up to which a triangle is degenerate: coordinates in the plane are accurate to
 # about 1e-12 of an edge, and a triangle must stay positively oriented when they are rounded.
 DEGENERATE_HEIGHT = 1e-8
-# A patch counts as done when every triangle has this part of the area it is asked to get.
+# A patch is finished when every triangle has this fraction of its target area.
 TARGET_AREA_SHARE = 0.1
 # Regularisation of the determinant: its floor, and its size relative to the worst determinant of the patch
 # (Garanzha et al. 2021, Section 4).
 MIN_REGULARISATION, RELATIVE_REGULARISATION = 1e-3, 0.2
-# A patch is given up, to be tried again with more of its surroundings, after so many rounds of so many Newton steps, or
-# where the gap to what is enough has not shrunk to this part of itself in one. Those that succeed take 4 steps at the
-# median.
+# A patch is abandoned, and tried again with more surrounding triangles, after MAX_ROUNDS rounds of STEPS_PER_ROUND
+# Newton steps, or if the distance to the goal has not shrunk by this factor in a round. Patches that succeed take 4
+# steps at the median.
 MAX_ROUNDS, STEPS_PER_ROUND, MIN_SHRINKING = 15, 4, 0.9
 
 
 class Patches:
-    """The triangles around movable vertices, as functions of how far these move.
+    """The triangles around movable vertices, as functions of the shifts of these vertices.
 
-    The map of a triangle from the shape it should have to the one it has is z -> a z + b conj(z); a and b are
-    linear in the shifts of its corners. Its determinant is |a|^2 - |b|^2.
+    The map of a triangle from its target shape to its current shape is z -> a z + b conj(z); a and b are linear in the
+    shifts of its corners. Its determinant is |a|^2 - |b|^2.
     Shifts are in units of the mean length of the edges at the vertex.
 
     Attributes:
-        vertices: (k,) those that move.
-        faces: (f,) triangles with such a vertex.
+        vertices: (k,) the movable vertices.
+        faces: (f,) triangles with a movable vertex.
         count: the number of patches, which have no movable vertex in common.
-        patch, face_patch: (k,), (f,) the patch of each.
+        patch, face_patch: (k,), (f,) the patch of each vertex and triangle.
     """
 
     def __init__(
@@ -74,20 +74,20 @@ class Patches:
         self.face_patch = self.patch[self.corners.max(axis=1)]
 
     def _find_maps(self, wanted: ComplexArray) -> None:
-        """Set a and b as they are, and their derivatives by the shifts of the corners."""
+        """Set the current a and b, and their derivatives with respect to the shifts of the corners."""
         found = []
         for factors in map_factors(wanted):
-            # With corner 2 at 0, side 0 is minus the place of corner 1, and side 1 is that of corner 0.
+            # With corner 2 at 0, side 0 is minus the position of corner 1, and side 1 is that of corner 0.
             found.append(factors[:, 0] * self.sides[:, 1] - factors[:, 1] * self.sides[:, 0])
             found.append(factors * self.shift)
         self.a, self.a_of, self.b, self.b_of = found
 
     def solve(self) -> ComplexArray:
-        """Return shifts (k,) that make the determinants positive, where this succeeds.
+        """Return (k,) shifts that make the determinants positive, where this succeeds.
 
-        Newton's method with the Hessian made positive triangle by triangle. All patches take their steps together, in
-        one system, but every patch has its own regularisation and step length, and stops as soon as it is done or
-        stuck: `linalg.newton` has one of each.
+        Newton's method with the Hessian of each triangle projected to a positive semidefinite one. The steps of all
+        patches are solved for in one system, but every patch has its own regularisation and step length, and stops as
+        soon as it is finished or stuck. `linalg.newton` is not used because it has one of each for the whole system.
         """
         shifts = np.zeros(len(self.vertices), dtype=np.complex128)
         gap = TARGET_AREA_SHARE - self.worst(shifts)
@@ -103,7 +103,7 @@ class Patches:
         return shifts
 
     def _step(self, e: _Equations, shifts: ComplexArray, active: BoolArray) -> BoolArray:
-        """Add a step to the shifts of active patches (count,); return those that gained by it, and may take more."""
+        """Add a step to the shifts of active patches (count,); return the patches that improved and may continue."""
         worst = self.worst(shifts)
         a, b = self._maps_at(shifts)
         a, b = a[e.rows], b[e.rows]
@@ -129,13 +129,13 @@ class Patches:
         return gained
 
     def moved(self, shifts: ComplexArray) -> ComplexArray:
-        """Return (f, 3) the sides of the triangles with their vertices shifted."""
+        """Return (f, 3) the sides of the triangles after their vertices are shifted."""
         moved = np.where(self.corners >= 0, self.shift * shifts[self.corners], 0)
         sides: ComplexArray = self.sides + moved[:, [2, 0, 1]] - moved[:, [1, 2, 0]]
         return sides
 
     def worst(self, shifts: ComplexArray) -> FloatArray:
-        """Return (count,) the least determinant of each patch."""
+        """Return (count,) the smallest determinant of each patch."""
         a, b = self._maps_at(shifts)
         worst = np.full(self.count, np.inf)
         np.minimum.at(worst, self.face_patch, np.abs(a) ** 2 - np.abs(b) ** 2)
@@ -154,7 +154,7 @@ class _Equations:
     """Newton's equations of some of the patches.
 
     Attributes:
-        rows: (r,) the triangles, of those of all patches.
+        rows: (r,) indices of their triangles among those of all patches.
         face_patch: (r,) the patch of each.
     """
 
@@ -179,7 +179,7 @@ class _Equations:
     def newton_step(
         self, a: ComplexArray, b: ComplexArray, epsilon: FloatArray
     ) -> tuple[ComplexArray, FloatArray]:
-        """Return the step of each vertex of all patches, and what it adds to the slope of the energy."""
+        """Return the step of each vertex of all patches, and its contribution to the directional derivative."""
         k = len(self.vertices)
         gradient, values = np.zeros(2 * k), np.zeros(4 * len(self.columns))
         add_derivatives(a, b, epsilon, self.a_of, self.b_of, self.corners, self.slots, gradient, values)
@@ -199,17 +199,17 @@ class _Equations:
 
 
 def _corner_frames(flat: FlatTriangles, faces: IntArray, rows: IntArray, movable: BoolArray) -> ComplexArray:
-    """Return (f, 3) unit numbers that take a shift of a movable vertex to the frame of the triangle there.
+    """Return (f, 3) unit complex numbers that rotate a shift of a movable vertex to the frame of each triangle there.
 
-    All corners of a vertex are reached by turning around it from a first one, the same for all.
+    The corners of a vertex are visited by walking around it, beginning with the same corner for all triangles.
 
-    faces, rows: (f, 3) the triangles that have a movable vertex, and (f,) which these are, upwards.
+    faces, rows: (f, 3) the triangles that have a movable vertex, and (f,) their indices in ascending order.
     """
     tails = faces[:, [1, 2, 0]]
     frames = np.zeros(faces.shape, dtype=np.complex128)
     leaves = movable[tails]
     leaving, tails = (3 * rows[:, None] + np.arange(3))[leaves], tails[leaves]
-    # Where the fan of a boundary vertex begins there is a half-edge without twin; it must come last to stay.
+    # The fan of a boundary vertex begins at a half-edge without twin; it is assigned last, to overwrite the others.
     order = np.argsort(flat.twin[leaving] < 0, kind="stable")
     first = np.full(len(movable), -1)
     first[tails[order]] = leaving[order]
@@ -227,7 +227,7 @@ def _corner_frames(flat: FlatTriangles, faces: IntArray, rows: IntArray, movable
 
 @compiled
 def fill_energies(a: ComplexArray, b: ComplexArray, epsilon: FloatArray, energies: FloatArray) -> None:
-    """Fill the energy of each triangle."""
+    """Fill in the energy of each triangle."""
     for f in range(len(a)):
         norm = a[f].real ** 2 + a[f].imag ** 2
         other = b[f].real ** 2 + b[f].imag ** 2
@@ -250,16 +250,16 @@ def add_derivatives(
     gradient: FloatArray,
     values: FloatArray,
 ) -> None:
-    """Add up the gradient by the shifts of vertices, and the positive part of each triangle's Hessian.
+    """Add up the gradient with respect to the shifts of vertices, and the positive part of each triangle's Hessian.
 
     Args:
         a, b: (f,) the maps.
-        epsilon: (f,) by which the determinants are smoothed, see `fill_energies`.
-        a_of, b_of: (f, 3) their derivatives by the shift of each corner, as complex factors.
+        epsilon: (f,) regularisation of the determinants, see `fill_energies`.
+        a_of, b_of: (f, 3) their derivatives with respect to the shift of each corner, as complex factors.
         corners: (f, 3) the vertex that is shifted with a corner, -1 for none.
         slots: (f, 3, 3) the block of the matrix for each pair of corners.
-        gradient: (2k,) by the real and the imaginary part of the shift of each vertex in turn.
-        values: (4 blocks,) the entries of the blocks, which are two by two, row by row.
+        gradient: (2k,) derivatives by the real and the imaginary part of the shift of each vertex; added to.
+        values: (4 blocks,) the entries of the two by two blocks, row by row; added to.
     """
     for f in range(len(a)):
         one, two = abs(a[f]), abs(b[f])
@@ -273,7 +273,7 @@ def add_derivatives(
         along_a = a[f] / one if one > 0 else 1.0 + 0.0j
         along_b = b[f] / two if two > 0 else 1.0 + 0.0j
         slope_a, slope_b = 2 * (by_norm + by_det), 2 * (by_norm - by_det)
-        # The block of the lengths of a and b, and its positive part.
+        # The Hessian block of the absolute values of a and b, and its positive part.
         first = slope_a + 8 * mixed * one**2 + 4 * twice * one**2
         last = slope_b - 8 * mixed * two**2 + 4 * twice * two**2
         cross = -4 * twice * one * two
@@ -292,7 +292,7 @@ def add_derivatives(
             v = corners[f, i]
             if v < 0:
                 continue
-            # Shifts by 1 and by 1j change a and b by these parts along themselves and across.
+            # Components of the changes of a and b, parallel and perpendicular to them, for shifts by 1 and by 1j.
             p_i, q_i = a_of[f, i] * along_a.conjugate(), b_of[f, i] * along_b.conjugate()
             gradient[2 * v] += slope_a * one * p_i.real + slope_b * two * q_i.real
             gradient[2 * v + 1] -= slope_a * one * p_i.imag + slope_b * two * q_i.imag

@@ -1,4 +1,4 @@
-"""Layouts relaxed: the few triangles that cones bend too much, or all of them on the way from angles to areas."""
+"""Relaxation of layouts: only of the triangles that cones distort strongly, or of all, from angles towards areas."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from ..mesh.connectivity import TriangleMesh, label_components
 from ..stages import Layout, RelaxSpec
 from .relax import StretchEnergy, relax
 
-# Triangles with more quasi-conformal distortion than this are relaxed, with so many rings around them. Measured:
-# freeing a twentieth of the vertices of a fine mesh and three quarters of a coarse one, the mean comes within 0.0025 of
-# what it is with all free.
+# Triangles with more quasi-conformal distortion than this are relaxed, with this number of rings around them. Measured:
+# with a twentieth of the vertices of a fine mesh and three quarters of a coarse one free, the mean comes within 0.0025
+# of its value with all vertices free.
 RELAXED_QC, RELAXED_RINGS = 1.35, 3
-# Part of the energy above the least that a further Newton step must promise to gain. Most take 6 to 10 steps, those
-# with triangles that are bent a thousandfold 20 to 30.
+# A further Newton step is taken if its predicted decrease is above this fraction of the energy minus its lower bound.
+# Most relaxations take 6 to 10 steps, those with triangles distorted by a factor of a thousand 20 to 30.
 TOLERANCE = 1e-2
-# Part of the mean area that every triangle counts more than its own: with none, slivers are bent without end, 60 to 1
-# on a decimated face instead of 11; means rise by 0.0005.
+# Fraction of the mean area that is added to the weight of every triangle. Without it, slivers are distorted without
+# bound, 60 to 1 on a decimated face instead of 11; with it, means rise by 0.0005.
 MEAN_AREA_SHARE = 0.1
-# Where a patch's mean or the worst triangle of all would be worse, the same is tried with this sharpness.
+# Patches whose mean distortion or worst triangle would get worse are relaxed again with this sharpness.
 RETRY_SHARPNESS = 2.0
-# What is worse by less than this part is not: nothing may have moved, or what has as a whole.
+# Relative changes below this value are not a deterioration: the patch may not have moved, or moved rigidly.
 RELATIVE_TOLERANCE = 1e-9
 
 
@@ -39,34 +39,40 @@ def relax_layouts(
     layouts: Sequence[Layout],
     weights: Sequence[FloatArray | None],
     spec: RelaxSpec,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> list[Layout]:
     """Return layouts with less distortion, the same cones and the same seams, relaxed as one mesh.
 
-    The boundary stays where its lengths or its shape are prescribed. A layout that cannot be relaxed stays as it is,
-    with a note where relaxing all of it was asked for.
+    A boundary with prescribed lengths or shape does not move. A layout that cannot be relaxed is returned unchanged,
+    with a note if the relaxation of all triangles was requested.
 
     Args:
-        layouts: of connected meshes.
-        weights: (n,) the importance of the vertices of each, or None.
-        spec: what is asked.
-        tell: called after each step with what is being done.
+        layouts: layouts of connected meshes.
+        weights: for each layout the (n,) importance of its vertices, or None.
+        spec: the options for relaxing.
+        report: called after each step with a description of it.
+
+    Returns:
+        The relaxed layouts, in the same order.
+
+    Raises:
+        MetricError: a relaxation found no finite step.
     """
     if spec.is_off or not layouts:
         return list(layouts)
     try:
-        return _relaxed(LayoutGroup(layouts, weights), spec, tell)
+        return _relaxed(LayoutGroup(layouts, weights), spec, report)
     except (SeamError, LengthError, MetricError) as error:  # a metric that did not converge
         if len(layouts) > 1:
             return [
-                relax_layouts([one], [own], spec, tell)[0] for one, own in zip(layouts, weights, strict=True)
+                relax_layouts([one], [w], spec, report)[0] for one, w in zip(layouts, weights, strict=True)
             ]
         if isinstance(error, MetricError):
             raise
         return [layouts[0].with_notes(f"Not relaxed: {error}.") if spec.is_whole else layouts[0]]
 
 
-def _relaxed(group: LayoutGroup, spec: RelaxSpec, tell: Callable[[str], None]) -> list[Layout]:
+def _relaxed(group: LayoutGroup, spec: RelaxSpec, report: Callable[[str], None]) -> list[Layout]:
     mesh, points = group.mesh, group.points
     before = group.ratios(points)
     is_free = group.is_free
@@ -85,7 +91,7 @@ def _relaxed(group: LayoutGroup, spec: RelaxSpec, tell: Callable[[str], None]) -
             weights=group.weights,
             free=is_free,
             tolerance=TOLERANCE,
-            progress=lambda step, _: tell(f"step {step}"),
+            progress=lambda step, _: report(f"step {step}"),
         ).points
 
     if spec.stretch:
@@ -96,7 +102,7 @@ def _relaxed(group: LayoutGroup, spec: RelaxSpec, tell: Callable[[str], None]) -
             points, _ = group.without_losses(
                 points, relaxed_by(points, RETRY_SHARPNESS, is_lost), before, is_lost
             )
-    found = group.described(points, is_free)
+    found = group.updated(points, is_free)
     freed = np.bincount(group.of_vertex[is_free], minlength=len(found)).tolist()
     means, largest = group.means(before).tolist(), group.largest(before).tolist()
     return [
@@ -114,14 +120,14 @@ def _relaxed(group: LayoutGroup, spec: RelaxSpec, tell: Callable[[str], None]) -
 
 
 class LayoutGroup:
-    """The triangles of several layouts as they should be, those of one after those of the other.
+    """Several layouts of connected meshes, concatenated into one.
 
     Attributes:
-        layouts: of each connected mesh.
-        mesh: what is laid out.
-        points, corners: of all layouts.
-        lengths: (m, 3) side lengths.
-        areas: (m,) areas.
+        layouts: the layouts.
+        mesh: the union of their meshes.
+        points, corners: the points (u, 2) and corners (m, 3) of all layouts.
+        lengths: (m, 3) side lengths of the triangles on the surface.
+        areas: (m,) their areas.
         of_vertex: (n,) the layout of each vertex.
     """
 
@@ -143,23 +149,23 @@ class LayoutGroup:
 
     @property
     def is_free(self) -> BoolArray:
-        """(n,) True but for vertices that must stay."""
+        """Return (n,) True for vertices that may move."""
         return ~np.concatenate([one.is_held for one in self.layouts])
 
     def _sums(self, values: FloatArray, at: BoolArray | slice = slice(None)) -> FloatArray:
-        """Return the sum of values of faces of each component, over some faces."""
+        """Return the sum of (m,) values per face for each layout, over the faces `at`."""
         return np.bincount(self._of_face[at], values[at], len(self.layouts)).astype(np.float64)
 
     @cached_property
     def lengths_as_laid_out(self) -> FloatArray:
-        """(m, 3) side lengths at which each component has the area of its layout, so that all weigh the same."""
+        """Return (m, 3) the side lengths scaled so that each mesh has the area of its layout and equal weight."""
         laid_out = self._sums(np.abs(signed_double_areas(self.points[self.corners])))
         unit = np.sqrt(laid_out / (2 * self._sums(self.areas)))
         return np.asarray(self.lengths * unit[self._of_face, None])
 
     @cached_property
     def weights(self) -> FloatArray:
-        """(m,) what triangles count for their area."""
+        """Return (m,) the weights of triangles relative to their area."""
         least = np.finfo(np.float64).tiny
         means = self._sums(self.areas) / np.diff(self._faces)
         weights: FloatArray = 1 + MEAN_AREA_SHARE * means[self._of_face] / np.maximum(self.areas, least)
@@ -173,7 +179,7 @@ class LayoutGroup:
     def ratios(self, points: FloatArray, chosen: IntArray | None = None) -> FloatArray:
         """Return (m,) ratios of singular values, infinite for triangles that are flipped or have no area.
 
-        chosen: the triangles of interest, the others are infinite; None for all.
+        chosen: the triangles to compute, the others are set to infinity; None for all.
         """
         ratios = np.full(len(self.mesh.faces), np.inf)
         every = np.arange(len(ratios)) if chosen is None else chosen
@@ -181,14 +187,14 @@ class LayoutGroup:
         return ratios
 
     def means(self, ratios: FloatArray) -> FloatArray:
-        """Return each component's mean ratio by area over positively oriented triangles; infinite without any."""
+        """Return each layout's area-weighted mean ratio over positively oriented triangles; infinite without any."""
         is_positive = np.isfinite(ratios)
         areas = self._sums(self.areas, is_positive)
         sums = self._sums(np.where(is_positive, ratios, 0.0) * self.areas)
         return np.divide(sums, areas, out=np.full(len(areas), np.inf), where=areas > 0)
 
     def largest(self, ratios: FloatArray) -> FloatArray:
-        """Return the largest finite ratio of each component, or 1."""
+        """Return the largest finite ratio of each layout, or 1 without any."""
         largest: FloatArray = np.ones(len(self.layouts))
         np.maximum.at(largest, self._of_face, np.where(np.isfinite(ratios), ratios, 1.0))
         return largest
@@ -196,9 +202,9 @@ class LayoutGroup:
     def without_losses(
         self, points: FloatArray, moved: FloatArray, before: FloatArray, was_free: BoolArray
     ) -> tuple[FloatArray, BoolArray]:
-        """Return the moved points, but as they were where their mean or their worst triangle would be worse.
+        """Return the moved points, without patches whose mean or worst distortion got worse, and a mask of these (n,).
 
-        The vertices there, (n,), too. before: (m,) the ratios of the layout that nothing may be worse than.
+        before: (m,) the ratios of the layout to compare with.
         """
         mesh, faces = self.mesh, self.mesh.faces
         inside = np.flatnonzero(was_free[mesh.edges[:, 0]] & was_free[mesh.edges[:, 1]])
@@ -220,15 +226,15 @@ class LayoutGroup:
         back[self.corners[is_lost[faces]]] = True
         return np.where(back[:, None], points, moved), is_lost
 
-    def described(self, points: FloatArray, was_free: BoolArray) -> list[Layout]:
-        """Return the layouts with moved points, with the curvature and the scale that they have, and had before."""
+    def updated(self, points: FloatArray, was_free: BoolArray) -> list[Layout]:
+        """Return the layouts with moved points and with updated curvature, target and log scale."""
         mesh, corners = self.mesh, rows_of(points, self.corners)
-        # Where triangles were moved; elsewhere it is what it was.
+        # Curvatures change only at vertices of moved triangles.
         changed = np.zeros(len(mesh.vertices), dtype=bool)
         changed[mesh.faces[has_any(was_free, mesh.faces)]] = True
         old = np.concatenate([one.curvature for one in self.layouts])
         curvature = np.where(changed, laid_out_curvature(mesh, corners, changed), old)
-        # What counts as no area is so for each layout.
+        # Areas are relative to those of each layout, as the threshold for zero area is.
         unit = self._sums(self.areas)[self._of_face]
         before, after = (np.abs(signed_double_areas(p[self.corners])) / 2 for p in (self.points, points))
         # The energy of angles does not depend on the scale: components keep their areas relative to each other.
@@ -247,7 +253,7 @@ class LayoutGroup:
                     one,
                     points=factor * points[self._points[i] : self._points[i + 1]],
                     curvature=curvature[own],
-                    # Where the curvature is not prescribed, the target is what comes out.
+                    # Where the curvature is not prescribed, the target is set to the resulting curvature.
                     target=np.where(one.is_open, curvature[own], one.target),
                     log_scale=log_scale[own],
                     statistics=replace(one.statistics, area_distortion=reached),
@@ -257,7 +263,7 @@ class LayoutGroup:
 
 
 def _joined(meshes: Sequence[TriangleMesh], starts: IntArray) -> TriangleMesh:
-    """Return meshes as one, the vertices of each from a number on."""
+    """Return the union of meshes; the vertex indices of each are shifted by its start."""
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
     return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
@@ -266,14 +272,14 @@ def _joined(meshes: Sequence[TriangleMesh], starts: IntArray) -> TriangleMesh:
 def fill_ratios(
     lengths: FloatArray, points: FloatArray, corners: IntArray, chosen: IntArray, ratios: FloatArray
 ) -> None:
-    """Write the ratio of singular values of the maps of chosen triangles; infinite for those flipped.
+    """Fill in the ratio of singular values of the maps of chosen triangles; infinite for flipped ones.
 
     Args:
-        lengths: (m, 3) side lengths of the triangles as they should be.
-        points: (u, 2) of the plane.
+        lengths: (m, 3) side lengths of the triangles on the surface.
+        points: (u, 2) positions in the plane.
         corners: (m, 3) indices of points.
-        chosen: triangles.
-        ratios: (m,) filled at the chosen.
+        chosen: indices of triangles.
+        ratios: (m,) filled at the chosen triangles.
     """
     rest = np.empty(3, np.complex128)
     for f in chosen:
@@ -283,7 +289,7 @@ def fill_ratios(
         a, b = 0j, 0j
         for i in range(1, 3):
             place = complex(points[corners[f, i], 0] - x, points[corners[f, i], 1] - y)
-            # Both times the area of the triangle at rest, which the ratio does not depend on.
+            # Both are scaled by the area of the triangle at rest, which cancels in the ratio.
             a += rest[i].conjugate() * place
             b += rest[i] * place
         one, two = abs(a), abs(b)
@@ -293,7 +299,7 @@ def fill_ratios(
 
 
 def _around(mesh: TriangleMesh, is_bent: BoolArray) -> BoolArray:
-    """Return (n,) True for the vertices of triangles and of the rings around them."""
+    """Return (n,) True for the vertices of given triangles and of `RELAXED_RINGS` rings around them."""
     inside = np.zeros(len(mesh.vertices), dtype=bool)
     inside[mesh.faces[is_bent]] = True
     for _ in range(RELAXED_RINGS):

@@ -11,36 +11,38 @@ from ..errors import ArrayShapeError
 from ..geometry.planar import as_pairs
 from ..geometry.straight import FlatTriangles
 
-# Iterations that spread the gaps; each costs as much as half a breadth-first search.
+# Number of iterations that distribute the gaps; each costs as much as half a breadth-first search.
 SWEEPS = 10
-# Part of the longest side below which a side counts as if it were that long: the gap at a side of no length
-# has no relative size.
+# Minimum length of a side in weights, as a fraction of the longest side: the relative gap at a side of length zero is
+# not defined.
 NO_LENGTH = 1e-12
 
 
 def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
-    """Return (u, 2) the places in the plane of the points of a flat mesh, cut into charts, in linear time.
+    """Return (u, 2) the positions in the plane of the points of a flat mesh, cut into charts, in linear time.
 
     Args:
         flat: the m triangles, in any unit: `ExactMetric.straight` has those of an exact metric, `flat_triangles` those
-            of other lengths. No vertex off the cut may have curvature, or there are gaps, which are spread.
-        corners: (m, 3) the points at the triangles' corners, from 0: `cut_open(mesh, seams).mesh.faces`, say. The mesh
-            is cut along the sides whose ends have other points on the other side. Points of no triangle are at 0.
+            of other lengths. Vertices off the cut should have no curvature; otherwise there are gaps, which are
+            distributed.
+        corners: (m, 3) the points at the triangles' corners, from 0, for example `cut_open(mesh, seams).mesh.faces`.
+            The mesh is cut along the sides whose ends have different points in the two triangles. Points without a
+            triangle are at 0.
 
     Raises:
         ArrayShapeError, FaceIndexError: `corners` does not fit the triangles.
 
     Notes:
-        Every vertex has one place, and every chart is placed by itself, its first triangle at the origin.
+        Every point has one position, and every chart is placed separately, its first triangle at the origin.
 
-        The border goes first: its sides are strung together with their own lengths, turned from one to the
-        next by the angles of the triangles between, and the rounding by which the loop fails to close is
-        spread over all of it. So both sides of a seam are equal to the last digits whatever the size
-        of the mesh. Then the inside follows breadth first from all of the border at once, and what it
-        fails to fit where fronts meet is spread by a few steps of conjugate gradients.
+        The border is laid out first: its sides are joined with their given lengths, rotated from one to the
+        next by the angles of the triangles between them, and the rounding error that keeps the loop open is
+        distributed over all of it. Both sides of a seam are therefore equal up to the last digits for any mesh
+        size. Then the interior is laid out breadth first from the whole border, and the gaps where fronts meet
+        are distributed by a few steps of conjugate gradients.
 
-        Measured, largest relative error of a seam edge and of any edge, 20 cones (a coordinate's own
-        rounding is worth 1e-12 to 2e-11 of the shortest seam edges):
+        Measured, largest relative error of a seam edge and of any edge, 20 cones (the rounding of a coordinate
+        amounts to 1e-12 to 2e-11 of the shortest seam edges):
 
         | | 28,576 triangles | 457,216 | 1,551,456 |
         | --- | --- | --- | --- |
@@ -54,7 +56,7 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
     if faces.size != len(flat.twin):
         raise ArrayShapeError(
             f"corners must have the shape {(len(flat.twin) // 3, 3)}, a point for each corner of the flat triangles, "
-            f"not {faces.shape}"
+            f"got {faces.shape}"
         )
     corner = faces.ravel()
     cut = find_cut(flat.twin, corner)
@@ -91,9 +93,9 @@ def _next(halfedges: IntArray) -> IntArray:
 
 
 def _border(flat: FlatTriangles, cut: BoolArray, start: int) -> tuple[IntArray, ComplexArray]:
-    """Return the border loop of a half-edge and frames of its triangles in which the loop closes."""
-    room = int(cut.sum())
-    border, frames = np.empty(room, dtype=np.int64), np.empty(room + 1, dtype=np.complex128)
+    """Return the border loop through a half-edge, and frames of its triangles in which the directions close up."""
+    size = int(cut.sum())
+    border, frames = np.empty(size, dtype=np.int64), np.empty(size + 1, dtype=np.complex128)
     count = walk_border(flat.twin, cut, flat.turns, start, border, frames)
     border, excess, frames = border[:count], np.angle(frames[count]), frames[:count]
     frames = frames * np.exp(-1j * excess * np.arange(count) / count)
@@ -101,7 +103,11 @@ def _border(flat: FlatTriangles, cut: BoolArray, start: int) -> tuple[IntArray, 
 
 
 def closed_chain(steps: ComplexArray) -> ComplexArray:
-    """Return the corners of a closed polygon, whose sides are the steps but for the gap they leave."""
+    """Return (k,) the corners of a closed polygon whose sides are given steps (k,), with their closing gap distributed.
+
+    Args:
+        steps: (k,) complex side vectors, whose sum is almost zero.
+    """
     path = np.cumsum(np.abs(steps))
     ends = np.cumsum(steps)
     ends -= ends[-1] * (path / path[-1])
@@ -117,11 +123,11 @@ def _close_gaps(
     weight: FloatArray,
     diagonal: FloatArray,
 ) -> None:
-    """Move the points that are not pinned, in place, to spread the gaps in the layout.
+    """Move the points that are not pinned, in place, to distribute the gaps in the layout.
 
     Conjugate gradients on the sum of the squared relative gaps, preconditioned by the diagonal. The gaps are
-    jumps along lines where fronts have met; k iterations spread a jump over about k triangles. SciPy's would divide by
-    zero where no gap is left, as on small charts.
+    jumps along lines where fronts have met; k iterations distribute a jump over about k triangles. SciPy's version
+    would divide by zero if no gap is left, as on small charts.
     """
     damping = np.divide(1.0, diagonal, out=np.zeros(len(points)), where=~pinned & (diagonal > 0))
     residual, pull = np.empty_like(points), np.empty_like(points)
@@ -141,9 +147,9 @@ def _close_gaps(
 def weigh_sides(
     corner: IntArray, sides: ComplexArray, no_length: float, count: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return (3m,) one over the squared length of each side, and (count,) the sum of these at each point.
+    """Return (3m,) the inverse squared length of each side, and (count,) the sum of these at each point.
 
-    no_length: part of the longest side below which one counts as if it were that long.
+    no_length: minimum length of a side, as a fraction of the longest side.
     """
     longest, weight, diagonal = 0.0, np.empty(len(sides)), np.zeros(count)
     for h in range(len(sides)):
@@ -166,7 +172,7 @@ def take_step(
     shift: ComplexArray,
     residual: ComplexArray,
 ) -> float:
-    """Take a step of conjugate gradients, in place; return the product of residual and its damped self after it."""
+    """Take a step of conjugate gradients, in place; return the product of the residual and the damped residual."""
     slope = 0.0
     for v in range(len(pull)):
         slope += direction[v].real * pull[v].real + direction[v].imag * pull[v].imag
@@ -188,7 +194,7 @@ def take_step(
 
 @compiled
 def find_cut(twin: IntArray, corner: IntArray) -> BoolArray:
-    """Return (3m,) True for half-edges on the boundary, or with other points at their ends than their twins have."""
+    """Return (3m,) True for half-edges on the boundary, and for those whose points differ from those of their twins."""
     cut = np.ones(len(twin), np.bool_)
     for base in range(0, len(twin), 3):
         for x in range(3):
@@ -210,10 +216,10 @@ def walk_border(
     border: IntArray,
     frames: ComplexArray,
 ) -> int:
-    """Fill the half-edges of a border loop, in order, and the frames of their triangles.
+    """Fill in the half-edges of a border loop, in order, and the frames of their triangles; return its length n.
 
-    The walk starts in the frame of the first triangle and carries it around each vertex through the fan of
-    triangles inside. Returns the length n of the loop; frames[n] is where the first frame has come to.
+    The walk starts in the frame of the first triangle and transports it around each vertex through the fan of
+    triangles inside. frames[n] is the first frame after transport around the whole loop.
     """
     count = 0
     h = start
@@ -247,10 +253,10 @@ def spread(
     placed: BoolArray,
     points: ComplexArray,
 ) -> int:
-    """Lay out, breadth first, all triangles that can be reached from the `last` ones in the queue.
+    """Lay out, breadth first, all triangles that can be reached from the first `last` ones in the queue.
 
-    corner: (3m,) vertex of the cut mesh at each corner. Triangles in the queue are reached, have frames,
-    and at least one corner placed. Returns the length of the queue: all triangles laid out.
+    corner: (3m,) vertex of the cut mesh at each corner. Triangles in the queue are marked as reached and have frames
+    and at least one placed corner. Returns the length of the queue, the number of triangles laid out.
     """
     first = 0
     while first < last:
@@ -285,28 +291,28 @@ def gap_forces(
     points: ComplexArray,
     force: ComplexArray,
 ) -> None:
-    """Add up, at each vertex, how far it lies from where the sides of its triangles put it.
+    """Fill in for each vertex the weighted sum of the gaps between its position and those given by adjacent sides.
 
-    Weights of one over the squared length of a side make relative gaps what is measured.
+    The weights are inverse squared lengths of sides, so that gaps are relative.
     """
     force[:] = 0.0
     for base in range(0, len(sides), 3):
         for x in range(3):
             start, end, w = corner[base + (x + 1) % 3], corner[base + (x + 2) % 3], weight[base + x]
             gap = frame[base // 3] * sides[base + x] - (points[end] - points[start])
-            gap = complex(gap.real * w, gap.imag * w)  # a number as a complex one takes twice the products
+            gap = complex(gap.real * w, gap.imag * w)  # w * gap would need twice the products
             force[end] += gap
             force[start] -= gap
 
 
 @compiled
 def apply_stiffness(corner: IntArray, weight: FloatArray, shift: ComplexArray, force: ComplexArray) -> None:
-    """Fill the force at each vertex by which springs along the sides resist a shift of the vertices."""
+    """Fill in the force at each vertex that springs along the sides exert against a shift of the vertices."""
     force[:] = 0.0
     for h in range(0, len(weight), 3):
         i, j, k = corner[h], corner[h + 1], corner[h + 2]
         a, b, c = shift[i], shift[j], shift[k]
-        # Real and imaginary parts by themselves: a number as a complex one takes twice the products.
+        # Real and imaginary parts separately: real times complex would be computed with twice the products.
         one, two, three = weight[h], weight[h + 1], weight[h + 2]
         x, y, z = one * (c.real - b.real), two * (a.real - c.real), three * (b.real - a.real)
         u, v, w = one * (c.imag - b.imag), two * (a.imag - c.imag), three * (b.imag - a.imag)

@@ -1,4 +1,4 @@
-"""Turning the few inverted triangles of a flat metric over, by moving vertices on the flat surface."""
+"""Untangling: the few inverted triangles of a flat metric are flipped by moving vertices on the flat surface."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ..geometry.planar import heights, signed_angles
 from ..geometry.straight import FlatTriangles
 from .patches import DEGENERATE_HEIGHT, Patches
 
-# Height over longest side that triangles are asked to get at least.
+# Minimum ratio of height to longest side of the target shapes.
 LEAST_HEIGHT = 0.1
-# Rings of triangles around the bad ones that are let loose at most: 1, 2, 4, and so on until it works.
+# Maximum number of rings of triangles around the bad ones whose vertices may move; 1, 2, 4, and so on are tried.
 MAX_RINGS = 4
-# Angles around a vertex that miss theirs do so by whole turns; what rounding makes of them is far less than this.
+# Wrong angle sums around a vertex differ by full turns; rounding errors of the sums are far below this value.
 WINDING_ERROR = 1.0
 
 
@@ -26,10 +26,10 @@ class Untangled:
     """Flat triangles after untangling.
 
     Attributes:
-        flat: the triangles; their frames and gluing are the ones before.
+        flat: the triangles; their frames and adjacency are unchanged.
         moved: (k,) vertices that were moved.
-        largest_move: how far a vertex was moved at most, relative to the mean length of the edges at the vertex.
-        left: (j,) triangles that are inverted or degenerate still.
+        largest_move: largest shift of a vertex, relative to the mean length of the edges at the vertex.
+        left: (j,) triangles that are still inverted or degenerate.
     """
 
     flat: FlatTriangles
@@ -47,33 +47,33 @@ def untangle(
     rest: ComplexArray,
     max_rings: int = MAX_RINGS,
 ) -> Untangled:
-    """Turn inverted and degenerate triangles over, moving as few vertices as possible.
+    """Return flat triangles whose inverted and degenerate triangles are flipped by moving as few vertices as possible.
 
-    A vertex without curvature may move on a flat surface; its triangles' sides change with it and the surface
-    stays what it is. So seams keep equal sides even where their vertices move. Each bad triangle is
-    tried with small neighbourhoods first; vertices on seams move only if nothing else helps, and vertices on
-    the boundary, whose shape changes with them, only after that.
+    A vertex without curvature may move on a flat surface: the sides of its triangles change, but the surface does not.
+    Seams therefore keep equal sides even where their vertices move. For each bad triangle small neighbourhoods are
+    tried first. Vertices on seams move only if this fails, and vertices on the boundary, whose shape they change, only
+    after that.
 
-    Triangles that are all positively oriented may still wind around a vertex more than once, if another one, with
-    curvature or on the boundary, has that much less around it. They are rejected: their triangles stay inverted.
+    Triangles that are all positively oriented may still wind around a vertex more than once, if the angle sum around
+    another vertex, with curvature or on the boundary, is smaller by the same amount. Such results are rejected, and
+    their triangles stay inverted.
 
     The work is bounded by the size of the mesh.
 
     Args:
         flat: the triangles.
         faces: (m, 3) their vertices, before any cut.
-        angles: (n,) the angle around each vertex on the flat surface, radians; NaN where it may be any.
-        on_boundary: (n,) vertices of the boundary.
-        stays: (n,) vertices that must not move, one mask after another: each is tried where those before left
-            triangles inverted.
-        rest: (m, 3) sides of the triangles as they should be.
-        max_rings: rings of triangles around the inverted ones that are let loose at most.
+        angles: (n,) the angle around each vertex on the flat surface, radians; NaN where any angle is allowed.
+        on_boundary: (n,) True for vertices of the boundary.
+        stays: masks (n,) of vertices that must not move; each is used where the ones before left inverted triangles.
+        rest: (m, 3) sides of the triangles in their target shapes.
+        max_rings: maximum number of rings of triangles around the inverted ones whose vertices may move.
 
     Notes:
         V. Garanzha et al., "Foldover-free maps in 50 lines of code", 2021: an energy that grows without
-        bound as a triangle loses its area, with a regularisation that makes it finite beyond.
+        bound as the area of a triangle goes to zero, with a regularisation that makes it finite for inverted ones.
     """
-    if not are_low(flat.sides, DEGENERATE_HEIGHT):
+    if not any_degenerate(flat.sides, DEGENERATE_HEIGHT):
         return Untangled(flat, np.empty(0, dtype=np.int64), 0.0, np.empty(0, dtype=np.int64))
     state = _Untangling(flat, faces, angles, on_boundary, _thickened(rest))
     for stay in stays:
@@ -91,12 +91,12 @@ def untangle(
 
 
 class _Untangling:
-    """How far the triangles of a surface are untangled.
+    """The state of untangling the triangles of a surface.
 
     Attributes:
-        sides: (m, 3) sides of the triangles as they are.
-        is_bad: (m,) True for those that are inverted or degenerate.
-        moves: (n,) how far each vertex was moved, in units of the edges around it.
+        sides: (m, 3) current sides of the triangles.
+        is_bad: (m,) True for triangles that are inverted or degenerate.
+        moves: (n,) distance by which each vertex was moved, relative to the mean length of the edges around it.
     """
 
     def __init__(
@@ -109,38 +109,38 @@ class _Untangling:
     ) -> None:
         self.rest = rest
         self.flat, self.faces, self.angles, self.on_boundary = flat, faces, angles, on_boundary
-        self.sides, self.is_own = flat.sides.reshape(-1, 3), False
+        self.sides, self.is_copied = flat.sides.reshape(-1, 3), False
         self.moves = np.zeros(len(angles))
         self.is_bad = np.empty(len(faces), dtype=bool)
-        find_low(flat.sides, DEGENERATE_HEIGHT, self.is_bad)
+        find_degenerate(flat.sides, DEGENERATE_HEIGHT, self.is_bad)
 
     def improve(self, rings: int, stay: BoolArray) -> None:
-        """Untangle what can be with so many rings around bad triangles let loose, but for vertices that stay."""
+        """Untangle bad triangles by moving the vertices in a number of rings around them, except those in `stay`."""
         movable = _neighbourhood(self.faces, np.flatnonzero(self.is_bad), rings, len(stay)) & ~stay
         if movable.any():
             patches = Patches(self.flat, self.faces, self.sides, movable, self.rest)
             self._accept(patches, patches.solve())
 
     def _accept(self, patches: Patches, shifts: ComplexArray) -> None:
-        """Take over the patches that are positively oriented now and wind around no vertex."""
+        """Accept the patches whose triangles are now positively oriented and wind around every vertex once."""
         result = patches.moved(shifts)
-        is_upright = heights(result) > DEGENERATE_HEIGHT
+        is_positive = heights(result) > DEGENERATE_HEIGHT
         failed = np.zeros(patches.count, dtype=bool)
-        failed[patches.face_patch[~is_upright]] = True
+        failed[patches.face_patch[~is_positive]] = True
         trial = np.where(failed[patches.face_patch, None], patches.sides, result)
         winding = self._winding(patches, trial)
         winds = np.zeros(len(self.angles), dtype=bool)
         winds[winding] = True
         failed[patches.face_patch[winds[self.faces[patches.faces]].any(axis=1)]] = True
         good = ~failed[patches.face_patch]
-        if not self.is_own:
-            self.sides, self.is_own = self.sides.copy(), True
+        if not self.is_copied:
+            self.sides, self.is_copied = self.sides.copy(), True
         self.sides[patches.faces[good]] = result[good]
         self.is_bad[patches.faces[good]] = False
         self.moves[patches.vertices] += np.where(failed[patches.patch], 0.0, np.abs(shifts))
 
     def _winding(self, patches: Patches, trial: ComplexArray) -> IntArray:
-        """Return the vertices around which triangles would wind that do not now, with sides (f, 3) for the patches'."""
+        """Return the vertices with a wrong angle sum only after the patches' triangles get the trial sides (f, 3)."""
         near = np.zeros(len(self.angles), dtype=bool)
         near[self.faces[patches.faces]] = True
         rows = np.flatnonzero(has_any(near, self.faces))
@@ -152,7 +152,7 @@ class _Untangling:
         now, then = (
             winding_vertices(sides, self.faces[rows], self.angles, is_free) for sides in (before, after)
         )
-        # All that are far from the patches are among both.
+        # Vertices far from the patches are in both sets.
         is_new = near
         is_new[now] = False
         return then[is_new[then]]
@@ -161,13 +161,13 @@ class _Untangling:
 def winding_vertices(
     sides: ComplexArray, faces: IntArray, angles: FloatArray, is_free: BoolArray
 ) -> IntArray:
-    """Return the vertices around which positively oriented triangles turn by more, or less, than the surface.
+    """Return the vertices whose angle sum over positively oriented triangles differs from that of the surface.
 
     Args:
-        sides: (m, 3) of the triangles.
+        sides: (m, 3) sides of the triangles.
         faces: (m, 3) their vertices.
-        angles: (n,) the angle around each vertex.
-        is_free: (n,) vertices of the boundary around which there may be any angle of less than a turn.
+        angles: (n,) the angle around each vertex, radians.
+        is_free: (n,) True for boundary vertices at which any angle of less than a full turn is allowed.
     """
     is_bad = np.zeros(len(angles), dtype=bool)
     is_bad[faces[~(heights(sides) > DEGENERATE_HEIGHT)]] = True
@@ -178,7 +178,7 @@ def winding_vertices(
 
 
 def _neighbourhood(faces: IntArray, seeds: IntArray, rings: int, count: int) -> BoolArray:
-    """Return (n,) True for the vertices of the seed triangles and of so many rings less one around them."""
+    """Return (n,) True for the vertices of the seed triangles and of `rings - 1` rings of triangles around them."""
     inside = np.zeros(count, dtype=bool)
     inside[faces[seeds]] = True
     for _ in range(rings - 1):
@@ -187,7 +187,7 @@ def _neighbourhood(faces: IntArray, seeds: IntArray, rings: int, count: int) -> 
 
 
 def _thickened(rest: ComplexArray) -> ComplexArray:
-    """Return the sides (m, 3) of positively oriented triangles, but not too thin."""
+    """Return (m, 3) the sides of triangles with their heights raised to `LEAST_HEIGHT` times the longest side."""
     f = np.arange(len(rest))
     longest = np.abs(rest).argmax(axis=1)
     base = np.abs(rest[f, longest])
@@ -201,8 +201,8 @@ def _thickened(rest: ComplexArray) -> ComplexArray:
 
 
 @compiled
-def is_low(sides: ComplexArray, base: int, least: float) -> bool:
-    """Return whether a triangle, by its first side, is not higher than a share of its longest side, or is flipped."""
+def is_degenerate(sides: ComplexArray, base: int, least: float) -> bool:
+    """Return True if the triangle of a given first side is flipped or has at most a given height over longest side."""
     doubled = sides[base].real * sides[base + 1].imag - sides[base].imag * sides[base + 1].real
     longest = 0.0
     for h in range(base, base + 3):
@@ -211,16 +211,16 @@ def is_low(sides: ComplexArray, base: int, least: float) -> bool:
 
 
 @compiled
-def are_low(sides: ComplexArray, least: float) -> bool:
-    """Return whether any triangle with sides (3m,) is not higher than a share of its longest side, or is flipped."""
+def any_degenerate(sides: ComplexArray, least: float) -> bool:
+    """Return True if any triangle with sides (3m,) is flipped or has at most a given height over longest side."""
     f = 0
-    while f < len(sides) // 3 and not is_low(sides, 3 * f, least):
+    while f < len(sides) // 3 and not is_degenerate(sides, 3 * f, least):
         f += 1
     return f < len(sides) // 3
 
 
 @compiled
-def find_low(sides: ComplexArray, least: float, found: BoolArray) -> None:
-    """Fill in (m,) for each triangle what `are_low` returns for all."""
+def find_degenerate(sides: ComplexArray, least: float, found: BoolArray) -> None:
+    """Fill in (m,) True for each triangle that is flipped or has at most a given height over longest side."""
     for f in range(len(found)):
-        found[f] = is_low(sides, 3 * f, least)
+        found[f] = is_degenerate(sides, 3 * f, least)

@@ -1,4 +1,4 @@
-"""Where to cut: seams that open a surface to a disk with every cone on its border."""
+"""Seams that cut a surface open to a disk with every cone on its border."""
 
 from .costs import edge_costs, seam_costs
 from .tree import cut_to_disk, find_seams

@@ -1,4 +1,4 @@
-"""What edges cost as parts of seams: their lengths, and less where a seam does no harm."""
+"""Costs of edges as parts of seams: their lengths, reduced at creases and where seams are hidden."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ..geometry.visibility import visible_share
 from ..mesh.connectivity import TriangleMesh
 from ..stages import SeamSpec
 
-# Radians: edges that bend less are not creases, those that bend more are full ones. The studio draws cuts by the same
-# numbers (`apps/studio/page/graph.js`; a test compares them).
+# Dihedral angles in radians. Edges below SMOOTH are not creases, edges above SHARP are full creases. The studio draws
+# cuts by the same numbers (`apps/studio/page/graph.js`; a test compares them).
 SMOOTH, SHARP = np.radians(20), np.radians(60)
-# What a full crease costs of its length, and, where hiding is 1, what can hardly be seen.
+# Cost factor of a full crease, and, if hiding is 1, of an edge that is almost invisible.
 CHEAPEST = 0.1
-# Of the largest: weights below count as this, so that seams do not wander about where they cost nothing.
+# Minimum weight relative to the largest. It avoids detours of seams in regions of cost zero.
 LEAST_WEIGHT = 1e-3
-# Rounds of averages over neighbours, that take the grain from what is seen of single vertices.
-ROUNDS = 2
+# Number of averages over neighbours, which remove noise from the visibility of single vertices.
+SMOOTHING_ROUNDS = 2
 
 
 def edge_costs(
@@ -39,19 +39,19 @@ def edge_costs(
 
     Args:
         mesh: the mesh.
-        lengths: (e,) of its edges, positive.
-        creases: seams prefer sharp edges: one that bends by 60 degrees and more costs a tenth of its length.
-        hiding: how much they prefer what is hidden, 0 to 10: at 1, what can hardly be seen costs a tenth, at 2 a
-            hundredth.
-        visibility: (n,) what can be seen of each vertex, 0 to 1; by default what `visible_share` finds.
-        vertex_weights: (n,) of the user, 0 and up; an edge gets the mean of its ends.
-        edge_weights: (e,) likewise.
+        lengths: (e,) lengths of its edges, positive.
+        creases: whether seams prefer sharp edges: an edge with a dihedral angle of 60 degrees or more costs a tenth of
+            its length.
+        hiding: preference for hidden edges, 0 to 10: at 1, an almost invisible edge costs a tenth, at 2 a hundredth.
+        visibility: (n,) visible fraction of each vertex, 0 to 1; by default the result of `visible_share`.
+        vertex_weights: (n,) weights, not negative; an edge gets the mean of its two ends.
+        edge_weights: (e,) weights, not negative.
 
     Raises:
-        OptionError: a number makes no sense.
+        OptionError: `hiding` is out of range, or weights are negative, not finite, all 0 or of the wrong shape.
     """
     if not 0 <= hiding <= MOST_PREFERENCE:
-        raise OptionError(f"hiding must be a number from 0 to {MOST_PREFERENCE:g}, not {hiding:g}")
+        raise OptionError(f"hiding must be a number from 0 to {MOST_PREFERENCE:g}, got {hiding:g}")
     costs = np.array(lengths, dtype=np.float64)
     angles = dihedral_angles(mesh) if creases or hiding else np.zeros(len(costs))
     if creases:
@@ -69,13 +69,16 @@ def edge_costs(
 def seam_costs(
     mesh: TriangleMesh, lengths: FloatArray, spec: SeamSpec, follows_sharp: bool = False
 ) -> FloatArray:
-    """Return (e,) the cost of cutting each edge of a connected mesh, by what is asked of its seams.
+    """Return (e,) the cost of cutting each edge of a connected mesh, by the options for its seams.
 
     Args:
         mesh: the mesh.
         lengths: (m, 3) side lengths.
-        spec: what is asked.
-        follows_sharp: sharp edges are cheaper in any case.
+        spec: the options for seams.
+        follows_sharp: True makes sharp edges cheaper, whatever `spec` says.
+
+    Raises:
+        OptionError: as of `edge_costs`.
     """
     return edge_costs(
         mesh,
@@ -88,32 +91,32 @@ def seam_costs(
 
 
 def _hidden(mesh: TriangleMesh, share: FloatArray, angles: FloatArray) -> FloatArray:
-    """Return (e,) how well edges are hidden, 0 to 1: by what is around, and in the valleys that they are themselves."""
+    """Return (e,) how well edges are hidden, 0 to 1: by the surrounding surface, and as the bottom of a valley."""
     degree = np.bincount(mesh.edges.ravel(), minlength=len(share))
-    for _ in range(ROUNDS):
+    for _ in range(SMOOTHING_ROUNDS):
         around = np.bincount(mesh.edges.ravel(), share[mesh.edges[:, ::-1]].ravel(), minlength=len(share))
         share = (share + around / degree) / 2
-    # The faces of a valley leave so much of the directions from which a flat place is seen.
-    open_share = 1 + np.minimum(angles * _outside(mesh), 0.0) / np.pi
+    # Fraction of the directions from which a flat surface is visible that the two faces of a valley leave open.
+    open_share = 1 + np.minimum(angles * _orientation_sign(mesh), 0.0) / np.pi
     hidden: FloatArray = 1 - share[mesh.edges].mean(axis=1) * open_share
     return hidden
 
 
-def _outside(mesh: TriangleMesh) -> float:
-    """Return 1 if the faces run counterclockwise seen from outside, -1 if from inside."""
+def _orientation_sign(mesh: TriangleMesh) -> float:
+    """Return 1 if the faces are counterclockwise seen from outside, -1 if clockwise."""
     corners = mesh.vertices[mesh.faces] - mesh.vertices.mean(axis=0)
     volume = np.einsum("fi,fi->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
     return float(np.where(volume < 0, -1.0, 1.0))
 
 
 def _checked(weights: ArrayLike, count: int, noun: str) -> FloatArray:
-    """Return weights, one for each vertex or edge, all of them positive."""
+    """Return validated weights, one for each vertex or edge, raised to a positive minimum."""
     values = np.asarray(weights, dtype=np.float64)
     if values.shape != (count,):
-        raise OptionError(f"{noun} weights of seams must be {count:,} numbers, not of shape {values.shape}")
+        raise OptionError(f"{noun} weights of seams must be {count:,} numbers, got shape {values.shape}")
     if not (np.isfinite(values).all() and values.min() >= 0 and values.max() > 0):
         raise OptionError(
-            f"{noun} weights of seams must be finite, 0 and up, not all 0; they are {values.min():g} to "
+            f"{noun} weights of seams must be finite, not negative and not all 0, got {values.min():g} to "
             f"{values.max():g}"
         )
     values = at_safe_scale(values)

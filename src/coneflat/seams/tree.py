@@ -1,8 +1,7 @@
 """Seams of a connected mesh.
 
-Seams may end anywhere on a boundary loop, as if it were contracted to a point. Loops and cones
-are connected by a tree; where there are handles, the shortest loops around them are cut as well. That opens the mesh
-to a disk.
+Seams may end anywhere on a boundary loop, as if it were contracted to a point. Boundary loops and cones are connected
+by a tree; on surfaces with handles, the shortest loops around them are cut as well. This cuts the mesh to a disk.
 """
 
 from __future__ import annotations
@@ -20,8 +19,8 @@ from ..mesh.ties import mesh_tie_key
 from ..stages import Cut, SeamSpec
 
 NO_EDGES = np.empty(0, dtype=np.int64)
-# Relative: on grids many paths are equally long, and rounding should not choose among them, lest the result
-# depend on the numbering. Far above rounding, far below what anyone would see in a seam.
+# Relative change of costs that breaks ties. On grids many paths are equally long; if rounding chose among them, the
+# result would depend on the numbering. The value is far above rounding and far below visible differences of seams.
 TIE_BREAK = 1e-7
 
 
@@ -34,17 +33,17 @@ def find_seams(
     required: IntArray = NO_EDGES,
     forbidden: IntArray = NO_EDGES,
 ) -> IntArray:
-    """Return the edges (k,) to cut so that a connected mesh becomes a disk with all cones on its border.
+    """Return (k,) the edges to cut so that a connected mesh becomes a disk with all cones on its border.
 
-    Where required edges close curves that cut the mesh into pieces, every piece becomes a disk.
+    If required edges form closed curves that cut the mesh into pieces, every piece becomes a disk.
 
     Args:
         mesh: the mesh.
         cones: (s,) vertices that the seams must reach.
-        edge_costs: (e,) positive; the length of each edge, say, or what `edge_costs` makes of it.
-        is_avoided: (e,) edges to cut only if nothing else serves, such as diagonals of polygons.
-        required: edges that are cut in any case; on the boundary they mean nothing.
-        forbidden: edges that are not cut.
+        edge_costs: (e,) positive costs, for example the edge lengths, or the result of `edge_costs`.
+        is_avoided: (e,) True for edges that are cut only if necessary, such as diagonals of polygons.
+        required: edges that are always cut; boundary edges among them have no effect.
+        forbidden: edges that must not be cut.
 
     Raises:
         SeamError: every set of seams needs forbidden edges; or edges are both required and forbidden.
@@ -57,9 +56,9 @@ def find_seams(
     _refuse(is_required & is_forbidden, "both required and forbidden as seams")
     key = mesh_tie_key(mesh)
     costs = _checked(edge_costs, len(mesh.edges)) * (1 + TIE_BREAK * key[mesh.edges].sum(axis=1))
-    for dear in (is_avoided, is_forbidden):
-        if dear is not None and dear.any():
-            costs = np.where(dear, costs + costs.sum(), costs)
+    for is_costly in (is_avoided, is_forbidden):
+        if is_costly is not None and is_costly.any():
+            costs = np.where(is_costly, costs + costs.sum(), costs)
 
     is_cut = mesh.is_boundary_edge | is_required
     is_end = np.zeros(len(mesh.vertices), dtype=bool)
@@ -71,7 +70,7 @@ def find_seams(
     else:
         is_end[np.argmax(key)] = True
         is_cut = _without_loose_ends(mesh, _loops(mesh, costs, is_cut, is_end))
-    seams = _as_slit(mesh, costs, is_cut & ~mesh.is_boundary_edge)
+    seams = _lengthened(mesh, costs, is_cut & ~mesh.is_boundary_edge)
     _refuse(seams & is_forbidden, "needed to open the mesh, but forbidden as seams")
     return np.flatnonzero(seams)
 
@@ -82,18 +81,19 @@ def cut_to_disk(mesh: TriangleMesh, cones: IntArray, costs: FloatArray, spec: Se
     Args:
         mesh: the mesh.
         cones: (s,) vertices that the seams must reach.
-        costs: (e,) of the edges.
-        spec: which edges to avoid, and which must not be cut.
+        costs: (e,) costs of cutting the edges, positive.
+        spec: the edges to avoid and the forbidden ones.
 
     Raises:
         SeamError: every set of seams needs forbidden edges.
+        OptionError: costs are not positive numbers.
     """
     seams = find_seams(mesh, cones, costs, spec.is_avoided, forbidden=np.flatnonzero(spec.is_forbidden))
     return Cut(cut_open(mesh, seams).mesh, seams)
 
 
 def _checked(costs: FloatArray, count: int) -> FloatArray:
-    """Return (e,) costs, brought to a size at which their sums are finite where they are not."""
+    """Return (e,) validated costs, rescaled if their sums would overflow."""
     if np.shape(costs) != (count,) or not (np.isfinite(costs).all() and (costs > 0).all()):
         raise OptionError(f"costs of edges must be {count:,} positive numbers")
     return at_safe_scale(np.asarray(costs, dtype=np.float64))
@@ -106,11 +106,11 @@ def _refuse(edges: BoolArray, what: str) -> None:
 
 
 def _tree(mesh: TriangleMesh, costs: FloatArray, is_cut: BoolArray, is_end: BoolArray) -> BoolArray:
-    """Return (e,) a tree of paths that connects the ends (n,), at most twice as long as the shortest.
+    """Return (e,) the edges of a tree that connects the ends (n,), at most twice as costly as the cheapest.
 
     K. Mehlhorn, "A faster approximation algorithm for the Steiner problem in graphs", 1988: one search from all
-    ends at once, then a minimum spanning tree over the cheapest bridges between their regions. What is cut already
-    (e,) costs nothing.
+    ends simultaneously, then a minimum spanning tree over the cheapest bridges between their regions. Edges that are
+    already cut (e,) cost nothing.
     """
     paths = MultiGraph(len(mesh.vertices), mesh.edges, costs, mesh.edges_beside).shortest_paths(
         np.flatnonzero(is_end)
@@ -123,11 +123,11 @@ def _tree(mesh: TriangleMesh, costs: FloatArray, is_cut: BoolArray, is_end: Bool
 
 
 def _loops(mesh: TriangleMesh, costs: FloatArray, is_cut: BoolArray, is_end: BoolArray) -> BoolArray:
-    """Return (e,) loops that open each piece of a cut mesh to a disk, the shortest with the paths to their ends.
+    """Return (e,) the shortest loops, with the paths to the cut, that open each piece of a cut mesh to a disk.
 
-    Shortest paths from the ends (n,), those of the cut, to all vertices are a forest; a spanning forest of the faces
-    over the edges that are neither in it nor cut leaves 2 * genus edges (tree-cotree, D. Eppstein 2003), and takes
-    those first that would close the longest loops (J. Erickson and K. Whittlesey 2005).
+    The shortest paths from the ends (n,), the vertices of the cut, to all vertices form a forest. A spanning forest of
+    the faces over the edges that are neither in this forest nor cut leaves 2 * genus edges (tree-cotree, D. Eppstein
+    2003). It prefers the edges that would close the longest loops (J. Erickson and K. Whittlesey 2005).
     """
     pairs = mesh.edge_faces[~is_cut]
     pieces, _ = label_components(len(mesh.faces), *pairs.T)
@@ -145,12 +145,12 @@ def _loops(mesh: TriangleMesh, costs: FloatArray, is_cut: BoolArray, is_end: Boo
 
 
 def _costs_over(mesh: TriangleMesh, costs: FloatArray, paths: Paths, edges: IntArray) -> FloatArray:
-    """Return (k,) the cost of the path over each edge from end to end."""
+    """Return (k,) the cost of the path through each edge, from source to source."""
     return costs[edges] + paths.distance[mesh.edges[edges]].sum(axis=1)
 
 
 def _paths_over(mesh: TriangleMesh, paths: Paths, edges: IntArray) -> BoolArray:
-    """Return (e,) the paths over edges (k,) from end to end."""
+    """Return (e,) the edges of the paths through given edges (k,), from source to source."""
     found = np.zeros(len(mesh.edges), dtype=bool)
     found[edges] = True
     found[paths.edge[paths.nodes_to(mesh.edges[edges].ravel())]] = True
@@ -158,7 +158,7 @@ def _paths_over(mesh: TriangleMesh, paths: Paths, edges: IntArray) -> BoolArray:
 
 
 def _without_loose_ends(mesh: TriangleMesh, is_cut: BoolArray) -> BoolArray:
-    """Return (e,) the edges of a cut that are parts of loops, or between them."""
+    """Return (e,) the edges of a cut that are in loops or in paths between loops; dangling paths are removed."""
     kept = is_cut.copy()
     while True:
         cut = np.flatnonzero(kept)
@@ -169,11 +169,11 @@ def _without_loose_ends(mesh: TriangleMesh, is_cut: BoolArray) -> BoolArray:
         kept[cut[is_loose]] = False
 
 
-def _as_slit(mesh: TriangleMesh, costs: FloatArray, seams: BoolArray) -> BoolArray:
-    """Return seams that a mesh can be cut along: a slit of one edge would have the same vertices on both sides."""
+def _lengthened(mesh: TriangleMesh, costs: FloatArray, seams: BoolArray) -> BoolArray:
+    """Return seams of at least two edges on a closed mesh: a cut along one edge duplicates no vertex."""
     if seams.sum() != 1 or mesh.is_boundary_edge.any():
         return seams
-    beside = np.isin(mesh.edges, mesh.edges[seams]).sum(axis=1) == 1
+    is_adjacent = np.isin(mesh.edges, mesh.edges[seams]).sum(axis=1) == 1
     longer = seams.copy()
-    longer[np.argmin(np.where(beside, costs, np.inf))] = True
+    longer[np.argmin(np.where(is_adjacent, costs, np.inf))] = True
     return longer

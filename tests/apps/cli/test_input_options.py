@@ -62,7 +62,7 @@ class TestJoining:
         book = soup(vertices, np.array([[0, 1, 2], [1, 0, 3], [1, 0, 4]]))
         joined = join_borders(mesh_file(*book))
         assert (joined.edges, joined.left) == (0, 3)
-        assert "3 open edges at the same places as others, left open; --weld" in joined.notes()[0]
+        assert "3 open edges at the same positions as others, left open; --weld" in joined.notes()[0]
 
     def test_what_was_manifold_stays_so(self):
         """Triangles between few places, and two parts of a ball with vertices of their own and a few holes."""
@@ -120,7 +120,7 @@ class TestJoining:
         assert set(used[merged[[5, 40, 80]]].tolist()) <= set(found["cone_vertices"])
         one = int(merged[0])
         done = run("flatten", path, "--cones", f"{one},{int(used[one])},7")
-        assert "lie at the same place" in str(done.exception)
+        assert "have the same position" in str(done.exception)
 
 
 class TestRepair:

@@ -83,7 +83,7 @@ class TestNpz:
         [
             ("quads", None, "holds no mesh of quads: 'quads' is missing"),
             ("quads", np.zeros((3, 3)), "'quads' has the shape"),
-            ("quads", np.full((3, 4), 10**6), "'quads' has indices beyond"),
+            ("quads", np.full((3, 4), 10**6), "'quads' has indices outside"),
             ("faces", np.zeros(1), "'faces' has the shape"),
             ("surface_vertices", np.full((100, 3), np.nan), "not finite"),
             ("report", np.array("{}"), "not a readable NPZ file"),

@@ -107,7 +107,7 @@ class TestPictures:
         with open(tmp_path / "large.png", "wb") as file:
             file.write(PIXEL)
             file.truncate(40 * 2**20)
-        with pytest.raises(MeshFileError, match="has 40 MiB; a page takes up to 32"):
+        with pytest.raises(MeshFileError, match="has 40 MiB; the limit for a page is 32"):
             read_picture(tmp_path / "large.png")
 
 

@@ -1,1 +1,1 @@
-"""glTF 2.0: reading scenes, and writing them with new texture coordinates."""
+"""glTF 2.0: reading of scenes, and writing of scenes with new texture coordinates."""

@@ -1,7 +1,7 @@
-"""The JSON and the arrays of glTF 2.0 files, the references that arrays follow checked before anything is allocated.
+"""The JSON and the arrays of glTF 2.0 files; references and sizes are validated before memory is allocated.
 
-An own reader, because no library keeps all of what a GLB that is written has to reproduce, nor looks at what a file
-asks for before it is given. Names and numbers are those of the specification (Khronos, glTF 2.0, Sections 3.6, 4.4).
+This package has its own reader, because no library keeps all data that a written GLB must reproduce, or validates sizes
+before allocation. Names and numbers are those of the specification (Khronos, glTF 2.0, Sections 3.6, 4.4).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ..files import read_bytes
 Item: TypeAlias = dict[str, Any]
 #: (k, b) the bytes of the elements of an array.
 ByteRows: TypeAlias = NDArray[np.uint8]
-#: The types of numbers.
+#: The numeric types by component type.
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 #: Rows and columns of an element.
 SHAPES = {
@@ -39,7 +39,7 @@ _CHUNK = struct.Struct("<I4s")
 
 
 class Accessor(NamedTuple):
-    """What the JSON says of an array, checked but for its place."""
+    """The type and size of an array from the JSON, validated except for its position in the buffer."""
 
     kind: np.dtype[Any]
     rows: int
@@ -48,16 +48,16 @@ class Accessor(NamedTuple):
 
     @property
     def item_bytes(self) -> int:
-        """Bytes of an element; columns of matrices begin at multiples of four."""
+        """Return the bytes of an element; columns of matrices begin at multiples of four."""
         column = self.rows * self.kind.itemsize
         return column if self.columns == 1 else self.columns * (column + -column % 4)
 
 
 class GltfData:
-    """The tree of a glTF file, and the arrays that it names.
+    """The JSON tree of a glTF file, and the arrays that it refers to.
 
     Attributes:
-        path: of the file.
+        path: the file.
         tree: the JSON.
     """
 
@@ -65,7 +65,7 @@ class GltfData:
         """Open a .gltf or .glb file.
 
         Raises:
-            MeshFileError: it is none, is cut short, or names a buffer that is not there.
+            MeshFileError: it is not a glTF file, is truncated, or refers to a missing buffer.
         """
         self.path = path
         text, binary = _chunks(path, content) if content[:4] == b"glTF" else (content, None)
@@ -74,7 +74,7 @@ class GltfData:
         except RecursionError as error:
             raise MeshFileError(f"{path}: its JSON is nested too deeply") from error
         except ValueError as error:
-            raise MeshFileError(f"{path} is not a readable glTF file: its JSON is broken: {error}") from error
+            raise MeshFileError(f"{path} is not a readable glTF file: invalid JSON: {error}") from error
         if not isinstance(tree, dict):
             raise MeshFileError(f"{path} is not a glTF file: its JSON is not an object")
         self.tree: Item = tree
@@ -88,14 +88,14 @@ class GltfData:
         self._check_names()
 
     def _check_names(self) -> None:
-        """Refuse names that are not text: a GLB written keeps them, and other programs stumble over them."""
+        """Raise an error for names that are not strings: a written GLB keeps them, and other programs reject them."""
         for kind, items in self.tree.items():
             for i, item in enumerate(items if isinstance(items, list) else ()):
                 if isinstance(item, dict) and not isinstance(item.get("name", ""), str):
-                    self.fail(f"the name of number {i} of its {kind[:40]} is {item['name']!r:.40}, no text")
+                    self.fail(f"the name of {kind[:40]} {i} is {item['name']!r:.40}, not a string")
 
     def fail(self, reason: str) -> NoReturn:
-        """Say what is wrong with the file.
+        """Raise an error about the file.
 
         Raises:
             MeshFileError: always.
@@ -103,7 +103,7 @@ class GltfData:
         raise MeshFileError(f"{self.path}: {reason}")
 
     def entry(self, item: Item, name: str, kind: type[Any]) -> Any:
-        """Return the list or the object that an object has under a name, or an empty one; others are refused."""
+        """Return the list or object with a name in an object, or an empty one; raise an error for another type."""
         value = item.get(name, kind()) if isinstance(item, dict) else None
         if not isinstance(value, kind):
             self.fail(f"{name!r} is not {'a list' if kind is list else 'an object'}")
@@ -115,9 +115,9 @@ class GltfData:
         if not isinstance(every, list):
             self.fail(f"{name!r} is not a list")
         if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(every):
-            self.fail(f"{str(index)[:20]} is none of its {len(every)} {name}")
+            self.fail(f"{str(index)[:20]} is not one of its {len(every)} {name}")
         if not isinstance(every[index], dict):
-            self.fail(f"number {index} of its {name} is not an object")
+            self.fail(f"entry {index} of its {name} is not an object")
         return Item(every[index])
 
     def items(self, name: str) -> Iterator[Item]:
@@ -138,7 +138,7 @@ class GltfData:
         return memoryview(buffer)[start : start + length]
 
     def accessor(self, index: Any) -> Accessor:
-        """Return what kind of array an accessor is."""
+        """Return the type and size of an accessor's array."""
         item = self.item("accessors", index)
         kind = COMPONENTS.get(self.count(item, "componentType"))
         shape = SHAPES.get(str(item.get("type")))
@@ -150,7 +150,7 @@ class GltfData:
         """Return (count, b) the bytes of each element of an array.
 
         Raises:
-            MeshFileError: it reaches beyond its buffer, or has more elements than the file has bytes.
+            MeshFileError: it ends outside its buffer, or has more elements than the file has bytes.
         """
         item, form = self.item("accessors", index), self.accessor(index)
         if form.length > self.total_bytes:
@@ -166,7 +166,7 @@ class GltfData:
         return rows
 
     def values(self, index: Any, columns: int) -> FloatArray:
-        """Return (count, columns) an array of vectors as doubles; integers that stand for fractions as these.
+        """Return (count, columns) an array of vectors as doubles; normalized integers are converted to fractions.
 
         Raises:
             MeshFileError: as of `raw`; or it has another number of columns.
@@ -183,34 +183,34 @@ class GltfData:
         """Return (count,) an array of indices."""
         form = self.accessor(index)
         if form.kind.kind != "u" or form.rows * form.columns != 1:
-            self.fail(f"accessor {index} holds no indices")
+            self.fail(f"accessor {index} does not contain indices")
         return np.ascontiguousarray(self.raw(index)).view(form.kind).reshape(-1).astype(np.int64)
 
     def count(self, item: Item, name: str, default: int | None = None) -> int:
-        """Return an integer, 0 and up, that an object has."""
+        """Return the integer, 0 or more, with a name in an object."""
         value = item.get(name, default)
         if not isinstance(value, int) or isinstance(value, bool) or value < 0:
-            self.fail(f"{name!r} is {str(value)[:20]}, not an integer")
+            self.fail(f"{name!r} is {str(value)[:20]}, not an integer from 0")
         return value
 
-    def beside(self, uri: str) -> Path:
-        """Return the file that a reference relative to this one means."""
+    def resolve(self, uri: str) -> Path:
+        """Return the path of a URI that is relative to this file."""
         return self.path.parent / unquote(uri)
 
     def _rows(self, index: Any, item: Item, count: int, size: int, stride: int | None = None) -> ByteRows:
-        """Return (count, size) bytes of a buffer view that an accessor, or a part of it, names."""
+        """Return (count, size) bytes of the buffer view that an accessor, or a part of it, refers to."""
         data = self.view(item.get("bufferView"))
         start = self.count(item, "byteOffset", 0)
         step = size if stride is None else self.count({"byteStride": stride}, "byteStride")
         if step < size:
-            self.fail(f"the elements of accessor {index} lie over each other: byteStride is {step}")
+            self.fail(f"the elements of accessor {index} overlap: byteStride is {step}")
         end = start + step * (count - 1) + size if count else start
         if end > len(data):
             self.fail(f"accessor {index} ends at {end:,} of the {len(data):,} bytes of its buffer view")
         return np.ndarray((count, size), np.uint8, data, start, (step, 1))
 
     def _with_sparse(self, index: Any, sparse: Item, rows: ByteRows) -> ByteRows:
-        """Return an array with those elements replaced that the accessor lists."""
+        """Return an array with the elements replaced that the sparse accessor lists."""
         count = self.count(sparse, "count")
         where, new = self.entry(sparse, "indices", dict), self.entry(sparse, "values", dict)
         form = COMPONENTS.get(self.count(where, "componentType"))
@@ -225,7 +225,7 @@ class GltfData:
         return rows
 
     def _find_buffers(self, binary: bytes | None) -> list[bytes | None]:
-        """Return the content of each buffer; None of one that only stands for compressed data."""
+        """Return the content of each buffer; None for a placeholder of compressed data."""
         known: dict[Path, bytes] = {}
         buffers: list[bytes | None] = []
         for i, item in enumerate(self.items("buffers")):
@@ -233,38 +233,38 @@ class GltfData:
             if uri is None:
                 found = binary if i == 0 else None
             elif not isinstance(uri, str):
-                self.fail(f"the address of buffer {i} is not text")
+                self.fail(f"the URI of buffer {i} is not a string")
             elif uri.startswith("data:"):
                 found = self.decoded(uri, f"buffer {i}")
             elif "://" in uri:
-                self.fail(f"buffer {i} is at {uri[:60]!r}, and nothing is loaded from anywhere")
+                self.fail(f"buffer {i} is at {uri[:60]!r}, but remote files are not loaded")
             else:
-                path = self.beside(uri)
+                path = self.resolve(uri)
                 try:
                     found = known[path] = known[path] if path in known else read_bytes(path)
                 except ConeflatError as error:
-                    raise MeshFileError(f"{self.path}: buffer {i} is not to be had: {error}") from error
+                    raise MeshFileError(f"{self.path}: buffer {i} cannot be read: {error}") from error
             if found is not None and len(found) < length:
                 self.fail(f"buffer {i} has {len(found):,} of the {length:,} bytes it should have")
             buffers.append(found)
         return buffers
 
     def decoded(self, uri: str, what: str) -> bytes:
-        """Return what a data URI holds."""
+        """Return the decoded content of a data URI."""
         head, comma, body = uri.partition(",")
         try:
             if not comma:
                 raise ValueError("no comma")
             return base64.b64decode(unquote(body)) if head.endswith(";base64") else unquote_to_bytes(body)
         except (binascii.Error, ValueError) as error:
-            raise MeshFileError(f"{self.path}: the data URI of {what} is broken: {error}") from error
+            raise MeshFileError(f"{self.path}: the data URI of {what} is invalid: {error}") from error
 
     def _buffer_of(self, view: Item) -> bytes | None:
         self.item("buffers", view.get("buffer"))
         return self._buffers[view["buffer"]]
 
     def _refuse_compressed(self) -> None:
-        """Refuse views of which there are compressed data only."""
+        """Raise an error for buffer views that have only compressed data."""
         for view in self.items("bufferViews"):
             extensions = self.entry(view, "extensions", dict)
             for name in COMPRESSED:
@@ -273,11 +273,11 @@ class GltfData:
 
 
 def numbers(data: GltfData, item: Item, name: str, default: list[float]) -> FloatArray:
-    """Return a list of as many finite numbers as the default has."""
+    """Return (k,) a list of finite numbers, of the same length as the default."""
     values = item.get(name, default)
     count = len(values) if isinstance(values, list) else -1
     if count != len(default) or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in values):
-        data.fail(f"the {name} of a node is not {len(default)} numbers")
+        data.fail(f"the {name} of a node must be {len(default)} finite numbers")
     return np.array(values, dtype=np.float64)
 
 
@@ -290,7 +290,7 @@ def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes | None]:
         raise MeshFileError(f"{path} is GLB of version {version}; convert it to version 2")
     if total > len(content):
         raise MeshFileError(
-            f"{path} ends early: it has {len(content):,} of the {total:,} bytes that its header promises"
+            f"{path} is truncated: it has {len(content):,} of the {total:,} bytes that its header declares"
         )
     found: dict[bytes, bytes] = {}
     place = _HEADER.size

@@ -1,7 +1,7 @@
-"""Reading glTF and GLB scenes as one mesh, with the way back to their parts.
+"""Reading of glTF and GLB scenes as one mesh, with a mapping back to their parts.
 
-Ours, since libraries give a scene's meshes without saying which corner became which, and a writer must know of each
-triangle which node, mesh and primitive it came from.
+This package has its own reader, because libraries do not report the correspondence of corners, and the writer must know
+the node, mesh and primitive of each triangle.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from .data import GltfData, Item, numbers
 from .references import check_references
 
 DRACO = "KHR_draco_mesh_compression"
-#: A scene may show its meshes so often that it has as many corners in all,
-MOST_CORNERS = 10_000_000
-#: or else as many for each byte of the file.
-MOST_CORNERS_PER_BYTE = 8
+#: Maximum number of corners of a scene, counting meshes as often as nodes show them,
+MAX_CORNERS = 10_000_000
+#: or per byte of the file, whichever is larger.
+MAX_CORNERS_PER_BYTE = 8
 
 
 class Mode(IntEnum):
-    """How the vertices of a primitive make triangles."""
+    """The mode in which the vertices of a primitive form triangles."""
 
     TRIANGLES = 4
     STRIP = 5
@@ -37,12 +37,12 @@ class Mode(IntEnum):
 
 
 class ScenePart(NamedTuple):
-    """A primitive of triangles, as a node shows it.
+    """A primitive of triangles in a node.
 
     Attributes:
-        node, mesh, primitive: which, the primitive within the mesh.
-        corners: (c,) the primitive's vertex at each corner, three for each triangle, as they run in the scene.
-        is_mirrored: triangles run the other way in the scene than in the primitive.
+        node, mesh, primitive: their indices, that of the primitive within the mesh.
+        corners: (c,) the primitive's vertex at each corner, three for each triangle, with the orientation in the scene.
+        is_mirrored: whether triangles have the opposite orientation in the scene and in the primitive.
     """
 
     node: int
@@ -54,12 +54,12 @@ class ScenePart(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class GltfScene:
-    """A glTF file, and which of its triangles are those of the mesh that was read.
+    """A glTF file, and the correspondence of its triangles to those of the mesh that was read.
 
     Attributes:
         data: the file.
-        parts: whose corners are those of the mesh, one after the other.
-        blocks: where the vertices of each node begin, and where the last end; only within a node may they be merged.
+        parts: the parts whose concatenated corners are those of the mesh.
+        blocks: start of the vertices of each node, and the end of the last; vertices may be merged only within a node.
     """
 
     data: GltfData
@@ -70,15 +70,15 @@ class GltfScene:
 def parse_gltf(path: Path, content: bytes) -> MeshFile:
     """Return all triangle meshes of the scene as one, in scene coordinates.
 
-    A mesh that several nodes show is there as often as it is shown. Lines and points are left out. What a skeleton or
-    a morph target would move stays where it is without.
+    A mesh is repeated for each node that shows it. Lines and points are left out. Skeletons and morph targets are not
+    applied.
 
     Raises:
         EmptyMeshError: the scene shows no triangle.
-        MeshFileError: the file is broken, or its data are compressed in a way that cannot be decoded.
+        MeshFileError: the file is invalid, or its data are compressed in a way that cannot be decoded.
     """
     reading = _Reading(GltfData(path, content))
-    # What is not a number, or becomes none under a transform, is passed on.
+    # NaN coordinates, in the file or after a transform, are not rejected here.
     with np.errstate(all="ignore"):
         for node, matrix in shown_nodes(reading.data):
             mesh = reading.data.item("nodes", node).get("mesh")
@@ -89,11 +89,11 @@ def parse_gltf(path: Path, content: bytes) -> MeshFile:
 
 
 class _Reading:
-    """The parts of a scene, one after the other."""
+    """The state of reading a scene, whose parts are added one after the other."""
 
     def __init__(self, data: GltfData) -> None:
         self.data = data
-        self._most = max(MOST_CORNERS, MOST_CORNERS_PER_BYTE * data.total_bytes)
+        self._most = max(MAX_CORNERS, MAX_CORNERS_PER_BYTE * data.total_bytes)
         self._parts: list[ScenePart] = []
         self._vertices: list[FloatArray] = [np.empty((0, 3))]
         self._corners: list[IntArray] = [np.empty(0, np.int64)]
@@ -105,12 +105,12 @@ class _Reading:
         """Add the triangles of a mesh that a node shows.
 
         Raises:
-            MeshFileError: they are broken or compressed, or there are too many in all.
+            MeshFileError: they are invalid or compressed, or the scene has too many.
         """
         data = self.data
         linear = matrix[:3, :3]
         is_mirrored = bool(np.linalg.det(linear) < 0)
-        # Of each array of positions, the first vertex and their number.
+        # For each array of positions, the first vertex and the number of vertices.
         placed: dict[Any, tuple[int, int]] = {}
         for index, primitive in enumerate(data.entry(data.item("meshes", mesh), "primitives", list)):
             attributes = data.entry(primitive, "attributes", dict)
@@ -131,7 +131,7 @@ class _Reading:
             self._check_copied(primitive, count)
             self._take(len(corners))
             if is_mirrored:
-                # The specification turns the winding under a mirroring node (Section 3.7.4).
+                # A mirroring node reverses the orientation of triangles (Section 3.7.4 of the specification).
                 corners = corners.reshape(-1, 3)[:, ::-1].reshape(-1)
             self._parts.append(ScenePart(node, mesh, index, corners, is_mirrored))
             self._corners.append(corners + first)
@@ -165,7 +165,7 @@ class _Reading:
         )
 
     def _check_copied(self, primitive: Item, count: int) -> None:
-        """Refuse arrays that are there for some of the vertices only, or not at all."""
+        """Raise an error for attribute arrays with fewer entries than the primitive has vertices."""
         data = self.data
         for each in (primitive["attributes"], *data.entry(primitive, "targets", list)):
             for name, index in each.items():
@@ -173,12 +173,12 @@ class _Reading:
                     data.fail(f"a primitive has {name} for {len(data.raw(index))} of its {count} vertices")
 
     def _take(self, count: int) -> None:
-        """Count the vertices or corners that a part adds, before it is added."""
+        """Count the vertices or corners of a part before it is added; raise an error if there are too many."""
         self._taken += count
         if self._taken > self._most:
             self.data.fail(
-                f"its scene shows meshes so often that there are over {self._most:,} corners, many times what the "
-                "file holds; write each mesh once"
+                f"its scene repeats meshes so often that there are over {self._most:,} corners, many times those in "
+                "the file; write each mesh once"
             )
 
     def _refuse_packed(self, primitive: Item, position: Any) -> None:
@@ -190,7 +190,7 @@ class _Reading:
 
 
 class _Rows:
-    """What the corners of all parts have of an attribute."""
+    """The values of an attribute at the corners of all parts."""
 
     def __init__(self, columns: int) -> None:
         self._rows: list[FloatArray] = []
@@ -201,9 +201,9 @@ class _Rows:
     def add(
         self, data: GltfData, index: Any, node: int, corners: IntArray, linear: FloatArray | None = None
     ) -> None:
-        """Add the corners of a part; an accessor of None stands for none.
+        """Add the corners of a part; an accessor of None means that the part does not have the attribute.
 
-        linear: (3, 3) what the values are to be transformed by, the same for all parts of a node.
+        linear: (3, 3) transform of the values, equal for all parts of a node.
         """
         if index is None:
             self._corners.append(np.full(len(corners), -1))
@@ -216,7 +216,7 @@ class _Rows:
         self._corners.append(corners + self._known[node, index])
 
     def numbered(self) -> tuple[FloatArray | None, IntArray | None]:
-        """Return the different rows, and (c,) the row of each corner, -1 for none; None, None without any."""
+        """Return the distinct rows, and (c,) the row of each corner, -1 for none; None, None without any."""
         if not self._rows:
             return None, None
         rows = np.concatenate(self._rows)
@@ -225,19 +225,19 @@ class _Rows:
 
 
 def _cofactors(linear: FloatArray) -> FloatArray:
-    """Return what turns normals as a (3, 3) matrix turns positions: its inverse transpose times a positive number."""
+    """Return (3, 3) the normal transform of a linear map: its inverse transpose, up to a positive factor."""
     a, b, c = linear.T
     rows = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
     return np.asarray(np.copysign(1.0, np.linalg.det(linear)) * rows)
 
 
 def shown_nodes(data: GltfData) -> Iterator[tuple[int, FloatArray]]:
-    """Yield the nodes of the scene that the file shows, depth first, each with its (4, 4) transform.
+    """Yield the nodes of the default scene, depth first, each with its (4, 4) transform.
 
-    A file without a scene shows all its nodes.
+    For a file without scenes, all nodes are yielded.
 
     Raises:
-        MeshFileError: nodes are not trees, or their transforms no numbers.
+        MeshFileError: nodes do not form trees, or their transforms are not numbers.
     """
     seen: set[int] = set()
     stack = [(node, np.eye(4)) for node in reversed(_roots(data))]
@@ -253,17 +253,17 @@ def shown_nodes(data: GltfData) -> Iterator[tuple[int, FloatArray]]:
 
 
 def triangle_corners(data: GltfData, primitive: Item, count: int) -> IntArray:
-    """Return (3 m,) the vertices of the triangles of a primitive that has `count` vertices; none of lines and points.
+    """Return (3 m,) the vertices of the triangles of a primitive with `count` vertices; empty for lines and points.
 
     Raises:
-        MeshFileError: it names a vertex that it does not have.
+        MeshFileError: it refers to a vertex that does not exist.
     """
     mode = data.count(primitive, "mode", Mode.TRIANGLES)
     if mode not in list(Mode):
         return np.empty(0, np.int64)
     order = np.arange(count) if primitive.get("indices") is None else data.indices(primitive["indices"])
     if len(order) and order.max() >= count:
-        data.fail(f"a face names vertex {order.max()}, but its primitive has {count} vertices, from 0 on")
+        data.fail(f"a face names vertex {order.max()}, but its primitive has {count} vertices, from 0")
     if mode == Mode.TRIANGLES:
         return order[: len(order) // 3 * 3]
     i = np.arange(max(len(order) - 2, 0))
@@ -272,7 +272,7 @@ def triangle_corners(data: GltfData, primitive: Item, count: int) -> IntArray:
     else:
         rows = [i, i + 1 + i % 2, i + 2 - i % 2]
     triangles = order[np.stack(rows, axis=1)]
-    # Strips are joined by triangles that use a vertex twice.
+    # Strips are connected by degenerate triangles, which are removed.
     a, b, c = triangles.T
     return triangles[(a != b) & (b != c) & (c != a)].reshape(-1)
 
@@ -287,7 +287,7 @@ def _roots(data: GltfData) -> list[Any]:
 
 
 def _local(data: GltfData, node: Item) -> FloatArray:
-    """Return (4, 4) the transform of a node in that above it."""
+    """Return (4, 4) the transform of a node relative to its parent."""
     if "matrix" in node:
         return numbers(data, node, "matrix", [0.0] * 16).reshape(4, 4).T
     x, y, z, w = numbers(data, node, "rotation", [0.0, 0.0, 0.0, 1.0]).tolist()

@@ -1,6 +1,6 @@
-"""Which arrays and objects a glTF tree names, beyond what the mesh is made of.
+"""The arrays and objects that a glTF tree refers to, in addition to those of the mesh.
 
-What is written keeps all that, extensions included, and must not carry along what nothing names any more.
+A written file keeps all of them, including extensions, but not arrays that are no longer referred to.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 
 from .data import GltfData, Item
 
-#: What stands under these names in extensions is a number of something else than an array.
+#: Keys in extensions whose values are indices of objects other than arrays.
 _NO_ARRAYS = ("index", "texCoord", "source", "sampler", "material", "light", "node", "mesh", "variants")
 _LISTS = (
     "accessors", "bufferViews", "images", "materials", "meshes", "nodes", "textures", "skins", "animations",
@@ -18,10 +18,10 @@ _LISTS = (
 
 
 def check_references(data: GltfData) -> None:
-    """Refuse a tree that could not be written again, since something in it is not what it should be.
+    """Raise an error for a tree that could not be written again, because a reference or a type in it is invalid.
 
     Raises:
-        MeshFileError, KeyError, TypeError, AttributeError: respectively.
+        MeshFileError, KeyError, TypeError, AttributeError: depending on the invalid part.
     """
     for name in _LISTS:
         for i, item in enumerate(data.items(name)):
@@ -44,7 +44,7 @@ def check_references(data: GltfData) -> None:
 
 
 def _references(data: GltfData) -> Iterator[tuple[str, Any]]:
-    """Yield the list and the number of what scenes, nodes, primitives, textures and skins name, beside arrays."""
+    """Yield the list and the index of each object other than an array that scenes, nodes, meshes and so on refer to."""
     tree, entry = data.tree, data.entry
     if "scene" in tree:
         yield "scenes", tree["scene"]
@@ -64,7 +64,7 @@ def _references(data: GltfData) -> Iterator[tuple[str, Any]]:
 
 
 def accessors_of_arrays(tree: Item) -> Iterator[int]:
-    """Yield the accessors that meshes, skins and animations name."""
+    """Yield the accessors that meshes, skins and animations refer to."""
     for mesh in tree.get("meshes", []):
         for one in mesh["primitives"]:
             yield from one.get("attributes", {}).values()
@@ -93,7 +93,7 @@ def view_owners(accessor: Item) -> list[Item]:
 
 
 def numbers_in_extensions(tree: Any) -> Iterator[int]:
-    """Yield all numbers in extensions, of which some may name arrays or buffer views."""
+    """Yield all integers in extensions, some of which may be indices of arrays or buffer views."""
     stack = [(tree, False)]
     while stack:
         item, is_inside = stack.pop()
@@ -107,7 +107,7 @@ def numbers_in_extensions(tree: Any) -> Iterator[int]:
 
 
 def keys_of(item: Any) -> Iterator[str]:
-    """Yield all keys of an object and of those within."""
+    """Yield all keys of an object and of nested objects."""
     stack = [item]
     while stack:
         item = stack.pop()

@@ -1,8 +1,8 @@
-"""Writing binary glTF: one mesh, or the scene that the mesh was read from, with new UVs and all else as it was.
+"""Writing of binary glTF: one mesh, or the scene that the mesh was read from, with new UVs and otherwise unchanged.
 
-What stays keeps its number in the lists of the JSON, so that extensions, animations and skins that this package knows
-nothing of go on naming what they named. That is why the file is not taken apart and built anew, as libraries do. Names
-and numbers are those of the glTF 2.0 specification (Khronos).
+Objects keep their indices in the lists of the JSON, so that references from unknown extensions, animations and skins
+stay valid. For this reason the file is modified and not rebuilt, as libraries do. Names and numbers are those of the
+glTF 2.0 specification (Khronos).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from .references import accessors_of_arrays, keys_of, numbers_in_extensions, vie
 if TYPE_CHECKING:
     from ...result import Flattening
 
-#: What a view holds, for the graphics card.
+#: Targets of buffer views, for the graphics card.
 FOR_VERTICES, FOR_INDICES = 34962, 34963
 MATERIAL: Item = {
     "name": "coneflat",
@@ -44,12 +44,12 @@ MATERIAL: Item = {
     },
 }
 UV = "TEXCOORD_0"
-#: What an array of some elements has of the whole one.
+#: Keys of an accessor that are copied to the accessor of a subset of its elements.
 _KEPT = ("componentType", "type", "normalized", "name", "extras")
 
 
 class Glb:
-    """What is to be written.
+    """The content of a GLB file while it is built.
 
     Attributes:
         tree: the JSON.
@@ -61,44 +61,44 @@ class Glb:
         self._length = 0
         self._free: defaultdict[str, deque[int]] = defaultdict(deque)
 
-    def free(self, kind: str, number: int, stub: Item) -> None:
-        """Let what is new have a number of a list, such as "accessors"; `stub` stands there until then."""
+    def release(self, kind: str, number: int, stub: Item) -> None:
+        """Release an index of a list, such as "accessors", for new objects; `stub` is a placeholder until then."""
         self.tree[kind][number] = stub
-        # Taken from the end, so that what is new stands in the order in which it is written.
+        # Indices are taken from the end, so that new objects are in the order in which they are written.
         self._free[kind].appendleft(number)
 
     def add(self, kind: str, item: Item) -> int:
-        """Put something new into a list, and return its number there: one that is free, or the next."""
+        """Add an object to a list, and return its index: a released one, or the next."""
         every = self.tree.setdefault(kind, [])
         place = self._free[kind].pop() if self._free[kind] else len(every)
         every[place : place + 1] = [item]
         return place
 
     def append(self, content: bytes) -> int:
-        """Return where in the buffer some bytes are now."""
+        """Append bytes to the buffer, and return their position."""
         start = self._length
         self._pieces.append(content + bytes(-len(content) % 4))
         self._length += len(self._pieces[-1])
         return start
 
     def add_view(self, content: bytes, **more: int) -> int:
-        """Return the number of a new buffer view."""
+        """Add a buffer view, and return its index."""
         view = {"buffer": 0, "byteOffset": self.append(content), "byteLength": len(content), **more}
         return self.add("bufferViews", view)
 
     def add_array(self, rows: NDArray[Any], form: Item, target: int | None = None) -> int:
-        """Return the number of a new accessor of (k, c) values, or of their bytes, with what else is said of it."""
+        """Add an accessor of (k, c) values, or of their bytes, with further keys, and return its index."""
         content = np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1)
         more = {} if target is None else {"target": target}
         if content.shape[1] % 4 and target == FOR_VERTICES:
-            # Elements of vertices begin at multiples of four.
+            # Vertex attributes must be aligned to multiples of four bytes.
             content = np.pad(content, ((0, 0), (0, -content.shape[1] % 4)))
             more["byteStride"] = content.shape[1]
         view = self.add_view(content.tobytes(), **more)
         return self.add("accessors", {"bufferView": view, "componentType": 0, "count": len(rows)} | form)
 
     def add_material(self, texture: Texture) -> int:
-        """Return the number of a new material that shows an image."""
+        """Add a material with an image as its texture, and return its index."""
         image = self.add("images", {"bufferView": self.add_view(texture.content), "mimeType": texture.kind})
         colour = {"index": self.add("textures", {"source": image})}
         shown = {"baseColorFactor": [1.0] * 4, "baseColorTexture": colour}
@@ -117,7 +117,7 @@ class Glb:
         total = 12 + 8 + len(text) + 8 + self._length
         if total >= 2**32:
             raise MeshFileError(
-                f"the result takes {total:,} bytes as GLB, which holds 4 GB at most: choose .ply or .npz"
+                f"the result takes {total:,} bytes as GLB, which is limited to 4 GB: choose .ply or .npz"
             )
         stream.write(struct.pack("<4sII I4s", b"glTF", 2, total, len(text), b"JSON"))
         stream.write(text)
@@ -126,26 +126,26 @@ class Glb:
 
 
 def bounds(values: NDArray[Any]) -> Item:
-    """Return what an accessor of positions says of their box."""
+    """Return the minimum and maximum of (k, c) positions, as an accessor needs them."""
     return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
 
 
 def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None, folder: Path) -> None:
     """Write a result as GLB.
 
-    Of a mesh that was read from a glTF scene, that is the scene with new UVs. Else it has one mesh, with a two-sided
-    material that is plain or has a texture. Every vertex has its UV as TEXCOORD_0 (whose v points down, as glTF has
-    it), the input's normal or else one of the uncut surface, and as _SOURCE_VERTEX the vertex of the input that it
-    came from. All are 32-bit floats, the only type that glTF has for them: source vertices are exact up to 2^24.
+    For a mesh that was read from a glTF scene, the scene is written with new UVs. Otherwise the file has one mesh, with
+    a two-sided material that is plain or has a texture. Every vertex has its UV as TEXCOORD_0 (with v pointing down, as
+    glTF defines it), the input's normal or else that of the uncut surface, and its vertex in the input as
+    _SOURCE_VERTEX. All are 32-bit floats, the only type that glTF has for them: source vertices are exact up to 2^24.
 
     Args:
-        result: what to write.
+        result: the result to write.
         stream: a binary file.
         texture: the image of the material; None for a light grey, or the scene's own materials.
-        folder: where the file will be, for paths of images that are not to be had.
+        folder: folder of the file, for relative paths of images that cannot be read.
 
     Raises:
-        MeshFileError: it is larger than GLB can be.
+        MeshFileError: the file would be larger than GLB permits.
     """
     scene = None if result.source is None or result.face_corners is None else result.source.scene
     if scene is None:
@@ -156,7 +156,7 @@ def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None, fo
 
 
 def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
-    """Return a scene of one mesh."""
+    """Return a scene with one mesh."""
     split = split_at_seams(result, source_normals(result))
     normals = split.normals
     if normals is None:
@@ -192,15 +192,15 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
 def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: Texture | None) -> Glb:
     """Return a glTF scene with the UVs of a result.
 
-    Of each primitive, TEXCOORD_0 is new, and every vertex is there as often as it has different UVs; all its other
-    attributes and morph targets are copied bit for bit. A mesh that several nodes show becomes one for each node.
-    Images beside the file are taken into the buffer. All else stays as it is.
+    In each primitive, TEXCOORD_0 is new, and every vertex is repeated for each of its UVs; all other attributes and
+    morph targets are copied bit for bit. A mesh that several nodes show is copied for each node. Image files are
+    embedded in the buffer. All other data is unchanged.
 
     Args:
-        result: of a mesh that was read from the scene, with its `face_corners`.
-        scene: what was read.
-        folder: where the file will be, for paths of images that are not to be had.
-        texture: for what was flattened, instead of the file's materials.
+        result: the result for a mesh that was read from the scene, with its `face_corners`.
+        scene: the scene that was read.
+        folder: folder of the file, for relative paths of images that cannot be read.
+        texture: texture of the flattened parts, instead of the file's materials.
     """
     assert result.face_corners is not None
     data, glb = scene.data, Glb(_copied(scene.data.tree))
@@ -211,7 +211,7 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
         for name in ("indices", "targets", "mode"):
             target.pop(name, None)
         target.get("extensions", {}).pop(DRACO, None)
-    _keep_the_rest(glb, data)
+    _keep_referenced(glb, data)
     _embed_images(glb, data, folder)
     # Readers such as trimesh return the UVs of primitives that have a material only.
     if texture is not None:
@@ -229,12 +229,12 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
         if texture is not None or "material" not in target:
             target["material"] = material
     _drop_empty(glb, targets)
-    _forget_extensions(glb.tree)
+    _remove_extensions(glb.tree)
     return glb
 
 
 def scene_losses(result: Flattening) -> tuple[str, ...]:
-    """Return what a GLB of a result does not keep of the glTF file that it was read from, one sentence each."""
+    """Return notes on data of the source glTF file that a GLB of a result does not keep, one sentence each."""
     source = result.source
     if source is None or source.scene is None or result.face_corners is None:
         return ()
@@ -247,7 +247,7 @@ def scene_losses(result: Flattening) -> tuple[str, ...]:
     copies = len(shown) - len({mesh for mesh, _ in shown})
     if copies:
         notes.append(
-            f"Meshes that several nodes show have UVs of their own for each: {copies:,} more of them."
+            f"Meshes that several nodes show were copied, with separate UVs for each node: {copies:,} more of them."
         )
     materials = tree.get("materials", [])
     painted = {
@@ -265,7 +265,7 @@ def scene_losses(result: Flattening) -> tuple[str, ...]:
 
 
 def _own_primitives(tree: Item, scene: GltfScene) -> list[Item]:
-    """Return the primitive of each part, after a copy was made of meshes that another node has."""
+    """Return the primitive of each part, after meshes that several nodes show are copied."""
     meshes, nodes = tree["meshes"], tree["nodes"]
     first_node: dict[int, int] = {}
     for part in scene.parts:
@@ -277,15 +277,15 @@ def _own_primitives(tree: Item, scene: GltfScene) -> list[Item]:
 
 
 def _faces_of_parts(parts: tuple[ScenePart, ...], face_corners: IntArray) -> list[IntArray]:
-    """Return the triangles of a result that are each part's, whose corners the scene has one after the other."""
+    """Return for each part of the scene the triangles of a result, whose corners are in the order of parts."""
     starts = np.cumsum([0] + [len(part.corners) for part in parts])
     owner = np.searchsorted(starts, face_corners[:, 0], side="right") - 1
     order = np.argsort(owner, kind="stable")
     return np.split(order, np.searchsorted(owner[order], np.arange(1, len(parts))))
 
 
-def _keep_the_rest(glb: Glb, data: GltfData) -> None:
-    """Move what is still referred to into the new buffer, and free the numbers of all else."""
+def _keep_referenced(glb: Glb, data: GltfData) -> None:
+    """Copy arrays that are still referred to into the new buffer, and release the indices of all others."""
     tree = glb.tree
     maybe = set(numbers_in_extensions(tree))
     accessors, views = maybe.union(accessors_of_arrays(tree)), maybe.union(views_of_images(tree))
@@ -293,8 +293,8 @@ def _keep_the_rest(glb: Glb, data: GltfData) -> None:
         if i in accessors:
             views |= {one["bufferView"] for one in view_owners(accessor)}
         else:
-            # What nothing names any more is as small as an accessor can be.
-            glb.free("accessors", i, {"componentType": 5121, "count": 1, "type": "SCALAR"})
+            # The placeholder is the smallest possible accessor.
+            glb.release("accessors", i, {"componentType": 5121, "count": 1, "type": "SCALAR"})
     for i, view in enumerate(tree.get("bufferViews", [])):
         if i in views:
             view["byteOffset"] = glb.append(data.view(i).tobytes())
@@ -302,13 +302,13 @@ def _keep_the_rest(glb: Glb, data: GltfData) -> None:
             for name in COMPRESSED:
                 view.get("extensions", {}).pop(name, None)
         else:
-            glb.free("bufferViews", i, {"buffer": 0, "byteLength": 1})
+            glb.release("bufferViews", i, {"buffer": 0, "byteLength": 1})
 
 
 def _fill(
     glb: Glb, data: GltfData, target: Item, before: Item, vertices: IntArray, points: IntArray, uv: FloatArray
 ) -> None:
-    """Write the triangles of a primitive, whose corners are these of its vertices and these points of the plane."""
+    """Write the triangles of a primitive, with its vertex and the point in the plane of every corner."""
     pairs, number = np.unique(vertices * len(uv) + points, return_inverse=True)
     own, point = np.divmod(pairs, len(uv))
 
@@ -329,7 +329,7 @@ def _fill(
 
 
 def _gathered(glb: Glb, data: GltfData, index: int, own: IntArray, has_bounds: bool) -> int:
-    """Return the number of an array of some elements of another one."""
+    """Add an array with some elements of another one, and return its index."""
     old = data.item("accessors", index)
     rows = np.take(data.raw(index), own, axis=0)
     kept: Item = {key: old[key] for key in _KEPT if key in old}
@@ -339,17 +339,17 @@ def _gathered(glb: Glb, data: GltfData, index: int, own: IntArray, has_bounds: b
 
 
 def _embed_images(glb: Glb, data: GltfData, folder: Path) -> None:
-    """Take the files of images into the buffer; of those that cannot be read, make the paths fit."""
+    """Embed image files in the buffer; for those that cannot be read, rewrite the relative paths."""
     for image in glb.tree.get("images", []):
         uri = image.get("uri")
         if not isinstance(uri, str) or uri.startswith("data:") or "://" in uri:
             continue
         try:
-            content = read_bytes(data.beside(uri))
+            content = read_bytes(data.resolve(uri))
         except ConeflatError:
             content = b""
         kind = image_kind(content)
-        if kind is None or kind == "image/gif":  # glTF knows no GIF
+        if kind is None or kind == "image/gif":  # glTF does not support GIF
             old, new = (os.path.realpath(place) for place in (data.path.parent, folder))
             image["uri"] = quote(moved_path(os.fsencode(unquote(uri)), old, new))
             continue
@@ -358,7 +358,7 @@ def _embed_images(glb: Glb, data: GltfData, folder: Path) -> None:
 
 
 def _drop_empty(glb: Glb, targets: list[Item]) -> None:
-    """Leave out primitives of which the repair left nothing, and meshes without any."""
+    """Remove primitives without remaining triangles after the repair, and meshes without primitives."""
     empty = {id(target) for target in targets if not target["attributes"]}
     if not empty:
         return
@@ -369,14 +369,14 @@ def _drop_empty(glb: Glb, targets: list[Item]) -> None:
     for mesh in glb.tree["meshes"]:
         left = [one for one in mesh["primitives"] if id(one) not in empty]
         if not left:
-            # Meshes must not be empty, not even those that nothing shows: they get a point.
+            # Meshes must not be empty, even if no node shows them: they get a point.
             zero = {"componentType": 5126, "count": 1, "type": "VEC3"} | bounds(np.zeros((1, 3)))
             left = [{"attributes": {"POSITION": glb.add("accessors", zero)}, "mode": 0}]
         mesh["primitives"] = left
 
 
-def _forget_extensions(tree: Item) -> None:
-    """Take compressions that are no more from the lists of extensions."""
+def _remove_extensions(tree: Item) -> None:
+    """Remove compression extensions that are no longer used from the lists of extensions."""
     used = set(keys_of(tree))
     for name in ("extensionsUsed", "extensionsRequired"):
         left = [one for one in tree.pop(name, []) if one not in (DRACO, *COMPRESSED) or one in used]
@@ -385,5 +385,5 @@ def _forget_extensions(tree: Item) -> None:
 
 
 def _copied(item: Any) -> Any:
-    """Return a copy of a tree of JSON, however deep."""
+    """Return a deep copy of a JSON tree."""
     return json.loads(json.dumps(item))

@@ -1,4 +1,4 @@
-"""Less distortion of a layout whose seams stay rigid copies: a general solver."""
+"""A solver that reduces the distortion of a layout while the sides of seams stay rigid copies of each other."""
 
 from .constraints import Lines, PointConstraints
 from .energies import StretchEnergy

@@ -1,4 +1,4 @@
-"""What points of a layout must do while it is relaxed."""
+"""Constraints on the points of a layout during relaxation."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from ...errors import OptionError
 
 @dataclass(frozen=True)
 class Lines:
-    """Points that lie on lines.
+    """Points that are constrained to lines.
 
     Attributes:
-        points: (q,) points; one on two lines is there twice.
-        line: (q,) the line of each, from 0.
-        directions: (l, 2) of the lines, of any length.
-        offsets: (l,) where each line is: its unit normal, a quarter turn to the left of its direction, times its
-            places. NaN for a line that may shift sideways. None: all are where their first point is.
+        points: (q,) point indices; a point on two lines is listed twice.
+        line: (q,) the line of each point, from 0.
+        directions: (l, 2) directions of the lines, of any length.
+        offsets: (l,) position of each line: the dot product of its points with its unit normal, which is the direction
+            rotated to the left by a quarter turn. NaN for a line that may move sideways. None: every line passes
+            through its first point.
     """
 
     points: ArrayLike
@@ -33,20 +34,20 @@ class Lines:
 
 @dataclass(frozen=True)
 class PointConstraints:
-    """What points must do; what does not hold in the beginning does in the end.
+    """Constraints on points; they need not hold at the start, but hold after relaxation.
 
     Attributes:
-        pinned: (p,) points.
-        places: (p, 2) where these are in the end; None: where they are.
+        pinned: (p,) indices of pinned points.
+        places: (p, 2) final positions of the pinned points; None for their current positions.
         lines: points on lines; None for none.
-        held_seams: (k, 2) edges, as vertices, of seams whose two sides keep not only the rotation between them but the
-            translation, too.
-        tied: (q,) half-edges of seams.
-        translations: (q, 2) what is added in the end to a point in the frame of the triangle across each, turned by the
-            seam's rotation, to give the one in the frame of its own.
-        quarter_turns: the sides of seams come to be the nearest quarter turns of each other, point by point, whatever
-            they are as yet; else they must be rigid copies, and keep their rotations.
-        nodes: vertices at which seams end in any case.
+        held_seams: (k, 2) edges, as vertices, of seams whose two sides keep the translation between them in addition to
+            the rotation.
+        tied: (q,) half-edges of seams with prescribed translations.
+        translations: (q, 2) the final translation of each tied half-edge: a point in the frame of its own triangle is
+            the corresponding point in the frame of the opposite triangle, rotated by the seam's rotation, plus this.
+        quarter_turns: True moves the two sides of every seam to copies of each other, rotated by the nearest multiple
+            of a quarter turn; otherwise they must already be rigid copies, and keep their rotations.
+        nodes: vertices at which chains of seam edges always end.
     """
 
     pinned: ArrayLike = ()
@@ -61,7 +62,7 @@ class PointConstraints:
 
 @dataclass(frozen=True, eq=False)
 class CheckedConstraints:
-    """The same as arrays that fit each other; offsets and places are given, with unit directions."""
+    """Validated constraints as arrays, with places and offsets filled in, and with unit directions."""
 
     pinned: IntArray
     places: FloatArray
@@ -77,10 +78,10 @@ class CheckedConstraints:
 
 
 def check_constraints(constraints: PointConstraints, points: FloatArray) -> CheckedConstraints:
-    """Return constraints on (u, 2) points, checked.
+    """Return validated constraints on (u, 2) points.
 
     Raises:
-        OptionError: shapes do not fit, indices are out of range, or numbers are not finite.
+        OptionError: shapes do not match, indices are out of range, or numbers are not finite.
     """
     pinned = _indices(constraints.pinned, len(points), "pinned")
     if len(np.unique(pinned)) < len(pinned):
@@ -88,14 +89,14 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
     places = points[pinned] if constraints.places is None else _floats(constraints.places, "places")
     if places.shape != (len(pinned), 2):
         raise OptionError(
-            f"places have shape {places.shape}, not {(len(pinned), 2)}, one for each pinned point"
+            f"places must have shape {(len(pinned), 2)}, one for each pinned point, got {places.shape}"
         )
     held = np.asarray(constraints.held_seams, dtype=np.int64).reshape(-1, 2)
     tied = np.asarray(constraints.tied, dtype=np.int64).ravel()
     translations = _floats(constraints.translations, "translations").reshape(-1, 2)
     if len(tied) != len(translations):
         raise OptionError(
-            f"{plural(len(tied), 'half-edge')} tied, but {plural(len(translations), 'translation')} for them"
+            f"{plural(len(tied), 'half-edge')} tied, but {plural(len(translations), 'translation')} given for them"
         )
     nodes = np.asarray(constraints.nodes, dtype=np.int64).ravel()
     on_line, line, directions, offsets = _checked_lines(constraints.lines, points)
@@ -117,7 +118,7 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
 def _checked_lines(
     lines: Lines | None, points: FloatArray
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
-    """Return points, the line of each, unit directions and offsets, as `CheckedConstraints` has them."""
+    """Return the points on lines, the line of each, unit directions and offsets, as in `CheckedConstraints`."""
     if lines is None:
         none = np.empty(0, dtype=np.int64)
         return none, none, np.empty((0, 2)), np.empty(0)
@@ -126,11 +127,11 @@ def _checked_lines(
     line = _indices(lines.line, len(directions), "line")
     if len(line) != len(on_line):
         raise OptionError(
-            f"{plural(len(on_line), 'point')} of lines, but {plural(len(line), 'line')} for them"
+            f"{plural(len(on_line), 'point')} of lines, but {plural(len(line), 'line')} given for them"
         )
     size = np.hypot(*directions.T)
     if not (size > 0).all():
-        raise OptionError(f"{plural(int((size == 0).sum()), 'line')} with direction (0, 0)")
+        raise OptionError(f"{plural(int((size == 0).sum()), 'line')} with the direction (0, 0)")
     directions = directions / size[:, None]
     if lines.offsets is None:
         offsets = np.full(len(directions), np.nan)
@@ -140,7 +141,7 @@ def _checked_lines(
         offsets = np.asarray(lines.offsets, dtype=np.float64)
         if offsets.shape != (len(directions),) or np.isinf(offsets).any():
             raise OptionError(
-                f"offsets of lines must be {plural(len(directions), 'number')}, or NaN, not of shape {offsets.shape}"
+                f"offsets of lines must be {plural(len(directions), 'number')}, or NaN, got shape {offsets.shape}"
             )
     return on_line, line, directions, offsets
 
@@ -155,9 +156,9 @@ def _indices(value: ArrayLike, count: int, name: str) -> IntArray:
     if given.size == 0:
         return np.empty(0, dtype=np.int64)
     if given.ndim != 1 or given.dtype.kind not in "iu":
-        raise OptionError(f"{name} must be a list of indices, not {given.dtype} of shape {given.shape}")
+        raise OptionError(f"{name} must be a list of indices, got {given.dtype} of shape {given.shape}")
     if given.min() < 0 or given.max() >= count:
-        raise OptionError(f"{name} has indices from {given.min()} to {given.max()}, of {count}")
+        raise OptionError(f"{name} must be below {count}, got indices from {given.min()} to {given.max()}")
     indices: IntArray = given.astype(np.int64)
     return indices
 

@@ -1,4 +1,4 @@
-"""Newton's method on the distortion of triangles, none of which is ever flipped."""
+"""Newton's method on the distortion of triangles, without flipping any of them."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from ...base.arrays import ComplexArray, FloatArray
 from ...errors import MetricError
 from ...linalg import Factor, factorize
 from ...linalg.newton import ARMIJO, HALVINGS
-from .elements import SHORT_OF_FLAT, Elements
+from .elements import MAX_STEP_SHARE, Elements
 from .energies import Energy
 from .motions import Motions
 
-# Part of the energy, and of the way to where the constraints hold, that is lost in a sum.
+# Relative rounding error of sums, for the energy and for the remaining distance to the constraints.
 RELATIVE_ROUNDING = 1e-12
-# Where the constraints hold is out of reach after a step that goes less than this part of the way.
+# The constraints cannot be reached if a step covers less than this fraction of the distance to them.
 MIN_PROGRESS = 1e-3
-# Part of the way that a step goes at most where seams and sides have to turn: on a longer one, sides fold over.
+# Maximum fraction of the distance per step if seams and sides have to rotate: with longer steps, sides fold over.
 TURNING_STRIDE = 0.1
-# Once less than this part of the unknowns is in parts that are not at their least, these go on alone.
+# If less than this fraction of the unknowns is in parts that have not converged, only these parts are continued.
 MIN_ACTIVE_SHARE = 0.6
 
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """Where Newton's method has come to.
+    """The result of Newton's method.
 
     Attributes:
-        points: (u,) the places.
-        before, after: the energy.
-        steps: Newton steps.
-        remaining: part of the way to where the constraints hold that is left: 0 when they do.
+        points: (u,) the positions as complex numbers.
+        before, after: the energy at the start and at the end.
+        steps: number of Newton steps.
+        remaining: remaining fraction of the distance to the constraints: 0 if they hold.
     """
 
     points: ComplexArray
@@ -50,23 +50,25 @@ def descend(
     energy: Energy,
     tolerance: float,
     steps: int,
-    tell: Callable[[int, float], bool | None] | None = None,
+    progress: Callable[[int, float], bool | None] | None = None,
     stride: float = 1.0,
 ) -> Descent:
-    """Return points of less energy, as far as Newton's method comes.
+    """Return points of lower energy, found by Newton's method.
 
-    Parts that no triangle connects take steps of their own lengths. Where constraints do not hold, all take one, which
-    goes as far towards them as triangles allow (an infeasible start: Boyd and Vandenberghe 2004, Section 10.3).
+    Parts that no triangle connects have separate step lengths. While constraints do not hold, all parts have a common
+    step length, as long towards the constraints as the triangles permit (an infeasible start: Boyd and Vandenberghe
+    2004, Section 10.3).
 
     Args:
-        points: (u,) where no triangle that moves is flipped.
-        motions: how they move.
-        elements: the triangles that do.
-        energy: what is minimised.
-        tolerance: part of its energy above the least that a step must promise to gain for a part to go on.
-        steps: at most.
-        tell: called with the number of steps and the energy; True ends it.
-        stride: part of the way to where constraints hold that a step goes at most.
+        points: (u,) start positions as complex numbers, where no moving triangle is flipped.
+        motions: the motions of the points as functions of the unknowns.
+        elements: the triangles that move.
+        energy: the energy that is minimised.
+        tolerance: a part is continued if the predicted decrease of a step is above this fraction of its energy minus
+            the lower bound.
+        steps: maximum number of steps.
+        progress: called with the number of steps and the energy; a return value of True ends the iteration.
+        stride: maximum fraction of the distance to the constraints per step.
 
     Raises:
         MetricError: the Hessian is singular in double precision.
@@ -99,7 +101,7 @@ def descend(
         factor = factorize(matrix, used_up=factor, whole=len(points))
         step = np.append(factor.solve(-gradient - pull), remaining)
         if not np.isfinite(step).all():
-            raise MetricError(f"relaxation found no finite step of {elements.count:,} unknowns")
+            raise MetricError(f"relaxation found no finite step of its {elements.count:,} unknowns")
         slope = np.bincount(unknown_part, gradient * step[:-1], parts)
         if not remaining:
             active &= -slope > np.maximum(tolerance * (here - least), RELATIVE_ROUNDING * here)
@@ -110,12 +112,12 @@ def descend(
         length = np.full(parts, np.inf)
         np.minimum.at(length, part, maps.largest_steps(change))
         longest = min(1.0, stride / remaining) if remaining else 1.0
-        length = np.minimum(longest, SHORT_OF_FLAT * length)
+        length = np.minimum(longest, MAX_STEP_SHARE * length)
         taken += 1
         for _ in range(HALVINGS):
             trial = maps.plus(length[part], change)
             there = sums(elements.energies(energy, trial))
-            # On the way to the constraints the energy may have to rise: all that counts is that it is finite.
+            # The energy may have to rise on the way to the constraints, so it need only be finite.
             enough = np.isfinite(there) if remaining else there <= here + ARMIJO * length * slope
             good = ~active | enough
             if good.all():
@@ -133,6 +135,6 @@ def descend(
             remaining = remaining if remaining > RELATIVE_ROUNDING else 0.0
             if length[0] < MIN_PROGRESS:
                 break
-        if tell is not None and tell(taken, done + float(here.sum())):
+        if progress is not None and progress(taken, done + float(here.sum())):
             break
     return Descent(places, before, done + float(here.sum()), taken, remaining)

@@ -1,8 +1,8 @@
 """Triangles as functions of unknowns: maps, largest steps, gradients and Hessians.
 
-The map of a triangle from the shape it should have to the one in the plane is z -> a z + b conj(z), with singular
-values |a| + |b| and |a| - |b| and the determinant |a|^2 - |b|^2. Both a and b are linear in the places of the corners,
-and so in the unknowns that move these.
+The map of a triangle from its target shape to its shape in the plane is z -> a z + b conj(z), with singular values
+|a| + |b| and |a| - |b| and the determinant |a|^2 - |b|^2. Both a and b are linear in the positions of the corners, and
+thus in the unknowns that move these.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from ...mesh.connectivity import label_components
 from .energies import Energy
 from .motions import Motions
 
-# Part of the step to where a triangle would have no area that is taken at most (Smith and Schaefer 2015).
-SHORT_OF_FLAT = 0.9
-# Part of diagonal entries that is added to them: what nothing holds may turn and shift as a whole.
+# Maximum step, as a fraction of the step at which a triangle would have no area (Smith and Schaefer 2015).
+MAX_STEP_SHARE = 0.9
+# Fraction of diagonal entries that is added to them: parts without constraints are free to rotate and translate.
 RELATIVE_RIDGE = 1e-10
 
 
@@ -34,16 +34,16 @@ class Maps:
     b: ComplexArray
 
     def plus(self, length: FloatArray, step: Maps) -> Maps:
-        """Return the maps after a step, (f,) of it each."""
+        """Return the maps after a step, multiplied by (f,) step lengths."""
         return Maps(self.a + length * step.a, self.b + length * step.b)
 
     def singular_values(self) -> tuple[FloatArray, FloatArray]:
-        """Return (f,) the larger and the smaller one; the smaller is negative where the map is flipped."""
+        """Return (f,), (f,) the larger and the smaller singular value; the latter is negative for flipped maps."""
         one, two = np.abs(self.a), np.abs(self.b)
         return one + two, one - two
 
     def largest_steps(self, step: Maps) -> FloatArray:
-        """Return (f,) how much of a step there may be before a triangle has no area."""
+        """Return (f,) the step lengths at which the triangles have no area, infinite if there is none."""
         constant = np.abs(self.a) ** 2 - np.abs(self.b) ** 2
         linear = (np.conj(self.a) * step.a - np.conj(self.b) * step.b).real  # half of it
         square = np.abs(step.a) ** 2 - np.abs(step.b) ** 2
@@ -64,16 +64,22 @@ class Elements:
     Attributes:
         faces: (f,) the triangles.
         count: the number of unknowns k.
-        parts, part, unknown_part: sets of unknowns that no triangle connects: how many, (f,), (k,) the one of each.
-        weight: (f,) what each triangle's energy counts.
+        parts: number of parts, which are connected components of unknowns that share triangles.
+        part, unknown_part: (f,), (k,) the part of each triangle and of each unknown.
+        weight: (f,) weight of each triangle's energy.
     """
 
     def __init__(
         self, motions: Motions, corners: IntArray, rest: ComplexArray, unit: float, weight: FloatArray
     ) -> None:
-        """Find the triangles (m, 3) with sides (m, 3) at rest, times a unit, that motions move, and how.
+        """Find the triangles that the motions move, and the derivatives of their maps.
 
-        rest: of these triangles; those of others are not looked at.
+        Args:
+            motions: the motions of points.
+            corners: (m, 3) the points of all triangles.
+            rest: (m, 3) complex sides in the target shape; used only for triangles that move.
+            unit: factor of these sides.
+            weight: (m,) weights of the triangles.
         """
         moves = np.diff(motions.start) > 0
         self.faces = np.flatnonzero(has_any(moves, corners))
@@ -81,7 +87,7 @@ class Elements:
         corners = corners[self.faces]
         self._corners = corners
         self._a_of, self._b_of = map_factors(unit * rest[self.faces])
-        # The unknowns of an element are those of its corners, one after the other; the same one may come twice.
+        # The unknowns of an element are those of its corners in order; an unknown may occur twice.
         sizes = np.diff(motions.start)[corners.ravel()]
         ends = np.cumsum(sizes)
         self._start = np.concatenate([[0], ends[2::3]])
@@ -97,7 +103,7 @@ class Elements:
         self._find_pattern()
 
     def of_parts(self, chosen: BoolArray) -> tuple[Elements, IntArray]:
-        """Return the elements of chosen parts (parts,), numbered anew, and (k',) the numbers of their unknowns here."""
+        """Return the elements of chosen parts (parts,), renumbered, and (k',) the indices here of their unknowns."""
         some = chosen[self.part]
         unknowns = np.flatnonzero(chosen[self.unknown_part])
         number = np.zeros(self.count + 1, dtype=np.int64)
@@ -121,7 +127,7 @@ class Elements:
         self._slots = np.empty(len(rows), dtype=np.int64)
         indptr, indices = np.zeros(k + 1, dtype=np.int32), np.empty(len(rows), dtype=np.int32)
         count = number_pairs(rows, columns, indptr, indices, self._slots)
-        # One matrix for all steps: its pattern is analysed once.
+        # One matrix for all steps, so that its pattern is analysed once.
         self._matrix = csc_matrix((np.zeros(count), indices[:count].copy(), indptr), shape=(k, k))
         self._indices, self._indptr = self._matrix.indices, self._matrix.indptr
         self._squares = squares
@@ -130,17 +136,17 @@ class Elements:
             k, self._indices.astype(np.int64), np.arange(k).repeat(np.diff(self._indptr))
         )
         first = self._unknown[self._start[:-1]]
-        self.part = np.append(self.unknown_part, 0)[first]  # the offset's is any: then all take one step
+        self.part = np.append(self.unknown_part, 0)[first]  # any part for the offset: all share a step
 
     def maps(self, points: ComplexArray) -> Maps:
-        """Return the maps at given places of all points."""
+        """Return the maps at given positions (u,) of all points."""
         places = points[self._corners]
-        # Relative to a corner, so that far from the origin no digits are lost.
+        # Relative to a corner, to avoid cancellation far from the origin.
         places = places - places[:, :1]
         return Maps((self._a_of * places).sum(axis=1), (self._b_of * places).sum(axis=1))
 
     def change(self, step: FloatArray) -> Maps:
-        """Return how the maps change with a step of the unknowns, (k,) or with the offset's share (k + 1,)."""
+        """Return the change of the maps for a step of the unknowns, with the offset as the last entry (k + 1,)."""
         values = step[self._unknown]
         sums = [np.add.reduceat(factor * values, self._start[:-1]) for factor in (self._alpha, self._beta)]
         return Maps(sums[0], sums[1])
@@ -156,14 +162,18 @@ class Elements:
     def newton_system(
         self, energy: Energy, maps: Maps, offset: float
     ) -> tuple[FloatArray, FloatArray, csc_matrix]:
-        """Return the gradient (k,), what an offset adds to it, and the Hessian, made positive triangle by triangle.
+        """Return the gradient (k,), the contribution of an offset to it (k,), and the positive semidefinite Hessian.
 
-        offset: how much of the last unknown, which is none to be solved for, is going to be added.
+        Args:
+            energy: the energy.
+            maps: the current maps.
+            offset: the prescribed change of the last unknown, which is not solved for.
 
         Notes:
-            In the lengths A = |a| and B = |b|, and their directions, a triangle's Hessian falls apart into a block of
+            In the lengths A = |a| and B = |b|, and their directions, a triangle's Hessian decouples into a block of
             two by two for the lengths and one number each for the directions, psi_A / A and psi_B / B (in other
-            coordinates: Smith, de Goes, Kim, "Analytic eigensystems for isotropic distortion energies", 2019).
+            coordinates: Smith, de Goes, Kim, "Analytic eigensystems for isotropic distortion energies", 2019). Each
+            block is projected to a positive semidefinite one.
         """
         one, two = np.abs(maps.a), np.abs(maps.b)
         found = energy.derivatives(one + two, one - two)
@@ -174,7 +184,7 @@ class Elements:
         unit_a = maps.a / one  # |a| > |b|
         is_round = two <= 1e-9 * one
         unit_b = np.where(is_round, 1.0, maps.b / np.where(is_round, 1.0, two))
-        # By symmetry psi_B vanishes with B, and so the quotient is the second derivative there.
+        # By symmetry psi_B vanishes for B = 0, so the limit of the quotient is the second derivative.
         turn_b = np.where(is_round, last, by_b / np.where(is_round, 1.0, two))
         turn_a = by_a / one
         middle, half = (first + last) / 2, (first - last) / 2
@@ -221,7 +231,7 @@ class Elements:
 def fill_pairs(
     start: IntArray, unknown: IntArray, squares: IntArray, rows: IntArray, columns: IntArray
 ) -> None:
-    """Fill the ordered pairs of the unknowns of each element."""
+    """Fill in the ordered pairs of the unknowns of each element."""
     for f in range(len(start) - 1):
         at = squares[f]
         for i in range(start[f], start[f + 1]):
@@ -235,13 +245,13 @@ def fill_pairs(
 def number_pairs(
     rows: Int32Array, columns: Int32Array, indptr: Int32Array, indices: Int32Array, slots: IntArray
 ) -> int:
-    """Number pairs by column and row, equal ones alike, as entries of a sparse matrix; return how many there are.
+    """Number the distinct pairs by column and row, as entries of a sparse matrix; return the number of entries.
 
     Args:
         rows, columns: (p,) the pairs; those with an index of k or more are left out.
-        indptr: (k + 1,) zeros on entry; filled with where each column begins.
+        indptr: (k + 1,) zeros on entry; filled with the start of each column.
         indices: (p,) filled with the rows of the entries.
-        slots: (p,) filled with the number of each pair, -1 if it is left out.
+        slots: (p,) filled with the entry of each pair, -1 if it is left out.
     """
     k = len(indptr) - 1
     begin = np.zeros(k + 1, np.int64)
@@ -252,7 +262,7 @@ def number_pairs(
     for i in range(k):
         begin[i + 1] += begin[i]
         indptr[i + 1] += indptr[i]
-    # By row, and then, with the order kept, by column.
+    # Sort by row, and then by column with a stable sort.
     by_row, by_column = np.empty(begin[k], np.int64), np.empty(begin[k], np.int64)
     for p in range(len(rows)):
         slots[p] = -1
@@ -296,14 +306,14 @@ def add_elements(
     """Add up the gradient and the Hessian.
 
     Args:
-        start: (f + 1,) where the unknowns of each element begin.
-        unknown, alpha, beta: the unknowns, and by how much each of them changes a and b.
-        squares, slots: where the pairs of each element begin, and where in `values` they go.
-        unit_a, unit_b: (f,) directions of a and b.
+        start: (f + 1,) the start of the unknowns of each element.
+        unknown, alpha, beta: the unknowns, and the derivatives of a and b by each of them.
+        squares, slots: the start of the pairs of each element, and the entry of `values` for each pair.
+        unit_a, unit_b: (f,) directions of a and b as unit complex numbers.
         slopes: (f, 2) derivatives by |a| and |b|.
-        bends: (f, 5) second derivatives: by |a|, by |b|, mixed, and across a and b.
+        bends: (f, 5) second derivatives: by |a|, by |b|, mixed, and perpendicular to a and b.
         gradient: (k + 1,) added to.
-        pull: (k + 1,) the column of the Hessian of the last unknown, added to.
+        pull: (k + 1,) the column of the Hessian for the last unknown, added to.
         values: the entries of the Hessian, added to.
     """
     last = len(gradient) - 1

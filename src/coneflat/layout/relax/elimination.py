@@ -1,4 +1,4 @@
-"""Solutions of small systems of linear equations of which some may depend on others."""
+"""Solutions of small systems of linear equations, some of which may be linearly dependent."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from scipy.sparse import csr_matrix
 from ...base.arrays import FloatArray, IntArray
 from ...mesh.connectivity import label_components
 
-# Relative size below which what elimination leaves of an equation, or of a coefficient of integers, is rounding.
+# Relative size below which the residual of an eliminated equation, or an eliminated integer coefficient, is rounding.
 RELATIVE_ROUNDING = 1e-10
-# Coefficients of an orthogonal basis below this are none; what is taken for none is missed by the sides of seams.
+# Coefficients of an orthogonal basis below this value are set to zero; the sides of seams differ by the dropped part.
 ZERO_COEFFICIENT = 1e-15
-# Part of the largest coefficient of an equation that a pivot has at least.
+# Minimum size of a pivot, as a fraction of the largest coefficient of the equation.
 MIN_PIVOT_SHARE = 0.5
-# Columns that LAPACK turns together.
+# Block size of LAPACK, in columns.
 PANEL_COLUMNS = 32
 
 
 def sparse_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, FloatArray]:
-    """Return (v, k + 1) a basis of the solutions of equations, one of these in the last column, and what was missed.
+    """Return the solutions of linear equations as a sparse basis, and the residuals of dependent equations.
 
-    Equations with the fewest variables are solved first, each for the variable that is in the fewest others (H. M.
-    Markowitz, "The elimination form of the inverse and its application to linear programming", 1957), so that variables
-    depend on few; those of an orthogonal basis would depend on all.
+    Equations with the fewest variables are solved first, each for the variable that is in the fewest other equations
+    (H. M. Markowitz, "The elimination form of the inverse and its application to linear programming", 1957), so that
+    each variable depends on few others; with an orthogonal basis it would depend on all.
 
     Args:
-        rows: (r, v) coefficients, dependent ones among them are no harm.
-        right: (r,).
+        rows: (r, v) coefficients; equations may be linearly dependent.
+        right: (r,) right-hand sides.
 
     Returns:
-        The basis, and (d,) what is left of the right-hand sides of equations that depend on others: 0 unless they
-        contradict these.
+        (v, k + 1) a basis of the k-dimensional space of homogeneous solutions, with a particular solution in the last
+        column; and (d,) the residuals of the dependent equations, 0 if the equations are consistent.
     """
     work = np.concatenate([rows.toarray(), right[:, None]], axis=1)
     count = rows.shape[1]
@@ -69,35 +69,35 @@ def sparse_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, F
 
 
 def orthogonal_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, FloatArray]:
-    """Return (v, k + 1) a basis of the solutions of equations, one of these in the last column, and what was missed.
+    """Return the solutions of linear equations by QR factorization, and the residuals of dependent equations.
 
-    Each set of variables that equations connect is solved for by itself.
+    Each set of variables that equations connect is solved for separately.
 
     Args:
-        rows: (r, v) coefficients, dependent ones among them are no harm.
-        right: (r,).
+        rows: (r, v) coefficients; equations may be linearly dependent.
+        right: (r,) right-hand sides.
 
     Returns:
-        The basis, and (d,) what is left of the right-hand sides, turned: rounding unless equations contradict each
-        other.
+        (v, k + 1) a basis of the k-dimensional space of homogeneous solutions, with a particular solution in the last
+        column; and (d,) the remaining transformed right-hand sides, rounding errors if the equations are consistent.
     """
     variables = rows.shape[1]
-    missed, at, columns, values, count = [np.empty(0)], [], [], [], 0
+    residuals, at, columns, values, count = [np.empty(0)], [], [], [], 0
     for own, rights, matrix in _blocks(rows):
         basis, last, left = _solutions_of_block(matrix, right[rights])
-        whole = np.concatenate([last[:, None], basis], axis=1)
-        row, column = np.nonzero(whole)
+        extended = np.concatenate([last[:, None], basis], axis=1)
+        row, column = np.nonzero(extended)
         at.append(own[row])
         columns.append(np.where(column == 0, -1, count + column - 1))
-        values.append(whole[row, column])
-        missed.append(left)
+        values.append(extended[row, column])
+        residuals.append(left)
         count += basis.shape[1]
     column = np.concatenate(columns)
     column[column < 0] = count
     solutions = csr_matrix(
         (np.concatenate(values), (np.concatenate(at), column)), shape=(variables, count + 1)
     )
-    return solutions, np.concatenate(missed)
+    return solutions, np.concatenate(residuals)
 
 
 def _blocks(rows: csr_matrix) -> Iterator[tuple[IntArray, IntArray, FloatArray]]:
@@ -125,11 +125,11 @@ def _blocks(rows: csr_matrix) -> Iterator[tuple[IntArray, IntArray, FloatArray]]
 
 
 def _solutions_of_block(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (w, f) a basis of what equations (h, w) let free, (w,) a solution, and what is left, turned."""
+    """Return (w, f) a basis of the null space of equations (h, w), (w,) a solution, and the transformed residuals."""
     height, width = rows.shape
     if not height:
         return np.eye(width), np.zeros(width), right
-    # By LAPACK itself: there may be thousands of blocks, and SciPy's checks take longer than all of it.
+    # LAPACK is called directly: there may be thousands of blocks, and SciPy's checks take longer than the computation.
     r, pivots, scales, _, _ = lapack.dgeqp3(rows, lwork=(width + 1) * PANEL_COLUMNS)
     turned = lapack.dormqr("L", "T", r[:, : len(scales)], scales, right[:, None], PANEL_COLUMNS)[0][:, 0]
     diagonal = np.abs(np.diag(r))

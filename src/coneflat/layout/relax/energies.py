@@ -23,17 +23,17 @@ class Derivatives(NamedTuple):
 
 
 class Energy(Protocol):
-    """What a triangle's map costs per area.
+    """The energy of a triangle's map per area.
 
-    It must be symmetric in the singular values, smooth for s1, s2 > 0, and grow without bound as s1 s2 falls to 0.
+    It must be symmetric in the singular values, smooth for s1, s2 > 0, and grow without bound as s1 s2 goes to 0.
 
     Attributes:
-        least: the least it can be, for an isometry say.
+        least: its minimum, for example that of an isometry.
     """
 
     @property
     def least(self) -> float:
-        """The least it can be."""
+        """Return the minimum of the energy."""
         ...
 
     def values(self, one: FloatArray, two: FloatArray) -> FloatArray:
@@ -47,15 +47,16 @@ class Energy(Protocol):
 
 @dataclass(frozen=True)
 class StretchEnergy:
-    """Angles against areas: (M A^stretch)^sharpness, M = (s1/s2 + s2/s1) / 2 and A = (s1 s2 + 1/(s1 s2)) / 2.
+    """Energy of angles and areas: (M A^stretch)^sharpness, M = (s1/s2 + s2/s1) / 2 and A = (s1 s2 + 1/(s1 s2)) / 2.
 
     Attributes:
-        stretch: from 0, where angles alone count (MIPS: Hormann and Greiner 2000), to 1, where it is the symmetric
-            Dirichlet energy, least for isometries (Smith and Schaefer 2015). More weighs areas more still.
-        sharpness: 1, or more, where the worst triangles count more.
+        stretch: from 0, which measures angles alone (MIPS: Hormann and Greiner 2000), to 1, which is the symmetric
+            Dirichlet energy, minimal for isometries (Smith and Schaefer 2015). Larger values increase the weight of
+            areas further.
+        sharpness: 1 or more; larger values increase the weight of the worst triangles.
 
     Raises:
-        OptionError: `stretch` is negative, `sharpness` below 1, or one of them not finite.
+        OptionError: `stretch` is negative, `sharpness` is below 1, or one of them is not finite.
 
     Notes:
         P. Degener, J. Meseth, R. Klein, "An adaptable surface parametrization method", 2003.
@@ -66,13 +67,13 @@ class StretchEnergy:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.stretch) and self.stretch >= 0):
-            raise OptionError(f"stretch must be a number from 0, not {self.stretch!r}")
+            raise OptionError(f"stretch must be a number from 0, got {self.stretch!r}")
         if not (np.isfinite(self.sharpness) and self.sharpness >= 1):
-            raise OptionError(f"sharpness must be a number from 1, not {self.sharpness!r}")
+            raise OptionError(f"sharpness must be a number from 1, got {self.sharpness!r}")
 
     @property
     def least(self) -> float:
-        """The least it can be: 1, for isometries."""
+        """Return the minimum of the energy: 1, for isometries."""
         return 1.0
 
     def values(self, one: FloatArray, two: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""How the points of a layout move with unknowns, so that seams stay rigid copies and constraints hold."""
+"""Motions of the points of a layout as functions of unknowns, such that seams stay rigid and constraints hold."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from .constraints import CheckedConstraints
 from .elimination import RELATIVE_ROUNDING, orthogonal_solutions, sparse_solutions
 from .seam_chains import SeamChains, constrained_chains
 
-# What rounding leaves between the sides of seams is looked at in units of this, in which it is not none.
+# Unit of the rounding gaps between the sides of seams. In this unit they are large enough not to be treated as zero.
 CLOSING_UNIT = 2.0**-40
 
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """The shift of each point as a sum of unknowns times complex numbers.
+    """The shift of each point as a sum of real unknowns times complex coefficients.
 
     Attributes:
         count: the number of unknowns k, all real.
-        start: (u + 1,) where those of each point begin.
-        unknown, coefficient: which they are, and by what they shift the point. The unknown k is none to be solved for:
-            at 1 it takes the points to where the constraints want them.
-        has_offset: whether constraints do not hold as the points are.
-        made_by: what has made them.
+        start: (u + 1,) the start of the entries of each point.
+        unknown, coefficient: the unknown of each entry, and the shift of the point per unit of it. Unknown k is not
+            solved for: with the value 1 it moves the points to where the constraints hold.
+        has_offset: whether constraints do not hold at the current points.
+        builder: the builder of these motions.
     """
 
     count: int
@@ -39,24 +39,24 @@ class Motions:
     unknown: IntArray
     coefficient: ComplexArray
     has_offset: bool
-    made_by: _Builder
+    builder: _Builder
 
     def closed(self, points: ComplexArray) -> ComplexArray:
-        """Return points (u,) that were moved so, with what rounding has left between the sides of seams closed.
+        """Return (u,) moved points with the rounding gaps between the sides of seams closed.
 
-        Layouts may shrink a thousand times, and what is rounding of where points were is as much more of a seam then.
-        Those that were brought to quarter turns stay as they are.
+        If a layout shrinks by a factor of a thousand, the relative size of rounding errors grows by the same factor.
+        Layouts with quarter turns are returned unchanged.
         """
-        if self.made_by.constraints.quarter_turns or not len(self.made_by.chains.edges):
+        if self.builder.constraints.quarter_turns or not len(self.builder.chains.edges):
             return points
-        motions = self.made_by.at(points).motions()
+        motions = self.builder.at(points).motions()
         step = np.zeros(motions.count + 1)
         step[-1] = CLOSING_UNIT
         moved: ComplexArray = points + motions.shifts(step)
         return moved
 
     def shifts(self, step: FloatArray) -> ComplexArray:
-        """Return (u,) the shifts of the points, with step (k + 1,)."""
+        """Return (u,) the complex shifts of the points for a step (k + 1,) of the unknowns and the offset."""
         size = len(self.start) - 1
         moved = self.coefficient * step[self.unknown]
         total = np.empty(size, dtype=np.complex128)
@@ -66,7 +66,7 @@ class Motions:
 
     @cached_property
     def _point(self) -> IntArray:
-        """The point that each of the coefficients is of."""
+        """Return the point of each coefficient."""
         return np.arange(len(self.start) - 1).repeat(np.diff(self.start))
 
 
@@ -77,19 +77,19 @@ def find_motions(
     is_free: BoolArray,
     constraints: CheckedConstraints,
 ) -> Motions:
-    """Return the motions of points that keep the rotation across every seam, and do what constraints say.
+    """Return the motions of points that preserve the rotation across every seam and satisfy constraints.
 
-    An ordinary point has two unknowns, its shift. So has a vertex within a seam, whose second point is shifted by the
-    same, turned by the rotation of the seam, plus the change of the seam's translation. These changes, and the shifts
-    of the points where seams end, depend on each other through a small linear system, whose solutions are spanned by
-    further unknowns.
+    An ordinary point has two unknowns, its shift. A vertex within a seam also has two; the shift of its second point is
+    that of the first, rotated by the rotation of the seam, plus the change of the seam's translation. These changes
+    and the shifts of the points where seams end satisfy a small linear system, whose solutions are spanned by further
+    unknowns.
 
     Args:
         mesh: the mesh.
         corners: (m, 3) the point at each triangle corner.
-        points: (u,) of the plane.
-        is_free: (n,) vertices that may move; where a seam has others inside, its translation stays.
-        constraints: what else points must do.
+        points: (u,) positions in the plane as complex numbers.
+        is_free: (n,) True for vertices that may move; the translation of a seam that contains others is fixed.
+        constraints: further constraints on points.
 
     Raises:
         SeamError: the sides of a seam are not rigid copies of each other.
@@ -100,13 +100,13 @@ def find_motions(
     return _Builder(points, vertex, is_free, chains, constraints).motions()
 
 
-def _require_solved(missed: float, right: FloatArray) -> None:
-    if missed > RELATIVE_ROUNDING * max(1.0, float(np.abs(right).max())):
-        raise OptionError(f"constraints contradict each other, or the seams: by {missed:.2g} at least")
+def _require_solved(residual: float, right: FloatArray) -> None:
+    if residual > RELATIVE_ROUNDING * max(1.0, float(np.abs(right).max())):
+        raise OptionError(f"constraints contradict each other, or the seams, by at least {residual:.2g}")
 
 
 class _Builder:
-    """The equations between shifts of nodes, changes of translations and of lines, and what follows for all points."""
+    """The linear system of node shifts, translation changes and line shifts, and the motions of all points."""
 
     def __init__(
         self,
@@ -125,12 +125,12 @@ class _Builder:
         on_seam = np.zeros(len(points), dtype=bool)
         on_seam[chains.left] = on_seam[chains.right] = True
         self.is_special = on_seam & chains.is_node[vertex]
-        held = np.concatenate([constraints.pinned, constraints.on_line])
-        if len(held):
-            twice, times = np.unique(held, return_counts=True)
+        fixed = np.concatenate([constraints.pinned, constraints.on_line])
+        if len(fixed):
+            twice, times = np.unique(fixed, return_counts=True)
             self.is_special[twice[times > 1]] = True
         self.is_special &= self.is_free
-        # Real variables of the small system: two for each special point and each translation, one for each line.
+        # Real variables of the linear system: two for each special point and each translation, one for each line.
         self.of_point = np.full(len(points), -1)
         special = np.flatnonzero(self.is_special)
         self.of_point[special] = 2 * np.arange(len(special))
@@ -149,7 +149,7 @@ class _Builder:
         ]
 
     def at(self, points: ComplexArray) -> _Builder:
-        """Return the same for points that these were moved to; its offset, in `CLOSING_UNIT`, closes all seams."""
+        """Return the builder for moved points; its offset, in units of `CLOSING_UNIT`, closes all seams."""
         return _Builder(
             points, self.vertex, self.free_vertices, self.chains, self.constraints, is_closing=True
         )
@@ -159,16 +159,16 @@ class _Builder:
         chains = self.chains
         stays = ~self.is_free[chains.left] & ~chains.is_node[chains.vertices]
         is_loose = np.bincount(chains.chain, stays.any(axis=1), len(chains.rotation)) == 0
-        held = np.sort(self.constraints.held_seams, axis=1)
-        if len(held):
+        fixed = np.sort(self.constraints.held_seams, axis=1)
+        if len(fixed):
             n = int(self.vertex.max()) + 1
             ends = np.sort(chains.vertices, axis=1)
-            is_held = np.isin(ends[:, 0] * n + ends[:, 1], held[:, 0] * n + held[:, 1])
-            is_loose[chains.chain[is_held]] = False
+            is_fixed = np.isin(ends[:, 0] * n + ends[:, 1], fixed[:, 0] * n + fixed[:, 1])
+            is_loose[chains.chain[is_fixed]] = False
         return np.flatnonzero(is_loose)
 
     def _translations(self) -> ComplexArray:
-        """Return (c,) what is added to the left side of each chain, turned, on average, to give the right one."""
+        """Return (c,) the mean translation of each chain from its rotated left side to its right side."""
         chains = self.chains
         off = (
             self.points[chains.right] - chains.rotation[chains.chain, None] * self.points[chains.left]
@@ -179,13 +179,13 @@ class _Builder:
         total /= np.maximum(np.bincount(chains.chain, minlength=count), 1)
         return total
 
-    def _missing(self, left: IntArray, right: IntArray, chain: IntArray) -> ComplexArray:
-        """Return by what right points have to be shifted to be where the left ones go; nothing along rigid seams."""
+    def _gaps(self, left: IntArray, right: IntArray, chain: IntArray) -> ComplexArray:
+        """Return the shifts of right points that close the gaps to the mapped left points; zero for rigid seams."""
         if not (self.constraints.quarter_turns or self.is_closing):
             return np.zeros(len(left), dtype=np.complex128)
         turned: ComplexArray = self.chains.rotation[chain] * self.points[left]
-        missing: ComplexArray = turned + self.translation[chain] - self.points[right]
-        return missing / CLOSING_UNIT if self.is_closing else missing
+        gaps: ComplexArray = turned + self.translation[chain] - self.points[right]
+        return gaps / CLOSING_UNIT if self.is_closing else gaps
 
     def motions(self) -> Motions:
         """Return the motions."""
@@ -199,7 +199,7 @@ class _Builder:
         self._add_seams()
         self._add_ordinary()
         point, unknown, coefficient = (np.concatenate(parts) for parts in zip(*self.entries, strict=True))
-        last = unknown < 0  # the offset, whose number is known only now
+        last = unknown < 0  # the offset, whose index is known only now
         unknown = np.where(last, self.count, unknown)
         order = np.argsort(point, kind="stable")
         start = np.searchsorted(point[order], np.arange(len(self.points) + 1))
@@ -213,7 +213,7 @@ class _Builder:
         )
 
     def _add(self, points: IntArray, variables: IntArray, factors: ComplexArray, is_complex: bool) -> None:
-        """Have points shifted by variables of the small system, each times a factor."""
+        """Add shifts of points by variables of the linear system, each multiplied by a factor."""
         if not len(points):
             return
         rows = self._basis[variables]
@@ -231,7 +231,7 @@ class _Builder:
         self.entries.append((points[moved], np.full(int(moved.sum()), -1), shifts[moved]))
 
     def _add_seams(self) -> None:
-        """Let the vertices within seams move, both points of each together."""
+        """Add the motions of vertices within seams, which move both points of a vertex."""
         chains = self.chains
         if not len(chains.edges):
             return
@@ -241,7 +241,7 @@ class _Builder:
         chain = np.broadcast_to(chains.chain[:, None], chains.left.shape)[inside][at]
         self.is_special[left] = self.is_special[right] = True
         turn = chains.rotation[chain]
-        self._add_offset(right, self._missing(left, right, chain))
+        self._add_offset(right, self._gaps(left, right, chain))
         on_line = np.isin(left, self.constraints.on_line)
         self._add_on_lines(left[on_line], right[on_line], turn[on_line])
         one, two, turning = left[~on_line], right[~on_line], turn[~on_line]
@@ -255,7 +255,7 @@ class _Builder:
         self._add(right[moves], self.of_chain[chain[moves]], ones, is_complex=True)
 
     def _add_on_lines(self, left: IntArray, right: IntArray, turn: ComplexArray) -> None:
-        """Let left points within seams move along their lines and with these, and the right ones alike."""
+        """Add the motions of left points within seams along and with their lines, and of the matching right points."""
         if not len(left):
             return
         c = self.constraints
@@ -275,19 +275,19 @@ class _Builder:
             self._add(points[shifts], self.of_line[line[shifts]], (factor * normal)[shifts], is_complex=False)
 
     def _add_ordinary(self) -> None:
-        """Let all other points move: anywhere, along a line, or to their places."""
+        """Add the motions of all other points: free, along a line, or to their prescribed positions."""
         c = self.constraints
         rest = self.is_free & ~self.is_special
         if len(c.pinned) or len(c.on_line):
-            self._add_held(rest)
+            self._add_constrained(rest)
         free = np.flatnonzero(rest)
         for axis, step in enumerate((1.0, 1j)):
             directions = np.full(len(free), step, dtype=np.complex128)
             self._add_unknowns(free, directions, self.count + 2 * np.arange(len(free)) + axis)
         self.count += 2 * len(free)
 
-    def _add_held(self, rest: BoolArray) -> None:
-        """Let points move to their places or along their lines, if they are among `rest` (u,), and take them out."""
+    def _add_constrained(self, rest: BoolArray) -> None:
+        """Add the motions of pinned points and points on lines that are in `rest` (u,), and remove them from it."""
         c = self.constraints
         pins = np.flatnonzero(rest[c.pinned])
         self._add_offset(c.pinned[pins], as_complex(c.places[pins]) - self.points[c.pinned[pins]])
@@ -304,7 +304,10 @@ class _Builder:
         rest[c.on_line] = False
 
     def _off_line(self, points: IntArray, line: IntArray) -> FloatArray:
-        """Return (q,) by how much each point has to go to the left to its line; a loose one is where its first is."""
+        """Return (q,) the signed distance of each point to its line, positive to the left of its direction.
+
+        A line that may move sideways passes through its first point.
+        """
         c = self.constraints
         across = (np.conj(1j * as_complex(c.directions)[c.line]) * self.points[c.on_line]).real
         at = c.offsets.copy()
@@ -317,25 +320,25 @@ class _Builder:
         return here
 
     def _solutions(self) -> csr_matrix:
-        """Return (v, k + 1) a basis of the variables' values, and one solution of the equations in the last column."""
+        """Return (v, k + 1) a basis of the variables' values, and a particular solution in the last column."""
         rows, right = self._equations()
         if not len(right):
             return eye(self.size, self.size + 1, format="csr")
-        has_whole = self.constraints.quarter_turns
-        basis, left = (sparse_solutions if has_whole else orthogonal_solutions)(rows, right)
-        if has_whole or not self.is_closing:  # rounding may contradict itself, between points that stay
+        is_integer = self.constraints.quarter_turns
+        basis, left = (sparse_solutions if is_integer else orthogonal_solutions)(rows, right)
+        if is_integer or not self.is_closing:  # rounding gaps between fixed points may be inconsistent
             _require_solved(float(np.abs(left).max(initial=0.0)), right)
         return basis
 
     def _equations(self) -> tuple[csr_matrix, FloatArray]:
-        """Return (r, v) equations between the variables, and their right-hand sides (r,)."""
+        """Return (r, v) the equations between the variables, and their right-hand sides (r,)."""
         ends, values = self._equations_of_ends()
         rows: list[FloatArray] = []
         right: list[float] = []
         c = self.constraints
 
         def add(terms: list[tuple[int, complex]], value: complex) -> None:
-            """Add the sum of complex variables times factors = value as two real equations."""
+            """Add the equation "sum of factors times complex variables = value" as two real equations."""
             both = np.zeros((2, self.size))
             for variable, factor in terms:
                 both[0, variable] += factor.real
@@ -365,7 +368,7 @@ class _Builder:
         return vstack([ends, csr_matrix(np.array(rows))], format="csr"), np.concatenate([values, right])
 
     def _equations_of_ends(self) -> tuple[csr_matrix, FloatArray]:
-        """Return equations (2 q, v) and right-hand sides (2 q,): at ends of chains left points go to right ones."""
+        """Return equations (2 q, v) and right-hand sides (2 q,): chains map left points at nodes to right ones."""
         chains = self.chains
         edge, end = np.nonzero(chains.is_node[chains.vertices])
         chain, left, right = chains.chain[edge], chains.left[edge, end], chains.right[edge, end]
@@ -381,11 +384,11 @@ class _Builder:
         column = np.concatenate([variable, variable + 1, variable, variable + 1])
         some = entries != 0
         rows = csr_matrix((entries[some], (row[some], column[some])), shape=(2 * len(chain), self.size))
-        missing = self._missing(left, right, chain)
-        return rows, np.stack([missing.real, missing.imag], axis=1).ravel()
+        gaps = self._gaps(left, right, chain)
+        return rows, np.stack([gaps.real, gaps.imag], axis=1).ravel()
 
     def _tie(self, side: int, shift: complex) -> tuple[int, complex]:
-        """Return a half-edge's chain, and the change of its translation that makes `shift` of that to the half-edge."""
+        """Return a half-edge's chain, and the change of its translation that gives the half-edge the one in `shift`."""
         chains = self.chains
         at = np.argwhere(chains.halfedges == side)
         if not len(at):
@@ -393,7 +396,7 @@ class _Builder:
         k, is_right = at[0].tolist()
         chain = int(chains.chain[k])
         if self.of_chain[chain] < 0:
-            raise OptionError(f"tied half-edge {side} is on a seam that is held")
+            raise OptionError(f"tied half-edge {side} is on a seam with a fixed translation")
         turn = complex(chains.rotation[chain])
         wanted = shift if is_right else -turn * shift
         return chain, wanted - complex(self.translation[chain])

@@ -1,4 +1,4 @@
-"""StretchEnergy of a layout minimised over all layouts whose seams are rigid copies with the same rotations."""
+"""Minimisation of the distortion of a layout while both sides of seams stay rigid copies with the same rotations."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ from .elements import Elements
 from .energies import Energy, StretchEnergy
 from .motions import find_motions
 
-# Part of the energy above the least that a step must promise to gain to be taken, and steps at most.
+# A step is taken if its predicted decrease is above this fraction of the energy minus its lower bound; and the maximum
+# number of steps.
 TOLERANCE, STEPS = 1e-3, 100
 
 
@@ -40,9 +41,9 @@ class Relaxed:
     """A relaxed layout.
 
     Attributes:
-        points: (u, 2) of the plane.
-        energy_before, energy: of the triangles that could move, as the mean over them by weight.
-        steps: Newton steps.
+        points: (u, 2) positions in the plane.
+        energy_before, energy: weighted mean energy of the triangles that could move, at the start and at the end.
+        steps: number of Newton steps.
         moved: (n,) True for vertices that could move.
     """
 
@@ -67,64 +68,67 @@ def relax(
     steps: int = STEPS,
     progress: Callable[[int, float], bool | None] | None = None,
 ) -> Relaxed:
-    """Return a layout of less distortion, in which no triangle is flipped and seams are what they were.
+    """Return a layout with less distortion and the same seams, without flipping any triangle.
 
-    A seam is where the triangles on both sides have different points; the one side is a rigid copy of the other.
-    Their rotations stay and their translations may change, so cones keep their angles and the two sides of every seam
-    their equal lengths: the layout remains one of a flat metric with the same cones.
+    A seam is an edge whose two triangles have different points; one side is a rigid copy of the other.
+    The rotations of seams are preserved and their translations may change, so cones keep their angles and the two sides
+    of every seam stay equal: the result is again a layout of a flat metric with the same cones.
 
     Args:
         mesh: the mesh.
-        points: (u, 2) of the plane. Triangles that are flipped there, or have no area, stay as they are.
+        points: (u, 2) positions in the plane. Triangles that are flipped there, or have no area, do not move.
         corners: (m, 3) the point at each triangle corner, from 0.
-        energy: what a triangle costs, per area; None: its distortion of angles, `StretchEnergy(0)`.
-        constraints: what points must do; None for nothing.
-        lengths: (m, 3) side lengths of the triangles as they should be, column i opposite corner i; None: those
-            between the positions of the mesh.
-        weights: (m,) what each triangle counts besides its area; None: the same.
-        free: (n,) True for vertices that may move; None: all.
-        tolerance: part of the energy above the least there can be that a step must promise to gain to be taken.
-        steps: Newton steps at most.
-        progress: called after each step with its number and the energy; what it has found so far is returned where
-            this returns True.
+        energy: the energy of a triangle per area; None for its angle distortion, `StretchEnergy(0)`.
+        constraints: constraints on points; None for none.
+        lengths: (m, 3) target side lengths of the triangles, column i opposite corner i; None for those of the mesh.
+        weights: (m,) weights of the triangles in addition to their areas; None for equal weights.
+        free: (n,) True for vertices that may move; None for all.
+        tolerance: a step is taken if its predicted decrease is above this fraction of the energy minus its lower bound.
+        steps: maximum number of Newton steps.
+        progress: called after each step with its number and the energy; if it returns True, the iteration ends with
+            the current result.
+
+    Returns:
+        The relaxed layout.
 
     Raises:
-        ArrayShapeError, FaceIndexError, NonFiniteError: arrays do not fit the mesh, or are not finite.
+        ArrayShapeError, FaceIndexError, NonFiniteError: arrays do not match the mesh, or are not finite.
         LengthError: the lengths are not a metric.
-        OptionError: the constraints make no sense, or contradict each other.
+        OptionError: the constraints are invalid, or contradict each other.
         SeamError: the two sides of a seam are not rigid copies of each other.
-        ConvergenceError: constraints cannot be reached without flipping a triangle, as far as is known.
+        ConvergenceError: no way was found to satisfy the constraints without flipping a triangle.
         MetricError: the computation found no finite result.
 
     Notes:
-        Newton's method with each triangle's Hessian made positive, in closed form (Smith, de Goes, Kim, "Analytic
-        eigensystems for isotropic distortion energies", 2019), by steps that flip no triangle (Smith and Schaefer,
-        "Bijective parameterization with free boundaries", 2015). Seams are not constraints but eliminated, so the
-        system is symmetric positive definite, and of one pattern for all steps.
+        Newton's method with each triangle's Hessian projected to a positive semidefinite one in closed form (Smith, de
+        Goes, Kim, "Analytic eigensystems for isotropic distortion energies", 2019), with steps that flip no triangle
+        (Smith and Schaefer, "Bijective parameterization with free boundaries", 2015). Seams are not added as
+        constraints but eliminated, so the system is symmetric positive definite, with one sparsity pattern for all
+        steps.
     """
     energy = StretchEnergy() if energy is None else energy
     places = as_floats("points", points)
     if places.ndim != 2 or places.shape[1] != 2:
-        raise ArrayShapeError(f"points must have the shape (u, 2), not {places.shape}")
+        raise ArrayShapeError(f"points must have the shape (u, 2), got {places.shape}")
     corner = as_faces(corners, len(places))
     if corner.shape != mesh.faces.shape:
         raise ArrayShapeError(
-            f"corners must have the shape {mesh.faces.shape}, as the faces, not {corner.shape}"
+            f"corners must have the shape {mesh.faces.shape} of the faces, got {corner.shape}"
         )
     require_finite(places, corner)
     own = edge_lengths(mesh.vertices, mesh.faces) if lengths is None else check_lengths(mesh, lengths)
     if not 0 <= tolerance < 1 or steps < 0:
-        raise OptionError(f"tolerance must be from 0 to 1 and steps from 0, not {tolerance!r} and {steps!r}")
+        raise OptionError(f"tolerance must be from 0 to 1 and steps from 0, got {tolerance!r} and {steps!r}")
     checked = check_constraints(PointConstraints() if constraints is None else constraints, places)
     is_free = _flags(free, len(mesh.vertices))
     areas = double_areas(own) / 2
     share = areas * _weights(weights, len(mesh.faces))
     doubled = signed_double_areas(rows_of(places, corner))
-    # Of triangles that may move alone, mostly few.
+    # Only for triangles that may move, which are usually few.
     near = np.flatnonzero(has_any(is_free, mesh.faces))
     rest = np.empty(own.shape, dtype=np.complex128)
     rest[near] = at_rest = rest_sides(own[near])
-    is_thin = (np.conj(at_rest[:, 0]) * at_rest[:, 1]).imag <= 0  # but for rounding
+    is_thin = (np.conj(at_rest[:, 0]) * at_rest[:, 1]).imag <= 0  # up to rounding
     is_free[mesh.faces[near[(doubled[near] <= 0) | (areas[near] <= 0) | is_thin]]] = False
     if not is_free.any():
         return Relaxed(places, 0.0, 0.0, 0, is_free)
@@ -139,7 +143,7 @@ def relax(
     if found.remaining:
         raise ConvergenceError(
             f"constraints cannot be met without flipping triangles: {1 - found.remaining:.1%} of the way to them "
-            f"in {plural(found.steps, 'step')}"
+            f"after {plural(found.steps, 'step')}"
         )
     total = float(elements.weight.sum())
     moved = as_pairs(motions.closed(found.points))
@@ -147,7 +151,7 @@ def relax(
 
 
 def rest_sides(lengths: FloatArray) -> ComplexArray:
-    """Return (m, 3) the sides of triangles with given lengths (m, 3), positively oriented in the plane."""
+    """Return (m, 3) the complex side vectors of triangles with given lengths (m, 3), positively oriented."""
     sides = np.empty(lengths.size, dtype=np.complex128)
     place_triangles(np.ascontiguousarray(lengths).ravel(), sides)
     return sides.reshape(-1, 3)
@@ -159,7 +163,7 @@ def _flags(free: ArrayLike | None, count: int) -> BoolArray:
     flags = np.asarray(free)
     if flags.dtype != bool or flags.shape != (count,):
         raise ArrayShapeError(
-            f"free must be {count:,} flags, one for each vertex, not {flags.dtype} of shape {flags.shape}"
+            f"free must be {count:,} flags, one for each vertex, got {flags.dtype} of shape {flags.shape}"
         )
     return flags.copy()
 
@@ -169,7 +173,7 @@ def _weights(weights: ArrayLike | None, count: int) -> FloatArray:
         return np.ones(count)
     values = as_floats("weights", weights)
     if values.shape != (count,):
-        raise ArrayShapeError(f"weights must have the shape ({count},), not {values.shape}")
+        raise ArrayShapeError(f"weights must have the shape ({count},), got {values.shape}")
     if not (np.isfinite(values) & (values > 0)).all():
         raise OptionError(f"weights must be positive: {int((~(values > 0)).sum())} of {count:,} are not")
     return values

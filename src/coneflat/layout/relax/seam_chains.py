@@ -1,4 +1,4 @@
-"""The seams of a layout as chains of edges whose two sides are moved onto each other by one rigid motion each."""
+"""The seams of a layout as chains of edges; a rigid motion per chain maps one side onto the other."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ...mesh.charts import both_sides, point_seams
 from ...mesh.connectivity import TriangleMesh, label_components
 from .constraints import CheckedConstraints
 
-# Radians by which the rotation between the sides of a seam may change at a vertex without it being a cone. Cones have
-# curvatures of 1e-4 at least; lengths of edges of the plane are good to 1e-9 where they are shortest.
+# Largest change, in radians, of the rotation of a seam at a vertex that is not a cone. Cones have curvatures of at
+# least 1e-4; the shortest edge lengths in the plane are accurate to 1e-9.
 ROTATION_TOLERANCE = 1e-5
-# By how much of an edge the sides of a seam may miss being copies of each other.
+# Largest difference of the two lengths of a seam edge, relative to its length.
 RIGID_TOLERANCE = 1e-4
 QUARTER_TURNS = np.array([1, 1j, -1, -1j])
 
@@ -25,13 +25,13 @@ class SeamChains:
     """The seams of a layout, as k edges in c chains.
 
     Attributes:
-        edges: (k,) the mesh's edges.
-        vertices: (k, 2) the two ends of each.
-        left, right: (k, 2) the points at its ends on either side.
-        halfedges: (k, 2) the half-edges of the triangles on either side.
-        chain: (k,) the chain of each.
-        rotation: (c,) unit numbers: turned by it, the left side of a chain is parallel to the right one.
-        is_node: (n,) vertices where chains end: cones, branch points, those on the boundary, and those asked for.
+        edges: (k,) edge indices in the mesh.
+        vertices: (k, 2) the two end vertices of each edge.
+        left, right: (k, 2) the points at its ends on the left and on the right side.
+        halfedges: (k, 2) the half-edges of the triangles on the left and on the right side.
+        chain: (k,) the chain of each edge.
+        rotation: (c,) unit complex numbers that rotate the left side of a chain parallel to the right side.
+        is_node: (n,) True for vertices where chains end: cones, branch points, boundary vertices, and requested nodes.
     """
 
     edges: IntArray
@@ -57,9 +57,9 @@ def find_chains(
     Args:
         mesh: the mesh.
         corners: (m, 3) the point at each triangle corner.
-        points: (u,) of the plane.
-        nodes: vertices that are to be nodes, whether chains end there or not.
-        quarter_turns: rotations are the nearest quarter turns, whether the sides of seams are copies or not.
+        points: (u,) positions in the plane as complex numbers.
+        nodes: additional vertices at which chains end.
+        quarter_turns: True rounds rotations to quarter turns and does not require that sides are rigid copies.
 
     Raises:
         SeamError: the sides of a seam are not rigid copies of each other.
@@ -78,7 +78,7 @@ def find_chains(
     is_node = np.bincount(vertices.ravel(), minlength=len(mesh.vertices)) != 2
     is_node |= mesh.is_boundary_vertex
     is_node[nodes] = True
-    is_node[_turning(vertices, sides, turns, is_node)] = True
+    is_node[_rotating(vertices, sides, turns, is_node)] = True
     first, second = _strands(vertices, sides, is_node)
     swapped = second < first
     left = np.where(swapped[:, None], sides[1], sides[0])
@@ -101,7 +101,10 @@ def find_chains(
 def constrained_chains(
     mesh: TriangleMesh, corners: IntArray, points: ComplexArray, vertex: IntArray, c: CheckedConstraints
 ) -> SeamChains:
-    """Return the seams, with nodes at points that are held but on one line, as left ones within a seam may be."""
+    """Return the seams, with nodes at constrained points.
+
+    A point on a single line needs no node if it is a left point within a seam.
+    """
     if not len(c.on_line):
         nodes = np.concatenate([vertex[c.pinned], c.nodes])
         return find_chains(mesh, corners, points, nodes, quarter_turns=c.quarter_turns)
@@ -117,9 +120,9 @@ def constrained_chains(
 
 
 def _strands(vertices: IntArray, sides: IntArray, is_node: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return (k,) the number of what each edge's first side belongs to, and its second: sides that meet at no node."""
+    """Return (k,), (k,) the strands of each edge's first and second side: sides connected at vertices without node."""
     count = len(vertices)
-    # Numbered from 0 on the one hand and from `count` on the other.
+    # First sides are numbered from 0, second sides from `count`.
     point = sides.reshape(-1, 2).ravel()
     side = np.arange(2 * count).repeat(2)
     regular = ~is_node[np.concatenate([vertices, vertices]).ravel()]
@@ -132,20 +135,20 @@ def _strands(vertices: IntArray, sides: IntArray, is_node: BoolArray) -> tuple[I
 
 
 def _nearest_quarter(turns: ComplexArray) -> ComplexArray:
-    """Return the nearest of 1, i, -1 and -i."""
+    """Return for each number the nearest of 1, i, -1 and -i."""
     nearest: ComplexArray = QUARTER_TURNS[np.rint(np.angle(turns) / (np.pi / 2)).astype(np.int64) % 4]
     return nearest
 
 
-def _turning(vertices: IntArray, sides: IntArray, turns: ComplexArray, is_node: BoolArray) -> IntArray:
-    """Return the vertices at which two edges meet and the rotation changes from one to the other."""
+def _rotating(vertices: IntArray, sides: IntArray, turns: ComplexArray, is_node: BoolArray) -> IntArray:
+    """Return the vertices between two seam edges at which the rotation changes."""
     ends = vertices.ravel()
     edge = np.arange(len(vertices)).repeat(2)
     rest = ~is_node[ends]
     ends, edge, point = ends[rest], edge[rest], sides[0].ravel()[rest]
     order = np.argsort(ends, kind="stable").reshape(-1, 2)
     edge, point = edge[order], point[order]
-    # The first sides of both lie on the same hand if they meet at a point.
+    # The first sides of both edges are on the same side of the seam if they share a point.
     other = np.where(point[:, 0] == point[:, 1], turns[edge[:, 1]], np.conj(turns[edge[:, 1]]))
     turning: IntArray = ends[order[np.abs(other - turns[edge[:, 0]]) > ROTATION_TOLERANCE, 0]]
     return turning
@@ -161,5 +164,5 @@ def _check_rigid(edges: IntArray, vertices: IntArray, one: ComplexArray, two: Co
         pair = "-".join(str(v) for v in vertices[worst].tolist())
         raise SeamError(
             f"the sides of {int((off > RIGID_TOLERANCE).sum())} of {len(edges)} seam edges are not copies of each "
-            f"other: those of {pair} differ by {off[worst]:.2g} of their length"
+            f"other: those of edge {pair} differ by {off[worst]:.2g} of their length"
         )
