@@ -125,7 +125,7 @@ def project_arguments(
     context: click.Context, project: Path
 ) -> tuple[Path, dict[str, Any], Callable[[Flattening], Flattening]]:
     """Return the mesh of a project, its keyword arguments of `coneflat.flatten`, and a function that adds its notes."""
-    from ..studio.messages import noted
+    from ..studio.messages import with_warnings
     from ..studio.project import read_project
 
     for name in (*declarations(Options), "mesh", "paper", "weld"):
@@ -134,4 +134,4 @@ def project_arguments(
             raise click.UsageError(f"a project contains mesh and options: leave out {what}", context)
     opened = read_project(project)
     opened.check_mesh()
-    return opened.mesh, opened.choices.keywords(), lambda result: noted(result, opened.choices)
+    return opened.mesh, opened.choices.keywords(), lambda result: with_warnings(result, opened.choices)

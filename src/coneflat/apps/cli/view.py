@@ -138,5 +138,5 @@ def studio(
         if verbosity != QUIET or no_open:
             click.echo(line)
 
-    tell = click.echo if verbosity == VERBOSE else None
-    run_studio(file, port, opens=not no_open, say=say, tell=tell, color=color, most_triangles=most_triangles)
+    log = click.echo if verbosity == VERBOSE else None
+    run_studio(file, port, opens=not no_open, say=say, log=log, color=color, most_triangles=most_triangles)

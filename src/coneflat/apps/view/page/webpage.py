@@ -54,8 +54,8 @@ def page_of(
         texture: image file for the model: PNG, JPEG, GIF or WebP.
         up: the model's upward axis in the first view, "x", "y" or "z".
         show: display mode at the start: "checker", "picture", "charts", "qc", "area", "curvature" (of the model),
-            "flat" (curvature of the flat metric), "plain" or, with `color`, "own"; by default the values of `color`, else the
-            picture, else the checkerboard.
+            "flat" (curvature of the flat metric), "plain" or, with `color`, "own"; by default the values of `color`,
+            else the picture, else the checkerboard.
         color: quantity given by the user, or its name, see `own_quantity`.
         most_triangles: a mesh with more triangles is simplified for display.
         text: title and rows of the page; by default the main measures and the report.
