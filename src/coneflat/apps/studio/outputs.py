@@ -94,12 +94,9 @@ def curve_data(source: Joined, choices: Choices, report: Progress) -> dict[str, 
     from ...options import read_options
 
     words = curve_options(choices)
-    most = max(MOST_CONES, len(words.get("required_cones", ())) + 12)  # A dozen of them are free.
+    n = max(MOST_CONES, len(words.get("required_cones", ())) + 12)  # A dozen of them are free.
     found = whole_curve(
-        source.mesh,
-        None,
-        read_options({**source.renamed(words), "cone_count": most, "progress": report}),
-        most,
+        source.mesh, None, read_options({**source.renamed(words), "cone_count": n, "progress": report}), n
     )
     curve = {"counts": found.counts.tolist(), "distortions": found.distortions.tolist()}
     return {**curve, "knee": found.knee, "parts": found.parts}
